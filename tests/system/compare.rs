@@ -202,7 +202,7 @@ fn a_case_can_be_played_alone_and_gives_its_row_again() {
     let comparison = Comparison::run(&small(2), &Progress::silent()).expect("runs");
     let row = &comparison.rows[comparison.rows.len() - 1];
     assert!(
-        matches!(row.case.variation, Variation::Combination(_)),
+        matches!(row.case.variation, Variation::Drawn(_)),
         "{}",
         row.case.id
     );
@@ -459,4 +459,31 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
     for row in comparison.rows.iter().filter(|r| !r.case.feasible) {
         assert_eq!(row.figures.steady_error_mm, None);
     }
+}
+
+/// What a drawn case draws beside its factors: pressures at which the piston stands, other ones for each, and all four
+/// ticks of the law's period.
+#[test]
+fn a_drawn_case_begins_with_chambers_that_hold_the_piston() {
+    let sheet = AxisConfig::load(AXIS).expect("built in").axis;
+    let ambient = sheet.gas.ambient_pressure_pa;
+    let (mut ticks, mut filled) = ([0; 4], 0);
+    for number in 0..200 {
+        let mut plant = Factors::random(&sheet, number).plant(&sheet);
+        let supply = plant.supply.initial_pressure_pa;
+        ticks[Factors::draw_start(&mut plant, number) as usize] += 1;
+        let c = &plant.cylinder;
+        let (a, b) = (c.initial_pressure_a_pa, c.initial_pressure_b_pa);
+        assert!((ambient..=supply).contains(&a) && (ambient..=supply).contains(&b));
+        let circle = |d: f64| std::f64::consts::FRAC_PI_4 * d * d;
+        let (bore, rod) = (circle(c.bore_m), circle(c.rod_m));
+        let net_n = a * bore - b * (bore - rod) - ambient * rod + plant.load_n;
+        assert!(
+            net_n.abs() <= 0.5 * c.friction.coulomb_n + 1e-6,
+            "{number}: {net_n}"
+        );
+        filled += usize::from(a + b > ambient + supply);
+    }
+    assert!(ticks.iter().all(|n| *n > 30), "{ticks:?}");
+    assert!((60..140).contains(&filled), "{filled}");
 }

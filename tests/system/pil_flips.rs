@@ -8,7 +8,6 @@ use std::ops::Range;
 
 use crate::bench::pil::{Board, edge};
 use crate::bench::{closed_loop, delivery, frame, numbered, power_up, sync_frame};
-use wheeleg_node::{joint, wheel};
 use wheeleg_protocol::{
     Address, Arm, ClearFault, Decoder, Fault, FaultReport, LinkReport, Message, SCHEMA_HASH,
     SyncSlots, TransmitPosition, WheelSetpoint,
@@ -34,8 +33,6 @@ struct Subject {
     timeline: fn(&mut Ask<'_>),
     /// Edges at which flips happen: from arming until there is too little left to see.
     flip_edges: Range<u64>,
-    /// Ticks in which all seals of its configuration are looked at once.
-    round: usize,
     /// Its tick, ns.
     period_ns: u64,
     /// Ticks of a bus cycle, rounded up.
@@ -56,7 +53,6 @@ const JOINT: Subject = Subject {
     address: bench::ADDRESS,
     timeline: |ask| drop(closed_loop(480, ask)),
     flip_edges: 120..330,
-    round: joint::PARTS,
     period_ns: 1_000_000,
     cycle: 10,
     reset: 60,
@@ -70,7 +66,6 @@ const WHEEL: Subject = Subject {
     address: WHEEL_ADDRESS,
     timeline: follow,
     flip_edges: 240..680,
-    round: wheel::PARTS,
     period_ns: SAMPLE_NS,
     cycle: 20,
     reset: 120,
@@ -176,8 +171,6 @@ impl Flip {
 enum Came {
     /// The outputs are off from the second tick after it on.
     Held,
-    /// They are off once the seals of the configuration have all been looked at.
-    HeldInARound,
     /// They are off in the second tick after the next SYNC, which did not fit.
     HeldBySync,
     /// The board did exactly what it does without.
@@ -356,7 +349,6 @@ fn judge(subject: &Subject, baseline: &Timeline, flip: Flip) -> Came {
         () if flipped.driving == baseline.driving => Came::Nothing,
         () if flipped.reset && off(at + subject.reset) => Came::Reset,
         () if off(at + 2) => Came::Held,
-        () if off(at + 1 + subject.round) => Came::HeldInARound,
         () if off(at + 2 + subject.cycle) => Came::HeldBySync,
         () if whole && took_the_link_for_lost(subject, flip, &flipped) => Came::LinkLost,
         () if lost_one_frame(subject, baseline, flip, &flipped) => Came::FrameLost,
@@ -397,13 +389,11 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
         .collect();
     let held = count(Came::Held);
     println!(
-        "{}: {flips} flips in {size} bytes at edges {:?}: {held} held within 2 ticks, {} within \
-         {}, {} by the next SYNC, {} without effect, {} reset, {} took the link for lost, {} lost a frame and counted it, \
+        "{}: {flips} flips in {size} bytes at edges {:?}: {held} held within 2 ticks, \
+         {} by the next SYNC, {} without effect, {} reset, {} took the link for lost, {} lost a frame and counted it, \
          {} other {changed:?}",
         subject.image,
         subject.flip_edges,
-        count(Came::HeldInARound),
-        subject.round,
         count(Came::HeldBySync),
         count(Came::Nothing),
         count(Came::Reset),

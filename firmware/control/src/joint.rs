@@ -10,7 +10,7 @@
 //!      = limit(u)                            otherwise: braking
 //! ```
 //!
-//! * **Velocity** is a regression over a window ([`crate::velocity`]).
+//! * **Velocity** is a regression over a window ([`crate::paper::velocity`]).
 //! * **Anti-windup**: the integral advances only inside the integral zone, not
 //!   while the duty is limited and the error pushes further, and it is bounded by
 //!   its own scale. It is zero under the PD correction.
@@ -42,6 +42,7 @@ mod modes;
 mod settle;
 mod types;
 
-pub use config::{ConfigError, Gain, JointConfig, JointGains, JointParameter, JointRules};
+pub use crate::gain::Gain;
+pub use config::{ConfigError, JointConfig, JointGains, JointParameter, JointRules};
 pub use controller::JointController;
 pub use types::{Announced, Correction, JointInput, JointLimits, JointOutput, Law};

@@ -1,26 +1,20 @@
-//! Control laws of the robot's eight boards: pure functions of state and input,
-//! in fixed point.
+//! Control laws of the robot's eight boards: pure functions of configuration, state and input, in fixed point.
 //!
-//! * [`joint`]: proportional law with a fuzzy correction, rest detection,
-//!   anti-windup; on [`fuzzy`] (the inference engine), [`rules`] (its tables)
-//!   and [`velocity`] (the estimate of ė).
-//! * [`valve`] and [`pwm`]: from a signed duty to the on-times of four on/off
-//!   valves, with their switching delays compensated.
-//! * [`axis`]: the cylinder as the predictive law knows it: pressures, motion and
-//!   load without a pressure sensor.
-//! * [`reference`]: second-order reference generator with a governor, ahead of the predictive law.
-//! * [`wheel`]: the HCTL-1100's lead filter and its four modes.
-//!
-//! Cost on a Cortex-M4, as instructions in a linked image (opt-level 2, static
-//! count; every loop but the four valves is unrolled, so a tick executes
-//! fewer): rule base of 7 × 7 about 180, velocity 170, the whole joint tick 910, valve
-//! PWM 140 per valve at most, wheel sample about 300. The tick of a change of law adds one 64-bit
-//! division.
+//! | folder | what |
+//! |---|---|
+//! | [`observer`] | what an axis without a pressure sensor knows: valves, chamber pressures, motion, load, mass |
+//! | [`law`] | the predictive law on top: reference, prediction, switching curve, allocation, pulses, standstill |
+//! | [`tuning`] | all gains and thresholds of these two, each with unit, reason and the test that guards it |
+//! | [`axis`] | what a board is told of its axis, and the coefficients made of it |
+//! | [`paper`] | the paper's fuzzy inference with its rules, and the estimate of ė |
+//! | [`joint`] | the controller of a joint board: one of six laws, the paper's by default |
+//! | [`valve`], [`pwm`] | from a signed duty to the on-times of four on/off valves, for the laws without a plan of their own |
+//! | [`wheel`] | the HCTL-1100's lead filter and its four modes |
 //!
 //! Sign conventions, units and rounding are those of [`wheeleg_units`]. There
 //! is no clock: the length of a tick enters a configuration once, and every
 //! call is one tick. No function of this crate panics, allocates or loops more
-//! than its arrays are long.
+//! than its arrays are long. Nothing here protects memory: a board seals what it keeps by its `Hash`.
 //!
 //! # Glossary
 //!
@@ -33,7 +27,15 @@
 //! * **predictive law**: law 5: plans single valve pulses from estimated pressures, with no PWM
 //! * **observer**: estimate of pressures, motion and load from the potentiometer and the valve
 //!   commands
-//! * **Q-format**: fixed point: I16F16 has 16 integer and 16 fractional bits
+//! * **period**: four ticks, in the last of which observer and predictive law work; pulses are planned for
+//!   the next one
+//! * **moment**: the time in a period for which the observer's estimates hold
+//! * **dead time**: from the moment until a pulse of the next period acts at its chamber
+//! * **expected**: at the end of the dead time, with the pulses that are under way
+//! * **band**: error within which a piston rests
+//! * **seat**: a piston pressed against the end stop that is its target
+//! * **preload**: the force at the edge of slipping, ahead of an announced move
+//! * **Q-format**: fixed point: I16F16 has 16 integer and 16 fractional bits; "raw" is such a number as an integer
 #![no_std]
 #![cfg_attr(
     not(test),
@@ -47,11 +49,13 @@
 )]
 
 pub mod axis;
-pub mod fuzzy;
+mod gain;
 pub mod joint;
+pub mod law;
+mod math;
+pub mod observer;
+pub mod paper;
 pub mod pwm;
-pub mod reference;
-pub mod rules;
+pub mod tuning;
 pub mod valve;
-pub mod velocity;
 pub mod wheel;

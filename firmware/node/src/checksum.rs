@@ -15,21 +15,6 @@ use core::hash::{Hash, Hasher};
 pub(crate) struct WordSum(u32);
 
 impl WordSum {
-    /// Takes words, four between two jumps.
-    #[inline(always)]
-    pub(crate) fn words(&mut self, words: &[i32]) {
-        let (fours, rest) = words.as_chunks::<4>();
-        for [a, b, c, d] in fours {
-            self.checksum_step(a.cast_unsigned());
-            self.checksum_step(b.cast_unsigned());
-            self.checksum_step(c.cast_unsigned());
-            self.checksum_step(d.cast_unsigned());
-        }
-        for word in rest {
-            self.checksum_step(word.cast_unsigned());
-        }
-    }
-
     #[inline(always)]
     fn checksum_step(&mut self, word: u32) {
         // Odd multiplier (Knuth, 2^32 / golden ratio): a bijection.
@@ -119,71 +104,9 @@ impl Checksum {
     }
 }
 
-/// Seals of what only a request changes, part by part. A tick looks at one of
-/// them, so a flipped bit is found within as many ticks as there are parts.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PartChecksums<const PARTS: usize> {
-    seals: [Checksum; PARTS],
-    turn: u8,
-}
-
-impl<const PARTS: usize> PartChecksums<PARTS> {
-    /// Nothing sealed yet.
-    pub(crate) const fn new() -> Self {
-        Self {
-            seals: [Checksum { sum: 0 }; PARTS],
-            turn: 0,
-        }
-    }
-
-    /// The part whose turn it is.
-    #[inline]
-    pub(crate) fn next(&mut self) -> usize {
-        let part = usize::from(self.turn);
-        // Below the number of parts, which are few; a power of two of them is cheapest.
-        self.turn = part.wrapping_add(1).checked_rem(PARTS).unwrap_or(0) as u8;
-        part
-    }
-
-    /// Whether a part is as it was. One that does not exist is damage, too.
-    #[inline]
-    pub(crate) fn holds(&self, part: usize, now: Checksum) -> bool {
-        self.seals.get(part) == Some(&now)
-    }
-
-    /// Whether all parts are as they were.
-    pub(crate) fn all_hold(&self, now: impl Fn(usize) -> Checksum) -> bool {
-        let mut parts = self.seals.iter().zip(0..);
-        parts.all(|(seal, part)| *seal == now(part))
-    }
-
-    /// Seals all parts.
-    pub(crate) fn set(&mut self, seals: [Checksum; PARTS]) {
-        self.seals = seals;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_part_has_its_turn_and_a_damaged_turn_is_damage() {
-        let mut seals = PartChecksums::<3>::new();
-        let state = [1_u32, 2, 3];
-        seals.set(core::array::from_fn(|part| Checksum::of(&state[part])));
-        for part in [0, 1, 2, 0, 1, 2] {
-            assert_eq!(seals.next(), part);
-            assert!(seals.holds(part, Checksum::of(&state[part])));
-            assert!(!seals.holds(part, Checksum::of(&0_u32)));
-        }
-        assert!(seals.all_hold(|part| Checksum::of(&state[part])));
-        assert!(!seals.all_hold(|part| Checksum::of(&(state[part] ^ u32::from(part == 2)))));
-        seals.turn = 0x80;
-        let part = seals.next();
-        assert!(!seals.holds(part, Checksum::default()));
-        assert_eq!(seals.next(), 0, "back in the round");
-    }
 
     #[test]
     fn every_single_bit_flip_is_detected() {

@@ -13,5 +13,5 @@ mod settings;
 mod integrity_tests;
 
 pub use no_motion_detector::MotionAccount;
-pub use node::{JointNode, PARTS};
+pub use node::JointNode;
 pub use settings::{JointSettings, TickSettings};

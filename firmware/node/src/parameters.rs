@@ -60,15 +60,6 @@ impl<const N: usize> Parameters<N> {
         Ok(trial)
     }
 
-    /// One of `PARTS` parts of the values of about equal size, for sealing them.
-    #[inline]
-    pub(crate) fn part<const PARTS: usize>(&self, part: usize) -> &[i32] {
-        let mut parts = self
-            .values
-            .chunks(const { N.div_ceil(PARTS).next_multiple_of(4) });
-        parts.nth(part).unwrap_or_default()
-    }
-
     /// Sum by which sets of parameters are told apart (protocol/SPEC.md, Parameter sets): any single
     /// value that differs changes it.
     pub fn sum(&self) -> u32 {

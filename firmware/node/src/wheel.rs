@@ -11,5 +11,5 @@ mod settings;
 #[cfg(test)]
 mod integrity_tests;
 
-pub use node::{PARTS, WheelNode};
+pub use node::WheelNode;
 pub use settings::WheelSettings;

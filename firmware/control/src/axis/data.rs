@@ -1,6 +1,6 @@
 //! What a controller is told about its axis, in physical units.
 
-use crate::joint::Gain;
+use crate::gain::Gain;
 use fixed::types::I16F16;
 use wheeleg_units::{Micros, PositionMm};
 
@@ -111,7 +111,7 @@ pub enum AxisField {
 impl AxisData {
     /// Ranges of the data, as its fields say.
     #[inline]
-    pub(super) fn check(&self) -> Result<(), AxisField> {
+    pub(crate) fn check(&self) -> Result<(), AxisField> {
         const fn raw(value: I16F16) -> i32 {
             value.to_bits()
         }

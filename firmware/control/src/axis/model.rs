@@ -1,14 +1,18 @@
 //! The coefficients of the predictive law, made of an axis's data.
 
 use super::data::{AxisData, AxisField};
-use super::gas::FlowCurve;
-use super::valves::ValveTimes;
-use core::hash::{Hash, Hasher};
+use crate::observer::flow::FlowCurve;
+use crate::observer::valve_delay::ValveTimes;
+use crate::tuning::{
+    AMBIENT_PA, BRAKE_PERCENT, DAMPING_PERCENT, EXPONENT_PERCENT, LOAD_PERCENT, MEMORY,
+    NIMBLE_PERCENT, PRESSURE_HIGH_PERMILLE, PRESSURE_LOW_PERCENT, RAMP_PER_SECOND, SLOPE_PERCENT,
+    TOP_SPEED_HALVES,
+};
 use wheeleg_units::{Micros, PositionMm, divide};
 
 /// Coefficients of the predictive law. Stroke and speed in raw I16F16,
-/// pressures in 1/256 Pa, forces in mN. A period is [`STROKES`] ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// pressures in 1/256 Pa, forces in mN. A period is [`PERIOD_TICKS`] ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AxisModel {
     /// Valve timing.
     pub times: ValveTimes,
@@ -21,9 +25,9 @@ pub struct AxisModel {
     /// Full stroke.
     pub stroke: i32,
     /// Dead length of A and of B.
-    pub lead_a: i32,
+    pub dead_length_a: i32,
     /// Dead length of B.
-    pub lead_b: i32,
+    pub dead_length_b: i32,
     /// C ρ0 R T / area, raw mm/s, for A.
     pub flow_a: i32,
     /// The same for B.
@@ -112,32 +116,16 @@ pub struct AxisModel {
 /// of ISO 8778, kg/m³: 1.185 × 287.05 × 293.15 Pa. Times 1e-8 m³/(s Pa) and 1e9 mm³:
 /// mm³/s of choked outflow per dm³/(s bar).
 const CHOKED_MM3_S: u64 = 997_162;
-/// Ambient pressure, Pa (ASSUMED: sea level).
-const AMBIENT_PA: u64 = 101_325;
-/// Polytropic exponent × 100 (ASSUMED: usual for small cylinders).
-const EXPONENT_PERCENT: u64 = 120;
-/// Slope of the speed law times the dead time, × 100.
-const SLOPE_PERCENT: u64 = 36;
-/// Gain of the speed error times the dead time, × 100.
-const DAMPING_PERCENT: u64 = 95;
-/// Deceleration over slope times top speed, × 100.
-const BRAKE_PERCENT: u64 = 60;
-/// Mass that the valves can make follow the speed law, over what half of both chambers could, × 100.
-const NIMBLE_PERCENT: u64 = 60;
-/// What the observer keeps of an older period's weight, × 2^16 (θ): a fading memory of second
-/// order, whose gains are 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
-const MEMORY: u64 = 28400;
-/// The rest of it.
+/// What of the memory θ the present counts: gains 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
 const FRESH: u64 = (1 << 16) - MEMORY;
 /// Share of the innovation in stroke, × 2^16.
 const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY * MEMORY) >> 32);
 /// In speed, per period, × 2^16.
 const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) >> 17;
-/// In acceleration, per square of a period, × 2^16; a share of it (59 hundredths), because a load
-/// also takes what the pressures have wrong.
-const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * 59 / 100;
-/// Ticks of a period.
-pub(super) const STROKES: u64 = 4;
+/// In acceleration, per square of a period, × 2^16.
+const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * LOAD_PERCENT / 100;
+/// Ticks of a period of observer and law: valves that take milliseconds need no decision in every one.
+pub const PERIOD_TICKS: u8 = 4;
 /// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
 /// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
 /// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
@@ -149,13 +137,9 @@ impl AxisModel {
     /// Checks the data and works out the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time
-    /// T = 2.5 ticks + t_on + line, which bounds its slope and damping,
+    /// T = 1.5 ticks + t_on + line, which bounds its slope and damping,
     /// and the speed at which a choked outlet lets the piston go, which bounds
-    /// its top. The factors, here and where the law rests, have no unit or are times of a
-    /// period. They were searched on the bench axis (bore 20 × 180 mm, VQ110U-class valves),
-    /// three other and some 200 random cylinders, all with loads, masses, friction and valve
-    /// times off their data: of sets that meet the bars of `tests/system/control_bars.rs` one
-    /// that misses few of the others.
+    /// its top. The factors are those of [`crate::tuning`].
     ///
     /// In integers, like the tick: every coefficient is within 0.1 % of the exact
     /// one, or a step of its format.
@@ -166,98 +150,6 @@ impl AxisModel {
     pub fn new(data: &AxisData, tick: Micros) -> Result<Self, AxisField> {
         data.check()?;
         Ok(Self::coefficients(data, tick))
-    }
-
-    /// Quarter `0..4` for sealing memory: of about equal size, together all of it.
-    #[inline]
-    pub(crate) fn hash_quarter<H: Hasher>(&self, quarter: usize, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            times,
-            curve,
-            supply,
-            ambient,
-            stroke,
-            lead_a,
-            lead_b,
-            flow_a,
-            flow_b,
-            exponent,
-            force_a,
-            force_b,
-            force_rod,
-            half_pressure_a,
-            area_ratio,
-            pressure_b,
-            pressure_a,
-            mean,
-            low,
-            high,
-            force_out,
-            force_in,
-            share_out,
-            share_in,
-            coulomb,
-            breakaway,
-            viscous,
-            horizon,
-            horizon_us,
-            horizon_reference,
-            moment,
-            period,
-            mass,
-            nimble_mass,
-            slope,
-            damping,
-            brake,
-            top_speed,
-            observe_stroke,
-            observe_speed,
-            observe_load,
-            stick_step,
-            band,
-            release,
-            precharged,
-            learns_mass,
-            swing,
-        } = self;
-        match quarter {
-            0 => {
-                (times, curve, supply, ambient, stroke, lead_a).hash(state);
-            }
-            1 => {
-                (lead_b, flow_a, flow_b, exponent, force_a, force_b).hash(state);
-                (
-                    force_rod,
-                    half_pressure_a,
-                    area_ratio,
-                    pressure_b,
-                    pressure_a,
-                )
-                    .hash(state);
-            }
-            2 => {
-                (mean, low, high, force_out, force_in, coulomb).hash(state);
-                (share_out, share_in).hash(state);
-                (breakaway, viscous, horizon, horizon_us).hash(state);
-                (horizon_reference, moment, period).hash(state);
-            }
-            _ => {
-                (mass, nimble_mass, slope, damping, brake, top_speed).hash(state);
-                (
-                    observe_stroke,
-                    observe_speed,
-                    observe_load,
-                    stick_step,
-                    band,
-                    release,
-                    precharged,
-                    learns_mass,
-                    swing,
-                )
-                    .hash(state);
-            }
-        }
     }
 
     #[inline]
@@ -274,17 +166,17 @@ impl AxisModel {
         let flow_a_16 = divide(flow_24.wrapping_shl(8), area_a_16);
         let flow_b_16 = divide(flow_24.wrapping_shl(8), area_b_16);
         let tick_us = micros(tick);
-        let period_us = tick_us.wrapping_mul(STROKES);
-        // Between the second and the third tick, and from there to the next period.
-        let moment_us = tick_us.wrapping_mul(3).wrapping_shr(1);
+        let period_us = tick_us.wrapping_mul(u64::from(PERIOD_TICKS));
+        // Between the last two ticks, and from there to the next period.
+        let moment_us = tick_us.wrapping_mul(5).wrapping_shr(1);
         let valve_us = micros(data.valve_on).wrapping_add(micros(data.line_delay));
         let horizon_us = less(period_us, moment_us).wrapping_add(valve_us);
 
         let ambient_8 = AMBIENT_PA << 8;
         // kPa × 2^16 to Pa × 2^8: × 1000 / 256.
         let supply_8 = raw(data.supply).wrapping_mul(1000).wrapping_shr(8);
-        let low_8 = percent(ambient_8, 103);
-        let high_8 = divide(supply_8.wrapping_mul(985), 1000);
+        let low_8 = percent(ambient_8, PRESSURE_LOW_PERCENT);
+        let high_8 = divide(supply_8.wrapping_mul(PRESSURE_HIGH_PERMILLE), 1000);
         let mean_8 = ambient_8.wrapping_add(supply_8).wrapping_shr(1);
         let rod = force(ambient_8, area_rod_16);
         let force_out = less(less(force(high_8, area_a_16), force(low_8, area_b_16)), rod);
@@ -295,7 +187,7 @@ impl AxisModel {
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
-        let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(3).wrapping_shr(1));
+        let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1));
         let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
         // × 2^14, below 256/s: that of a dead time of 1.4 ms, and no steeper below it.
         // 2^22 × 2^37.
@@ -330,7 +222,7 @@ impl AxisModel {
         let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
         // 1/256 Pa per mN for an area in mm²: 256 000/area, × 2^12.
         let per_force_12 = |area_16: u64| divide((256_000 << 12) << 16, area_16);
-        let lead_16 = |dead: PositionMm, area_16: u64| {
+        let dead_length_16 = |dead: PositionMm, area_16: u64| {
             divide(raw(dead).wrapping_mul(1000).wrapping_shl(16), area_16)
         };
         let critical = u64::from(data.critical_ratio.to_bits().unsigned_abs());
@@ -352,8 +244,8 @@ impl AxisModel {
             supply: number(supply_8),
             ambient: number(ambient_8),
             stroke: number(raw(data.stroke)),
-            lead_a: number(lead_16(data.dead_a, area_a_16)),
-            lead_b: number(lead_16(data.dead_b, area_b_16)),
+            dead_length_a: number(dead_length_16(data.dead_a, area_a_16)),
+            dead_length_b: number(dead_length_16(data.dead_b, area_b_16)),
             flow_a: number(flow_a_16),
             flow_b: number(flow_b_16),
             exponent: const { ((EXPONENT_PERCENT << 50) / 100 / 1_000_000) as i32 },
@@ -376,7 +268,7 @@ impl AxisModel {
             viscous: number(raw(data.viscous).wrapping_shr(8)),
             horizon: seconds_32(horizon_us),
             horizon_us: number(horizon_us),
-            horizon_reference: seconds_32(tick_us.wrapping_shl(1).wrapping_add(valve_us)),
+            horizon_reference: seconds_32(tick_us.wrapping_add(valve_us)),
             moment: number(moment_us),
             period: seconds_32(period_us),
             mass: number(raw(data.mass)),
@@ -393,11 +285,11 @@ impl AxisModel {
                     .wrapping_shr(16),
                 period_us.wrapping_mul(period_us),
             ),
-            // Five times the break-away force in a second, × 2^8.
+            // Break-away forces in a second, × 2^8.
             stick_step: ratio(
                 to_mn(data.breakaway)
                     .wrapping_mul(period_us)
-                    .wrapping_mul(5 << 8),
+                    .wrapping_mul(RAMP_PER_SECOND << 8),
                 1_000_000,
             ),
             band: number(raw(data.band)),

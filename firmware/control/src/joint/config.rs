@@ -2,16 +2,12 @@
 
 use super::types::Law;
 use crate::axis::{AxisData, AxisField, AxisModel};
-use crate::fuzzy::GridRules;
-use crate::rules;
-use crate::velocity::VelocityWindow;
-use core::hash::{Hash as _, Hasher};
-use fixed::FixedI32;
-use fixed::types::extra::U24;
+use crate::gain::Gain;
+use crate::paper::fuzzy::GridRules;
+use crate::paper::rules;
+use crate::paper::velocity::VelocityWindow;
+use core::hash::{Hash, Hasher};
 use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, divide_signed, saturate_i32};
-
-/// Gain format: I8F24, ±128, step 6.0e-8.
-pub type Gain = FixedI32<U24>;
 
 /// Rule base of a joint correction: seven by seven sets.
 pub type JointRules = GridRules<7, 7>;
@@ -315,20 +311,15 @@ impl JointConfig {
 }
 
 impl JointConfig {
-    /// Number of parts in which a board seals a configuration, one after another.
-    pub const PARTS: usize = 5;
-
     /// Coefficients of the predictive law, when it is chosen.
     #[must_use]
     pub const fn axis(&self) -> Option<&AxisModel> {
         self.axis.as_ref()
     }
+}
 
-    /// Part `0..PARTS` for sealing memory: of about equal size, together all of the
-    /// configuration that the law in use reads in a tick. Rule bases, which are constants, count
-    /// by their address.
-    #[inline]
-    pub fn hash_part<H: Hasher>(&self, part: usize, state: &mut H) {
+impl Hash for JointConfig {
+    fn hash<H: Hasher>(&self, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
         let Self {
             gains,
@@ -345,101 +336,18 @@ impl JointConfig {
             bumpless_ticks,
             axis,
         } = self;
-        match (axis, part) {
-            (Some(axis), 0..=3) => axis.hash_quarter(part, state),
-            (Some(_), _) => {}
-            // What the predictive law has no use for.
-            (None, 0) => (settle_ticks, release_ticks, bumpless_ticks).hash(state),
-            (None, 1) => {
-                core::ptr::hash(*rules_pd, state);
-                core::ptr::hash(*rules_id, state);
-                (error_to_input, velocity_to_input).hash(state);
-            }
-            (None, 2) => gains.hash_forces(state),
-            (None, 3) => {
-                gains.hash_rest(state);
-                window.hash(state);
-            }
-            (None, _) => (integral_to_input, integral_limit).hash(state),
+        (gains.stroke_min, gains.stroke_max, gains.law, tick).hash(state);
+        axis.hash(state);
+        if axis.is_some() {
+            // The predictive law has no use for the rest.
+            return;
         }
-        if part == 4 {
-            (gains.stroke_min, gains.stroke_max, gains.law).hash(state);
-            (tick, axis.is_some()).hash(state);
-        }
-    }
-}
-
-impl core::hash::Hash for JointConfig {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        for part in 0..Self::PARTS {
-            self.hash_part(part, state);
-        }
-    }
-}
-
-impl JointGains {
-    /// The first half of all but the axis data.
-    #[inline]
-    fn hash_forces<H: Hasher>(&self, state: &mut H) {
-        let Self {
-            proportional,
-            correction_pd,
-            correction_id,
-            feed_forward,
-            error_scale,
-            velocity_scale,
-            integral_scale,
-            integral_zone,
-            duty_limit,
-            dead_zone_duty,
-            minimum_duty,
-            integral,
-            derivative,
-            ..
-        } = self;
-        (proportional, correction_pd, correction_id, feed_forward).hash(state);
-        (error_scale, velocity_scale, integral_scale, integral_zone).hash(state);
-        (duty_limit, dead_zone_duty, minimum_duty).hash(state);
-        (integral, derivative).hash(state);
-    }
-
-    /// The second half.
-    #[inline]
-    fn hash_rest<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            proportional: _,
-            correction_pd: _,
-            correction_id: _,
-            feed_forward: _,
-            error_scale: _,
-            velocity_scale: _,
-            integral_scale: _,
-            integral_zone: _,
-            duty_limit: _,
-            dead_zone_duty: _,
-            minimum_duty: _,
-            settle_band,
-            settle_velocity,
-            settle_dwell,
-            release_band,
-            release_dwell,
-            bumpless_time,
-            velocity_window,
-            // With the part of all laws.
-            stroke_min: _,
-            stroke_max: _,
-            law: _,
-            integral: _,
-            derivative: _,
-            sliding_time,
-            // Read when coefficients are made of it.
-            axis: _,
-            pwm_period,
-        } = self;
-        (settle_band, settle_velocity, settle_dwell).hash(state);
-        (release_band, release_dwell, bumpless_time).hash(state);
-        (velocity_window, sliding_time, pwm_period).hash(state);
+        gains.hash(state);
+        core::ptr::hash(*rules_pd, state);
+        core::ptr::hash(*rules_id, state);
+        (error_to_input, velocity_to_input).hash(state);
+        (integral_to_input, integral_limit, window).hash(state);
+        (settle_ticks, release_ticks, bumpless_ticks).hash(state);
     }
 }
 

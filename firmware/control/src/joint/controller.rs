@@ -4,10 +4,10 @@ use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
 use super::modes;
 use super::settle::Settle;
 use super::types::{Correction, JointInput, JointLimits, JointOutput, Law};
-use crate::axis::predictive::Predictive;
+use crate::law::Predictive;
+use crate::paper::velocity::VelocityEstimator;
 use crate::pwm::OnTimes;
 use crate::valve::{ValveOpenings, allocate};
-use crate::velocity::VelocityEstimator;
 use core::hash::{Hash, Hasher};
 use wheeleg_units::{
     Duty, PositionMm, VelocityMmS, saturate_i16, saturate_i32, shift_right_round_inner,
@@ -21,12 +21,16 @@ const RULE_SHIFT: u32 = 24 + 15 - 30;
 /// Controller of one joint: configuration and state.
 ///
 /// Call [`JointController::step`] once per control tick while the joint tracks,
-/// and [`JointController::observe`] once per tick while it does not. Its `Hash`
-/// covers configuration and state, so that a board can seal both.
+/// and [`JointController::observe`] once per tick while it does not. A board
+/// seals configuration and [`JointController::state`].
 #[derive(Clone, Debug)]
 pub struct JointController {
     config: JointConfig,
-    marks: Marks,
+    correction: Correction,
+    /// The last tick tracked.
+    tracked: bool,
+    /// Set by a change of law: the next tick continues from `last_law`.
+    changed: bool,
     velocity: VelocityEstimator,
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
@@ -40,40 +44,15 @@ pub struct JointController {
     predictive: Option<Predictive>,
 }
 
-/// Small ones, in an order in which they are a whole word, which is sealed as it is.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(4))]
-struct Marks {
-    correction: Correction,
-    /// The last tick tracked.
-    tracked: bool,
-    /// Set by a change of law: the next tick continues from `last_law`.
-    changed: bool,
-    /// Always zero: it makes the word whole.
-    rest: u8,
-}
-
-impl Marks {
-    #[inline]
-    const fn word(self) -> u32 {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            correction,
-            tracked,
-            changed,
-            rest,
-        } = self;
-        u32::from_le_bytes([correction as u8, tracked as u8, changed as u8, rest])
-    }
-}
-
 impl JointController {
     /// A controller at rest with an empty history.
     #[inline]
     #[must_use]
     pub fn new(config: JointConfig) -> Self {
         Self {
-            marks: Marks::default(),
+            correction: Correction::default(),
+            tracked: false,
+            changed: false,
             velocity: VelocityEstimator::new(),
             settle: Settle::new(),
             integral: 0,
@@ -93,27 +72,15 @@ impl JointController {
 
     /// What a tick changes and the next one reads, to be sealed apart from the
     /// configuration.
-    #[inline]
     #[must_use]
     pub const fn state(&self) -> State<'_> {
         State(self)
     }
 
-    /// Whether what [`JointController::state`] leaves out is as it was written: the
-    /// history of the velocity, or what the predictive law keeps.
-    #[inline]
-    #[must_use]
-    pub fn history_is_sound(&self) -> bool {
-        match &self.predictive {
-            Some(law) => law.kept_is_sound(),
-            None => self.velocity.is_sound(),
-        }
-    }
-
     /// The correction in use.
     #[must_use]
     pub const fn correction(&self) -> Correction {
-        self.marks.correction
+        self.correction
     }
 
     /// Whether all valves are held shut because the joint is at rest.
@@ -131,21 +98,12 @@ impl JointController {
         self.predictive.as_ref()
     }
 
-    /// What the last look ([`JointController::history_is_sound`]) found damaged is made anew: the
-    /// predictive law begins as after power-up with the next tick.
-    #[inline]
-    pub fn forget(&mut self) {
-        if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
-            law.forget(model);
-        }
-    }
-
     /// Takes note that nothing is sent of what the last [`JointController::step`] gave, after which
     /// it is not called before others have driven.
     #[inline]
     pub fn stopped(&mut self) {
-        if let Some(law) = &mut self.predictive {
-            law.stopped();
+        if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
+            law.stopped(model);
         }
     }
 
@@ -153,19 +111,19 @@ impl JointController {
     /// [`JointController::observe`]: for how much of it each valve counts as open without its
     /// switching delays, µs. The predictive law follows the air by it.
     #[inline]
-    pub fn sent(&mut self, open: &OnTimes) {
+    pub fn external_on_times(&mut self, open: &OnTimes) {
         if let Some(law) = &mut self.predictive {
-            law.sent(open);
+            law.external_on_times(open);
         }
     }
 
     /// Selects the correction, without a bump. The integral starts from zero.
     #[inline]
     pub fn set_correction(&mut self, correction: Correction) {
-        if correction != self.marks.correction {
-            self.marks.correction = correction;
+        if correction != self.correction {
+            self.correction = correction;
             self.integral = 0;
-            self.marks.changed = true;
+            self.changed = true;
         }
     }
 
@@ -188,15 +146,15 @@ impl JointController {
             self.reset();
         }
         self.config = config;
-        self.marks.changed = true;
+        self.changed = true;
     }
 
     /// Forgets everything but configuration and correction: as after
     /// [`JointController::new`].
     pub fn reset(&mut self) {
-        let correction = self.marks.correction;
+        let correction = self.correction;
         *self = Self::new(self.config);
-        self.marks.correction = correction;
+        self.correction = correction;
     }
 
     /// A tick in which the joint does not track (idle, hold, exhaust): follows the
@@ -208,8 +166,8 @@ impl JointController {
         }
         self.settle = Settle::new();
         self.integral = 0;
-        self.marks.tracked = false;
-        self.marks.changed = false;
+        self.tracked = false;
+        self.changed = false;
         self.fade = 0;
         self.velocity.update(&self.config.window, measured)
     }
@@ -250,7 +208,7 @@ impl JointController {
         // What is beyond ±2 is cut to a duty of ±1 in any case.
         let law = self.faded(saturate_i32(law));
         self.last_law = law;
-        self.marks.tracked = true;
+        self.tracked = true;
 
         let quiet = self
             .settle
@@ -262,7 +220,7 @@ impl JointController {
             self.shaped(law, error, input.reference_velocity, &mut limits)
         };
         let integrates = match self.config.gains().law {
-            Law::Fuzzy => self.marks.correction == Correction::Id,
+            Law::Fuzzy => self.correction == Correction::Id,
             Law::Pid => true,
             _ => false,
         };
@@ -312,7 +270,7 @@ impl JointController {
             config.velocity_to_input,
         );
         limits.velocity = rate_limited;
-        let (gain, output) = match self.marks.correction {
+        let (gain, output) = match self.correction {
             Correction::Pd => {
                 let (input, limited) =
                     to_input(error.raw(), gains.error_scale.raw(), config.error_to_input);
@@ -338,13 +296,9 @@ impl JointController {
     /// end of the duty beyond the other, is faded by that much.
     #[inline]
     fn faded(&mut self, law: i32) -> i32 {
-        if self.marks.changed {
-            self.marks.changed = false;
-            let last = if self.marks.tracked {
-                self.last_law
-            } else {
-                law
-            };
+        if self.changed {
+            self.changed = false;
+            let last = if self.tracked { self.last_law } else { law };
             // Symmetric, so that its magnitude is a number, too.
             self.fade = last.saturating_sub(law).max(-i32::MAX);
             // Rounded up: the fade ends within the configured time.
@@ -415,12 +369,13 @@ impl JointController {
 pub struct State<'a>(&'a JointController);
 
 impl Hash for State<'_> {
-    #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
         // Taken apart, so that a new field cannot be forgotten here.
         let JointController {
             config: _,
-            marks,
+            correction,
+            tracked,
+            changed,
             velocity,
             settle,
             integral,
@@ -429,17 +384,12 @@ impl Hash for State<'_> {
             fade_step,
             predictive,
         } = self.0;
-        state.write_u32(marks.word());
+        (correction, tracked, changed).hash(state);
         if let Some(law) = predictive {
             // The other laws begin afresh after it.
             return law.hash(state);
         }
-        velocity.hash(state);
-        settle.hash(state);
-        state.write_i64(*integral);
-        state.write_i32(*last_law);
-        state.write_i32(*fade);
-        state.write_i32(*fade_step);
+        (velocity, settle, integral, last_law, fade, fade_step).hash(state);
     }
 }
 

@@ -1,10 +1,10 @@
 //! Properties of the fuzzy engine and of the shipped rule bases.
 
 use proptest::prelude::*;
-use wheeleg_control::fuzzy::{
+use wheeleg_control::paper::fuzzy::{
     CHIP_LEVELS, FULL_LEVELS, FuzzyError, GridRules, Partition, Rule, RuleList, Triangle,
 };
-use wheeleg_control::rules;
+use wheeleg_control::paper::rules;
 
 const SHIPPED: [(&str, GridRules<7, 7>); 2] = [("PD", rules::PD), ("ID", rules::ID)];
 

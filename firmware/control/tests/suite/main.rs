@@ -5,6 +5,7 @@ mod closed_loop;
 mod fuzzy;
 mod joint;
 mod pwm;
+mod tuning;
 mod vectors;
 mod velocity;
 mod wheel;

@@ -5,11 +5,13 @@
 //! number format with the firmware.
 
 use serde_json::Value;
-use wheeleg_control::fuzzy::{ANY, CHIP_LEVELS, GridRules, Partition, Rule, RuleList, Triangle};
 use wheeleg_control::joint::{
     Correction, Gain, JointConfig, JointController, JointGains, JointInput,
 };
-use wheeleg_control::rules;
+use wheeleg_control::paper::fuzzy::{
+    ANY, CHIP_LEVELS, GridRules, Partition, Rule, RuleList, Triangle,
+};
+use wheeleg_control::paper::rules;
 use wheeleg_control::wheel::{
     LeadFilter, Profile, WheelCommand, WheelController, WheelInput, WheelMode,
 };

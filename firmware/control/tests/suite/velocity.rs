@@ -1,7 +1,7 @@
 //! Velocity estimate: exactness, delay, noise, range.
 
 use proptest::prelude::*;
-use wheeleg_control::velocity::{MAX_WINDOW, VelocityEstimator, VelocityWindow};
+use wheeleg_control::paper::velocity::{MAX_WINDOW, VelocityEstimator, VelocityWindow};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 fn window(length: u8) -> VelocityWindow {

@@ -164,6 +164,27 @@ fn b2_two_hanging_feet_stop_the_wheels_and_no_leg_extends_far() {
     assert!(!robot.run(60).contains(&Act::TipGuard));
 }
 
+/// Feet that look for the ground at their full length carry nothing: wheels that went on would drive in below the
+/// robot until it lies on its tail. Where one stands the other is only set down.
+#[test]
+fn b2_the_wheels_stop_while_both_feet_are_set_down_without_ground() {
+    let lower = LegPlan::Lower(mm(150.0));
+    let led = |robot: &mut Robot| robot.lead(120.0, true).wheels[0].velocity_mm_s.to_f64();
+    let mut robot = Robot::all([lower; 2]);
+    robot.lead(120.0, true);
+    robot.touch([false; 2]);
+    assert!(!robot.run(5).contains(&Act::TipGuard));
+    assert!(robot.run(1).contains(&Act::TipGuard));
+    robot.run(80);
+    assert_eq!(led(&mut robot), 0.0);
+    robot.touch([false, true]);
+    robot.run(60);
+    assert_eq!(led(&mut robot), 120.0, "one touches");
+    let mut robot = Robot::all([lower, LegPlan::Stance]);
+    robot.touch([false; 2]);
+    assert!(!robot.run(60).contains(&Act::TipGuard));
+}
+
 #[test]
 fn the_wheels_slow_down_and_speed_up_by_0_3_m_s2() {
     let mut robot = Robot::new(STAND, Behaviours::ALL.without(Behaviour::LostContact));
@@ -290,6 +311,21 @@ fn b4_no_ground_is_told_after_200_ms() {
     robot.joint(B6).stroke_mm = mm(178.0);
     assert_eq!(robot.run(19), []);
     assert_eq!(robot.run(1), [Act::NoGround(Side::Left)]);
+}
+
+/// A foot that is pressed against something from the begin of its reach on goes back after 0.1 s: after 0.2 s of push
+/// without motion its board takes it for a fault. One that gets away has its 250 ms.
+#[test]
+fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_gives_up() {
+    let pressed = |velocity_mm_s: f64| {
+        let mut robot = Robot::all([LegPlan::Reach, LegPlan::Stance]);
+        robot.joint(B5).velocity_mm_s = VelocityMmS::from_f64(velocity_mm_s);
+        robot
+    };
+    let mut robot = pressed(9.9);
+    assert_eq!(robot.run(9), []);
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    assert_eq!(pressed(10.1).run(25), []);
 }
 
 #[test]

@@ -1,9 +1,7 @@
-//! A flipped bit in what a joint board keeps between two ticks means Hold: at the
-//! next tick for what a tick changes, within a period of four for what the predictive law keeps
-//! (which has tests of its own), within [`PARTS`] ticks for the rest.
+//! A flipped bit in what a joint board keeps between two ticks means Hold at the next tick.
 
 use super::no_motion_detector::{MotionModel, MotionWatch};
-use super::node::{JointNode, PARTS};
+use super::node::JointNode;
 use super::precharge::Precharge;
 use super::reference::Target;
 use crate::NodeIdentity;
@@ -236,51 +234,35 @@ fn a_damaged_counter_or_address_is_seen_with_the_next_sync() {
     }));
 }
 
-/// A flipped bit of the configuration is found in its turn, from whichever part the
-/// node looks at next.
-fn found_in_turn(damage: impl Fn(&mut Node)) {
-    let mut latest = 0;
-    for earlier in 0..PARTS as u32 {
-        let mut node = armed();
-        for tick in 0..earlier {
-            node.tick(Micros(20_000 + (tick + 1) * 1000));
-        }
-        damage(&mut node);
-        let found = (1..=PARTS as u32).find(|tick| {
-            node.tick(Micros(20_000 + (earlier + tick) * 1000));
-            node.mode() == Mode::Hold && node.faults().contains(Fault::StateCorrupt)
-        });
-        latest = latest.max(found.expect("found within one round"));
-        assert_eq!(node.snapshot().pulses, [0; 4]);
-    }
-    assert_eq!(latest, PARTS as u32, "each part is looked at once a round");
+/// A flipped bit of the configuration is found by the next tick.
+fn found_at_once(damage: impl Fn(&mut Node)) {
+    assert_eq!(ticks_to_hold(armed(), 1, damage), Some(1));
 }
 
 #[test]
-fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
-    const { assert!(PARTS <= 8) };
+fn damaged_parameters_settings_and_gains_are_seen_by_the_next_tick() {
     let (first, last) = (
         JointParam::ALL[0].id(),
         JointParam::ALL.last().unwrap().id(),
     );
     for id in [first, JointParam::FollowingTime.id(), last] {
-        found_in_turn(|node| {
+        found_at_once(|node| {
             let raw = node.parameters.by_id(id).unwrap();
             let other = [raw + 1, raw - 1].into_iter();
             let mut other = other.filter_map(|raw| node.parameters.with(id, raw, true).ok());
             node.parameters = other.next().unwrap();
         });
     }
-    found_in_turn(|node| node.settings.sensor.step_max = PositionMm::ZERO);
-    found_in_turn(|node| {
+    found_at_once(|node| node.settings.sensor.step_max = PositionMm::ZERO);
+    found_at_once(|node| {
         node.settings.staged_exhaust = ValveMode::BlowThrough.openings(Micros(10_000))
     });
-    found_in_turn(|node| {
+    found_at_once(|node| {
         let gains = *node.controller.config().gains();
         node.settings.motion = MotionModel::new(&gains, PositionMm::from_int(77)).unwrap();
     });
-    found_in_turn(|node| node.core.times.hold = Micros(node.core.times.hold.get() ^ 1));
-    found_in_turn(|node| {
+    found_at_once(|node| node.core.times.hold = Micros(node.core.times.hold.get() ^ 1));
+    found_at_once(|node| {
         let gains = JointGains {
             feed_forward: fixed::FixedI32::from_bits(1),
             ..*node.controller.config().gains()
@@ -290,7 +272,7 @@ fn damaged_parameters_settings_and_gains_are_seen_within_a_round() {
         // What the change of the law leaves behind in the state is not the point.
         node.reseal();
     });
-    found_in_turn(|node| {
+    found_at_once(|node| {
         let tick = Micros(1000);
         let timing = PwmTiming::new(Micros(20_000), tick, tick, tick, tick).unwrap();
         node.pwm.set_timing(timing);
@@ -304,18 +286,18 @@ fn the_predictive_law_is_watched_as_well() {
     assert_eq!(ticks_to_hold(node(), 20, |_| {}), None);
     // Pressures, motion and valves followed through a tick that never was.
     let found = ticks_to_hold(node(), 1, |node| {
-        node.controller.sent(&[1000, 0, 0, 0]);
+        node.controller.external_on_times(&[1000, 0, 0, 0]);
         node.controller.observe(PositionMm::from_int(50));
     });
     assert_eq!(found, Some(1));
-    let found = ticks_to_hold(node(), PARTS as u32, |node| {
+    let found = ticks_to_hold(node(), 1, |node| {
         let mut gains = *node.controller.config().gains();
         gains.axis.mass = PositionMm::from_raw(gains.axis.mass.raw() + 1);
         node.controller
             .retune(JointConfig::new(&gains, Micros(1000)).unwrap());
         node.reseal();
     });
-    assert!(found.is_some());
+    assert_eq!(found, Some(1));
 }
 
 /// What the watch of motion has learnt holds for a stroke and an axis as they were told.

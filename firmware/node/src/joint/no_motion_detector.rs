@@ -124,28 +124,6 @@ impl MotionModel {
         })
     }
 
-    /// What the air obeys, for sealing memory.
-    #[inline]
-    pub(super) fn hash_air<H: Hasher>(&self, state: &mut H) {
-        self.air.hash(state);
-    }
-
-    /// All else.
-    #[inline]
-    pub(super) fn hash_forces<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            air: _,
-            margin,
-            nearly_all,
-            coulomb,
-            viscous,
-            low,
-            high,
-        } = self;
-        (margin, nearly_all, coulomb, viscous, low, high).hash(state);
-    }
-
     /// Absolute pressure of the atmosphere, 2^-17 of the supply pressure.
     #[inline]
     pub(super) const fn ambient(&self) -> i32 {

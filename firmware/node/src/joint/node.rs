@@ -7,7 +7,7 @@ use super::precharge::Precharge;
 use super::reference::Target;
 use super::settings::{JointSettings, TickSettings};
 use crate::board::{BoardCore, NodeIdentity, receive};
-use crate::checksum::{Checksum, PartChecksums};
+use crate::checksum::Checksum;
 use crate::debounce::Debounce;
 use crate::hardware::{ParameterStore, PositionSensor, SwitchBank, ValveBank};
 use crate::mode::{Event, Mode, ModeRules};
@@ -16,18 +16,11 @@ use crate::sensor::{Reading, Rejection, SensorMonitor};
 use crate::snapshot::{JointSnapshot, TickReport};
 use crate::transmission::Transmission;
 use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
-use wheeleg_control::joint::{JointConfig, JointController};
+use wheeleg_control::joint::JointController;
+use wheeleg_control::law::reference_generator::Reference;
 use wheeleg_control::pwm::ValvePwm;
-use wheeleg_control::reference::Reference;
 use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
-
-/// Parts in which the parameters are sealed.
-const PARAMETER_PARTS: usize = 3;
-/// Parts in which the configuration is sealed. A tick looks at one of them, so a
-/// flipped bit of it is found within so many ticks.
-pub const PARTS: usize = PARAMETER_PARTS + JointConfig::PARTS;
-const _: () = assert!(PARTS <= 8, "flipped configuration is found within 8 ms");
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,8 +60,8 @@ pub struct JointNode<V, S, W> {
     pub(super) monitor: SensorMonitor,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Seals of what only a request changes.
-    fixed_seals: PartChecksums<PARTS>,
+    /// Checksum of what only a request changes.
+    fixed_seal: Checksum,
     /// Checksum of what a tick changes.
     seal: Checksum,
     pub(super) snapshot: JointSnapshot,
@@ -133,7 +126,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 precharge: Precharge::default(),
                 boot_ticks: Ticks::ZERO,
             },
-            fixed_seals: PartChecksums::new(),
+            fixed_seal: Checksum::default(),
             seal: Checksum::default(),
             snapshot: JointSnapshot::at_boot(),
             switches: Debounce::new(),
@@ -212,9 +205,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.looks_intact() {
+        if !self.is_intact() {
             self.axis_fault(Fault::StateCorrupt, now);
-            self.controller.forget();
+            self.controller.reset();
             self.controller.set_correction(self.settings.correction);
             // Nobody knows which stroke was damaged: with the next good reading all that holds
             // a history of them begins anew.
@@ -353,24 +346,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// Checksum of one part of what shapes the outputs and is changed by requests alone.
+    /// Checksum of what shapes the outputs and is changed by requests alone.
     #[inline(never)]
-    fn fixed(&self, part: usize) -> Checksum {
-        let Some(part) = part.checked_sub(PARAMETER_PARTS) else {
-            let values = self.parameters.part::<PARAMETER_PARTS>(part);
-            return Checksum::made(|sum| sum.words(values));
-        };
+    fn fixed(&self) -> Checksum {
         Checksum::made(|sum| {
-            self.controller.config().hash_part(part, sum);
-            // With each part of the configuration another part of the rest.
-            match part {
-                0 => self.core.times.hash(sum),
-                1 => self.settings.motion.hash_air(sum),
-                2 => self.settings.motion.hash_forces(sum),
-                3 => self.pwm.timing().hash(sum),
-                4 => self.settings.hash_own(sum),
-                _ => {}
-            }
+            self.parameters.hash(sum);
+            self.controller.config().hash(sum);
+            self.core.times.hash(sum);
+            self.pwm.timing().hash(sum);
+            self.settings.hash(sum);
         })
     }
 
@@ -386,24 +370,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         })
     }
 
-    /// Whether all of the state is as the last tick or request left it.
-    #[inline]
-    fn state_holds(&self) -> bool {
-        self.seal == self.moving() && self.controller.history_is_sound()
-    }
-
     /// Whether everything is as the last tick or request left it.
     #[inline(never)]
     fn is_intact(&self) -> bool {
-        self.state_holds() && self.fixed_seals.all_hold(|part| self.fixed(part))
-    }
-
-    /// As [`JointNode::is_intact`], for a tick: all of the state, and one part of
-    /// what is fixed, another one each tick.
-    #[inline]
-    fn looks_intact(&mut self) -> bool {
-        let part = self.fixed_seals.next();
-        self.fixed_seals.holds(part, self.fixed(part)) && self.state_holds()
+        self.seal == self.moving() && self.fixed_seal == self.fixed()
     }
 
     #[inline]
@@ -413,8 +383,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
 
     #[inline(never)]
     fn reseal_all(&mut self) {
-        let seals = core::array::from_fn(|part| self.fixed(part));
-        self.fixed_seals.set(seals);
+        self.fixed_seal = self.fixed();
         self.reseal();
     }
 

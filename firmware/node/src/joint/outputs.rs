@@ -19,6 +19,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     pub(super) fn drive(&mut self, now: Micros) -> OnTimes {
         let TickReference {
             supervised,
+            expected,
             reference,
             announced,
             slew_limited,
@@ -47,7 +48,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             Ticks::ZERO
         };
         let driven = Driven {
-            reference: supervised,
+            reference: expected,
             position: self.state.measured,
             velocity: output.velocity,
         };
@@ -161,7 +162,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     fn rested(&mut self, now: Micros, on_times: OnTimes, open: &OnTimes) {
         self.state.following = Ticks::ZERO;
         let velocity = self.controller.observe(self.state.measured);
-        self.controller.sent(open);
+        self.controller.external_on_times(open);
         let state = &mut self.state;
         state
             .motion

@@ -11,7 +11,7 @@
 //! first reference of the law is the actual position, and from there the slew limit holds: no jump after
 //! an arm, wherever the set-point is.
 //!
-//! The predictive law follows the reference generator of `wheeleg_control::reference` instead, if
+//! The predictive law follows the reference generator of `wheeleg_control::law::reference_generator` instead, if
 //! its acceleration is set; supervision goes on to compare the piston with the reference above.
 //!
 //! The next reference of a slot is counted down to the tick and handed to the
@@ -21,7 +21,7 @@ use super::settings::TickSettings;
 use crate::JOINT_TICK;
 use core::hash::{Hash, Hasher};
 use wheeleg_control::joint::Announced;
-use wheeleg_control::reference::Reference;
+use wheeleg_control::law::reference_generator::Reference;
 use wheeleg_protocol::JointSetpoint;
 use wheeleg_protocol::link::CYCLE_US;
 use wheeleg_units::{PositionMm, Ticks, VelocityMmS, divide_signed};
@@ -144,6 +144,9 @@ fn travel(velocity: i32, ticks: u32) -> i32 {
 pub(super) struct TickReference {
     /// The command within the slew limit.
     pub(super) supervised: PositionMm,
+    /// Where the piston is expected to be on its way: the same, within what lies between piston and command. One
+    /// that was held up, and is told to come back, is not expected to go on first.
+    pub(super) expected: PositionMm,
     /// What the law follows.
     pub(super) reference: Reference,
     pub(super) announced: Option<Announced>,
@@ -187,6 +190,7 @@ pub(super) fn advance(
     };
     TickReference {
         supervised,
+        expected: supervised.limit(wanted.min(measured), wanted.max(measured)),
         reference,
         announced,
         slew_limited,
@@ -202,7 +206,7 @@ mod tests {
     use core::num::NonZeroU8;
     use std::hash::DefaultHasher;
     use wheeleg_control::joint::Announced;
-    use wheeleg_control::reference::Reference;
+    use wheeleg_control::law::reference_generator::Reference;
     use wheeleg_protocol::{JointSetpoint, LinkLossAction, NextReference};
     use wheeleg_units::{PositionMm, Ticks, VelocityMmS};
 
@@ -253,6 +257,47 @@ mod tests {
             let off = tick.reference.position.to_f64() - (20.0 + tenths / 10.0);
             assert!(off.abs() < 1e-4, "tick {k}: {off}");
             assert!(!tick.slew_limited, "tick {k}");
+        }
+    }
+
+    /// A piston that is held up at 20 mm is told to go out, and after 0.2 s to come back, or to go less far: it is not
+    /// expected to go on first, although the reference within the slew limit is still on its way back.
+    #[test]
+    fn a_piston_that_is_told_to_come_back_is_not_expected_to_go_on() {
+        let settings = settings();
+        let held = PositionMm::from_int(20);
+        let command = |mm: i16| {
+            Target::from_setpoint(&JointSetpoint {
+                reference: PositionMm::from_int(mm),
+                velocity: VelocityMmS::ZERO.to_wire(),
+                next: None,
+                on_link_loss: LinkLossAction::Hold,
+                track: true,
+            })
+        };
+        let mut target = command(170);
+        let mut last = held;
+        let mut tick = |target: &mut Target| {
+            let tick = advance(last, Reference::at(held), held, target, &settings);
+            last = tick.supervised;
+            tick
+        };
+        for _ in 0..200 {
+            let TickReference {
+                supervised,
+                expected,
+                ..
+            } = tick(&mut target);
+            assert_eq!(expected, supervised);
+        }
+        for (mm, expected_mm) in [(5, 20), (24, 24), (160, 160)] {
+            let TickReference {
+                supervised,
+                expected,
+                ..
+            } = tick(&mut command(mm));
+            assert!(supervised > PositionMm::from_int(160), "{supervised:?}");
+            assert_eq!(expected, PositionMm::from_int(expected_mm));
         }
     }
 

@@ -1,6 +1,6 @@
 //! Parameters of a joint board as the application uses them.
 
-use core::hash::{Hash, Hasher};
+use core::hash::Hash;
 
 use super::air::SUPPLY;
 use super::no_motion_detector::MotionModel;
@@ -10,8 +10,8 @@ use crate::sensor::SensorConfig;
 use crate::supervisor::{SupervisionTimes, watchdog};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointConfig, JointGains, Law};
+use wheeleg_control::law::reference_generator::GeneratorConfig;
 use wheeleg_control::pwm::PwmTiming;
-use wheeleg_control::reference::GeneratorConfig;
 use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divide_signed};
@@ -42,7 +42,7 @@ pub struct JointSettings {
 }
 
 /// The settings that the board application itself uses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TickSettings {
     /// Position sensor.
     pub sensor: SensorConfig,
@@ -67,31 +67,6 @@ pub struct TickSettings {
     pub staged_exhaust: ValveOpenings,
     /// Openings of a valve that stays open.
     pub full_period: Micros,
-}
-
-impl TickSettings {
-    /// All but what is expected of the piston, for sealing memory.
-    #[inline]
-    pub(super) fn hash_own<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            sensor,
-            correction,
-            slew_step,
-            slew_rate,
-            generator,
-            following_error,
-            following_ticks,
-            motion: _,
-            precharge,
-            staged_exhaust,
-            full_period,
-        } = self;
-        let [a, b, c, d] = &staged_exhaust.0;
-        (sensor, correction, slew_step, slew_rate, generator).hash(state);
-        (following_error, following_ticks, precharge).hash(state);
-        (a, b, c, d, full_period).hash(state);
-    }
 }
 
 impl JointSettings {

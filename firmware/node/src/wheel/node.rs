@@ -6,7 +6,7 @@ use super::encoder::EncoderWatch;
 use super::motion::{Target, tune_profile};
 use super::settings::WheelSettings;
 use crate::board::{BoardCore, NodeIdentity, receive};
-use crate::checksum::{Checksum, PartChecksums};
+use crate::checksum::Checksum;
 use crate::debounce::Debounce;
 use crate::hardware::{DumpValve, Encoder, MotorDrive, ParameterStore, SwitchBank};
 use crate::mode::{Event, Mode, ModeRules};
@@ -20,10 +20,6 @@ use wheeleg_units::{Micros, Ticks, WheelCount};
 
 /// Samples in Boot: long enough for the switch to be debounced.
 const BOOT_TICKS: Ticks = Ticks(10);
-
-/// Parts in which the configuration is sealed: most parameters, two of settings, the rest
-/// of the parameters with the times. A sample looks at one of them.
-pub const PARTS: usize = 4;
 
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -58,8 +54,8 @@ pub struct WheelNode<M, E, P, D> {
     /// Copies of the count in `state`: a counter shorter than the count cannot give it
     /// back once it is damaged.
     pub(super) counts: [WheelCount; 2],
-    /// Seals of what only a request changes.
-    fixed_seals: PartChecksums<PARTS>,
+    /// Checksum of what only a request changes.
+    fixed_seal: Checksum,
     /// Checksum of what a sample changes.
     seal: Checksum,
     pub(super) snapshot: WheelSnapshot,
@@ -99,7 +95,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             target: Target::default(),
             state: TickState::default(),
             counts: [WheelCount::ZERO; 2],
-            fixed_seals: PartChecksums::new(),
+            fixed_seal: Checksum::default(),
             seal: Checksum::default(),
             snapshot: WheelSnapshot::at_boot(),
             switches: Debounce::new(),
@@ -171,7 +167,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.looks_intact() {
+        if !self.is_intact() {
             self.state.actual = self.undamaged_count();
             actual = self.encoder.count(self.state.actual);
             self.axis_fault(Fault::StateCorrupt, now);
@@ -309,18 +305,15 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         tune_profile(&mut self.controller, settings);
     }
 
-    /// Checksum of one part of what shapes the outputs and is changed by requests alone.
-    #[inline]
-    fn fixed(&self, part: usize) -> Checksum {
-        match part {
-            0 => Checksum::made(|sum| sum.words(self.parameters.part::<2>(0))),
-            1 | 2 => Checksum::made(|sum| self.settings.hash_half(part == 2, sum)),
-            // With the few that are left of the parameters.
-            _ => Checksum::made(|sum| {
-                sum.words(self.parameters.part::<2>(1));
-                (&self.core.times, self.control_mode).hash(sum);
-            }),
-        }
+    /// Checksum of what shapes the outputs and is changed by requests alone.
+    #[inline(never)]
+    fn fixed(&self) -> Checksum {
+        Checksum::of(&(
+            &self.parameters,
+            &self.settings,
+            &self.core.times,
+            self.control_mode,
+        ))
     }
 
     /// What shapes the outputs of the next sample and is changed by every sample.
@@ -329,19 +322,10 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         (&self.state, &self.target, &self.controller)
     }
 
-    /// Whether everything is as the last sample or request left it: looks at all seals,
-    /// where a sample looks at some.
+    /// Whether everything is as the last sample or request left it.
     #[inline(never)]
     pub fn is_intact(&self) -> bool {
-        self.seal.holds(&self.moving()) && self.fixed_seals.all_hold(|part| self.fixed(part))
-    }
-
-    /// As [`WheelNode::is_intact`], for a sample: all of the state, and one part of
-    /// what is fixed, another one each sample.
-    #[inline]
-    fn looks_intact(&mut self) -> bool {
-        let part = self.fixed_seals.next();
-        self.fixed_seals.holds(part, self.fixed(part)) && self.seal.holds(&self.moving())
+        self.seal.holds(&self.moving()) && self.fixed_seal == self.fixed()
     }
 
     /// The count of the sample before, whichever one of its three copies is damaged: each
@@ -361,8 +345,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
 
     #[inline(never)]
     fn reseal_all(&mut self) {
-        let seals = core::array::from_fn(|part| self.fixed(part));
-        self.fixed_seals.set(seals);
+        self.fixed_seal = self.fixed();
         self.reseal();
     }
 

@@ -2,7 +2,6 @@
 
 use crate::parameters::WheelParameters;
 use crate::supervisor::{SupervisionTimes, watchdog};
-use core::hash::{Hash, Hasher};
 use wheeleg_control::wheel::{LeadFilter, SampleTimer, WheelAcceleration, WheelMode};
 use wheeleg_protocol::WheelControlMode;
 use wheeleg_protocol::link::CYCLE_US;
@@ -13,7 +12,7 @@ use wheeleg_units::{Micros, Ticks};
 const CLOCK_HZ: u32 = 2_000_000;
 
 /// Everything that follows from the parameters, worked out when they change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct WheelSettings {
     /// Digital filter.
     pub filter: LeadFilter,
@@ -36,28 +35,6 @@ pub struct WheelSettings {
 }
 
 impl WheelSettings {
-    /// One of two halves of about equal size, for sealing memory.
-    #[inline]
-    pub(super) fn hash_half<H: Hasher>(&self, second: bool, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
-        let Self {
-            filter,
-            timer,
-            max_speed,
-            acceleration,
-            times,
-            stop_ramp,
-            cycle_ticks,
-            following_error,
-            following_ticks,
-        } = self;
-        if second {
-            (times, cycle_ticks, following_error, following_ticks).hash(state);
-        } else {
-            (filter, timer, max_speed, acceleration, stop_ramp).hash(state);
-        }
-    }
-
     /// Works out the settings for a controller mode; `None` when the sample
     /// timer is below the minimum of the mode.
     pub fn new(parameters: &WheelParameters, mode: WheelControlMode) -> Option<Self> {

@@ -1,10 +1,10 @@
 //! Start-up identification on the bench: the valves' delays, before the first move.
 
-use wheeleg_control::axis::probe::DelayProbe;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
 use wheeleg_units::Micros;
 
+use super::delay_probe::DelayProbe;
 use super::error::AxisSimError;
 use super::firmware::{Design, Firmware};
 use super::run::{Action, AxisSim, Board, Sample};

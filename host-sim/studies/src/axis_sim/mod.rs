@@ -28,6 +28,7 @@
 //!   finds the valves' delays at start-up, as a board would.
 
 pub mod commission;
+mod delay_probe;
 mod design;
 mod error;
 pub mod export;

@@ -104,6 +104,32 @@ impl Factors {
         p
     }
 
+    /// What nobody tells a board at power-up, drawn by a number: both chamber pressures between the atmosphere and
+    /// the supply, such that with the load the piston stands within half of its friction. Gives the tick of the
+    /// law's period in which the first move falls, 0…3.
+    pub fn draw_start(plant: &mut AxisParams, number: u64) -> u64 {
+        let mut rng = Pcg64Mcg::seed_from_u64(number ^ 0x57A2_7000);
+        let (low, high) = (
+            plant.gas.ambient_pressure_pa,
+            plant.supply.initial_pressure_pa,
+        );
+        let load_n = plant.load_n;
+        let cylinder = &mut plant.cylinder;
+        let circle = |d_m: f64| std::f64::consts::FRAC_PI_4 * d_m * d_m;
+        let (bore, rod) = (circle(cylinder.bore_m), circle(cylinder.rod_m));
+        for _ in 0..1000 {
+            let a_pa = rng.random_range(low..high);
+            let net_n = 0.5 * cylinder.friction.coulomb_n * rng.random_range(-1.0..1.0);
+            let b_pa = (a_pa * bore - low * rod + load_n - net_n) / (bore - rod);
+            if (low..=high).contains(&b_pa) {
+                cylinder.initial_pressure_a_pa = a_pa;
+                cylinder.initial_pressure_b_pa = b_pa;
+                break;
+            }
+        }
+        rng.random_range(0..4)
+    }
+
     /// Force left over the load: 1.25 means a quarter more than the load needs.
     #[must_use]
     pub fn static_margin(&self, sheet: &AxisParams) -> f64 {
@@ -176,6 +202,22 @@ impl TestRig {
     #[must_use]
     pub const fn at_m(&self) -> f64 {
         self.at_m
+    }
+
+    /// So many milliseconds at the reference.
+    ///
+    /// # Errors
+    /// [`AxisSimError`].
+    pub fn wait(&mut self, ms: u64) -> Result<(), AxisSimError> {
+        if ms > 0 {
+            let stand = Motion::Step {
+                at_s: 0.0,
+                from_m: self.at_m,
+                to_m: self.at_m,
+            };
+            self.run(&stand, &[], ms as f64 * 1e-3)?;
+        }
+        Ok(())
     }
 
     /// A step of the reference, recorded from 0.05 s before it.

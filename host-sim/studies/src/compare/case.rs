@@ -10,7 +10,7 @@ use wheeleg_protocol::FaultBits;
 
 use super::moves::{CONTACT_S, Move, Played, RECOVERY_S};
 use super::variation::{UnknownVariation, Variation};
-use crate::axis_sim::suite::{AxisSimError, StartUp, TestRig};
+use crate::axis_sim::suite::{AxisSimError, Factors, StartUp, TestRig};
 use crate::axis_sim::{Delays, Kind, Metrics, Trace, design, design_with, identify};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
@@ -103,6 +103,9 @@ pub struct Case {
     /// Seed.
     pub seed: u64,
     plant: AxisParams,
+    /// Seed of the converter's noise, and milliseconds from power-up to the first move.
+    noise_seed: u64,
+    wait_ms: u64,
     margin: f64,
     delays: Option<Delays>,
 }
@@ -119,10 +122,19 @@ impl Case {
         seed: u64,
     ) -> Result<Self, AxisSimError> {
         let factors = variation.factors(sheet);
-        let plant = factors.plant(sheet);
+        let mut plant = factors.plant(sheet);
         let margin = factors.static_margin(sheet);
+        let (noise_seed, wait_ms) = match variation {
+            Variation::Drawn(number) => (
+                seed.wrapping_mul(0x9E37_79B9).wrapping_add(number),
+                Factors::draw_start(&mut plant, number),
+            ),
+            _ => (seed, 0),
+        };
         let delays = match variation.start_up() {
-            StartUp::Identified if margin >= feasible_margin() => identify(&plant, sheet, seed)?,
+            StartUp::Identified if margin >= feasible_margin() => {
+                identify(&plant, sheet, noise_seed)?
+            }
             _ => None,
         };
         Ok(Self {
@@ -131,6 +143,8 @@ impl Case {
             variation,
             seed,
             plant,
+            noise_seed,
+            wait_ms,
             margin,
             delays,
         })
@@ -173,7 +187,8 @@ impl Case {
             StartUp::Identified => design_with(&self.sheet, self.delays, kind),
         };
         let plant = motion.plant(&self.plant, &self.sheet);
-        let mut rig = TestRig::new(&plant, &design, self.seed)?;
+        let mut rig = TestRig::new(&plant, &design, self.noise_seed)?;
+        rig.wait(self.wait_ms)?;
         motion.play(&mut rig, &self.sheet, plant.load_n).map(Some)
     }
 

@@ -66,7 +66,7 @@ impl Comparison {
                 && c.controller == kind
                 && c.motion == Move::Step100
                 && c.feasible
-                && matches!(c.variation, Variation::Combination(_))
+                && matches!(c.variation, Variation::Combination(_) | Variation::Drawn(_))
         })
     }
 

@@ -301,7 +301,7 @@ fn plan(options: &Options, axes: &[AxisConfig]) -> Vec<(usize, Variation, u64)> 
             list.push((i, variation, options.seed));
         }
         for number in 0..options.combinations {
-            list.push((i, Variation::Combination(number), options.seed));
+            list.push((i, Variation::Drawn(number), options.seed));
         }
     }
     list
@@ -311,7 +311,7 @@ fn moves_of(options: &Options, variation: Variation) -> Vec<Move> {
     match (&options.moves, variation) {
         (Some(moves), _) => moves.clone(),
         (None, Variation::Nominal) => Move::ALL.to_vec(),
-        (None, Variation::Combination(_)) => vec![Move::Step100],
+        (None, Variation::Combination(_) | Variation::Drawn(_)) => vec![Move::Step100],
         (None, _) => VARIED.to_vec(),
     }
 }

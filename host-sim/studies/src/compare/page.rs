@@ -188,6 +188,8 @@ struct Combined {
     name: &'static str,
     kept: usize,
     count: usize,
+    /// Upper bound of the probability to miss, one-sided 95 %, per cent.
+    missed_at_most: f64,
     error_mm: Option<f64>,
     overshoot_mm: Option<f64>,
     first_mm: Option<f64>,
@@ -308,7 +310,10 @@ fn factors(comparison: &Comparison, axis: &str) -> Vec<Factor> {
     for row in comparison.rows.iter().filter(|r| r.case.axis == axis) {
         let c = &row.case;
         let shown = matches!(c.motion, Move::Step100 | Move::Step20 | Move::SCurve);
-        let varied = !matches!(c.variation, Variation::Nominal | Variation::Combination(_));
+        let varied = !matches!(
+            c.variation,
+            Variation::Nominal | Variation::Combination(_) | Variation::Drawn(_)
+        );
         if shown && varied && !lines.contains(&(c.variation, c.motion)) {
             lines.push((c.variation, c.motion));
         }
@@ -345,7 +350,9 @@ fn with_unit(variation: Variation) -> String {
         Variation::Delay(x) => format!("valve delay × {x}"),
         Variation::Spread(x) => format!("valves ± {:.0} %", 100.0 * x),
         Variation::Noise(x) => format!("noise × {x}"),
-        Variation::Nominal | Variation::Combination(_) => variation.to_string(),
+        Variation::Nominal | Variation::Combination(_) | Variation::Drawn(_) => {
+            variation.to_string()
+        }
     }
 }
 
@@ -366,6 +373,8 @@ fn combined(comparison: &Comparison, axis: &str) -> Vec<Combined> {
                 name: kind.name(),
                 kept,
                 count,
+                missed_at_most: 100.0
+                    * stats::failure_bound(count.saturating_sub(kept) as u32, count as u32),
                 error_mm: largest(rows(), |r| r.figures.steady_error_mm.map(f64::abs)),
                 overshoot_mm: largest(rows(), |r| r.figures.overshoot_mm),
                 first_mm: largest(rows(), |r| r.figures.first_overshoot_mm),

@@ -29,6 +29,8 @@ pub enum Variation {
     Noise(f64),
     /// Combination of load, mass, supply, friction and delay, by number.
     Combination(u64),
+    /// The same, with chamber pressures, tick phase and noise drawn by the number, too.
+    Drawn(u64),
 }
 
 /// A word that is no variation.
@@ -41,7 +43,7 @@ pub struct UnknownVariation {
 /// What may be typed.
 pub const KNOWN: &str = "nominal, load=SHARE (-0.95 to 0.95), mass=KG (0.01 to 1000), \
 supply=BAR (1 to 16, gauge), friction=FACTOR (0.1 to 10), delay=FACTOR (0.1 to 10), \
-spread=SHARE (0 to 0.9), noise=FACTOR (0 to 100), combination=NUMBER";
+spread=SHARE (0 to 0.9), noise=FACTOR (0 to 100), combination=NUMBER, drawn=NUMBER";
 
 impl Variation {
     /// The factors one at a time: load ±40 and ±80 %, mass ×2/3, 2 and 16/3, supply
@@ -104,7 +106,7 @@ impl Variation {
                 ..base
             },
             Self::Noise(noise) => Factors { noise, ..base },
-            Self::Combination(number) => Factors::random(sheet, number),
+            Self::Combination(number) | Self::Drawn(number) => Factors::random(sheet, number),
         }
     }
 
@@ -138,6 +140,7 @@ impl fmt::Display for Variation {
             Self::Spread(x) => write!(f, "spread={x}"),
             Self::Noise(x) => write!(f, "noise={x}"),
             Self::Combination(n) => write!(f, "combination={n}"),
+            Self::Drawn(n) => write!(f, "drawn={n}"),
         }
     }
 }
@@ -155,6 +158,9 @@ impl FromStr for Variation {
         let (name, value) = word.split_once('=').ok_or_else(unknown)?;
         if name == "combination" {
             return value.parse().map(Self::Combination).map_err(|_| unknown());
+        }
+        if name == "drawn" {
+            return value.parse().map(Self::Drawn).map_err(|_| unknown());
         }
         let number: f64 = value.parse().map_err(|_| unknown())?;
         let within = |low: f64, high: f64| {
@@ -185,7 +191,11 @@ mod tests {
     fn every_variation_comes_back_from_its_word() {
         let sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
         let mut list = Variation::one_at_a_time(&sheet, false);
-        list.extend([Variation::Nominal, Variation::Combination(17)]);
+        list.extend([
+            Variation::Nominal,
+            Variation::Combination(17),
+            Variation::Drawn(17),
+        ]);
         for variation in list {
             assert_eq!(variation.to_string().parse(), Ok(variation));
         }

@@ -12,8 +12,9 @@ use crate::setpoint::{Cylinder, LegPlan};
 const STALLED_MM_S: VelocityMmS = VelocityMmS::from_int(10);
 /// … for so many cycles (100 ms), …
 const STALLED: u16 = 10;
-/// … from so many after its begin on (250 ms), has run against something; so has a foot that
-/// touches. A joint's board takes a longer push without motion for a fault of the axis.
+/// … from so many after its begin on (250 ms), or with a switch closed from the begin on, has run
+/// against something; so has a foot that touches later. A joint's board takes a longer push without
+/// motion for a fault of the axis.
 const STARTED: u16 = 25;
 /// The foot goes back by so much …
 const BACK_MM: PositionMm = PositionMm::from_int(15);
@@ -68,13 +69,14 @@ impl Bump {
                 joint.velocity_mm_s.saturating_abs() < STALLED_MM_S
             });
         let started = self.cycles > STARTED;
-        self.stalled = if started && slow {
+        // Tips of nails may still scratch the ground.
+        let touches = !nailed && senses.touches(side).unwrap_or(false);
+        let pushes = touches && self.back.is_none();
+        self.stalled = if (started || pushes) && slow {
             self.stalled.saturating_add(1)
         } else {
             0
         };
-        // Tips of nails may still scratch the ground.
-        let touches = !nailed && senses.touches(side).unwrap_or(false);
         self.met = self.stalled >= STALLED || started && touches;
         if self.met {
             self.stalled = 0;

@@ -64,12 +64,16 @@ impl Contact {
         enabled: Behaviours,
     ) -> [Option<Act>; 3] {
         let mut hangs = [false; WHEELS];
+        // Feet that look for the ground: while all do, none carries.
+        let mut looks = true;
         for ((side, open), hangs) in SIDES.into_iter().zip(&mut self.open).zip(&mut hangs) {
             let touches = senses.touches(side).unwrap_or(false);
             *open = if touches { 0 } else { open.saturating_add(1) };
-            *hangs = plan.leg(side) == LegPlan::Stance && *open > LOST;
+            let leg = plan.leg(side);
+            *hangs = leg == LegPlan::Stance && *open > LOST;
+            looks &= matches!(leg, LegPlan::Lower(_)) && *open > LOST;
         }
-        let tips = enabled.contains(Behaviour::TipGuard) && hangs == [true; WHEELS];
+        let tips = enabled.contains(Behaviour::TipGuard) && (looks || hangs == [true; WHEELS]);
         let mut acts = [None; 3];
         if let ([first, ..], true) = (&mut acts, tips && !self.tipping) {
             *first = Some(Act::TipGuard);

@@ -18,7 +18,7 @@
 //! compilation error.
 //!
 //! ```
-//! use wheeleg_control::fuzzy::{GridRules, Partition};
+//! use wheeleg_control::paper::fuzzy::{GridRules, Partition};
 //!
 //! const RULES: GridRules<3, 3> = {
 //!     let Ok(error) = Partition::even(-1000, 1000) else { panic!() };
@@ -35,7 +35,7 @@
 //! Sets that leave a gap do not compile:
 //!
 //! ```compile_fail
-//! use wheeleg_control::fuzzy::{Partition, Triangle};
+//! use wheeleg_control::paper::fuzzy::{Partition, Triangle};
 //!
 //! const GAP: Partition<2> = {
 //!     let low = Triangle { vertex: -10, left: 0, right: 10 };
@@ -49,7 +49,7 @@
 //! and one unit more of either side does:
 //!
 //! ```
-//! use wheeleg_control::fuzzy::{Partition, Triangle};
+//! use wheeleg_control::paper::fuzzy::{Partition, Triangle};
 //!
 //! const TOUCHING: Partition<2> = {
 //!     let low = Triangle { vertex: -10, left: 0, right: 11 };

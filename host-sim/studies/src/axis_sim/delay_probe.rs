@@ -16,7 +16,7 @@
 //! t_off does not show this way. Both delays of a valve come from one coil and
 //! one spring: it is taken to differ from its data sheet by the same factor.
 
-use crate::pwm::OnTimes;
+use wheeleg_control::pwm::OnTimes;
 use wheeleg_units::{Micros, PositionMm};
 
 /// Time between the starts of two pulses, ticks.
@@ -198,5 +198,44 @@ impl DelayProbe {
             self.longest = LONGEST;
             self.pause();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A valve of `t_on` µs, and a piston that jumps 0.4 mm with every third opening.
+    fn probe(t_on: u32, works: bool) -> Option<Micros> {
+        let mut search = DelayProbe::new();
+        let (mut position, mut on_us, mut openings) = (40.0, 0_u32, 0_u32);
+        let mut opened = false;
+        for _ in 0..60_000 {
+            if search.is_done() {
+                break;
+            }
+            let on = search.tick(PositionMm::from_f64(position));
+            let coil = u32::from(on[0]);
+            on_us = if coil == 0 { 0 } else { on_us + coil };
+            if coil == 0 {
+                opened = false;
+            } else if on_us > t_on && !opened && works {
+                opened = true;
+                openings += 1;
+                if openings % 3 == 0 {
+                    position += 0.4;
+                }
+            }
+        }
+        search.t_on()
+    }
+
+    #[test]
+    fn the_probe_finds_the_opening_delay() {
+        for t_on in [1_750, 3_500, 7_000, 12_000] {
+            let found = probe(t_on, true).expect("moves").get();
+            assert!(found.abs_diff(t_on) <= 300, "{t_on}: {found}");
+        }
+        assert_eq!(probe(3_500, false), None, "a piston that never moves");
     }
 }

@@ -13,7 +13,7 @@
 //! scale: closer together near zero, where the piston is to come to rest.
 //! Neighbours cross at half membership, so at most four rules fire.
 
-use crate::fuzzy::{FuzzyError, GridRules, Partition};
+use crate::paper::fuzzy::{FuzzyError, GridRules, Partition};
 
 /// Vertices of all joint inputs, full scale ±32 767.
 pub const VERTICES: [i16; 7] = [-32_767, -16_384, -6_554, 0, 6_554, 16_384, 32_767];

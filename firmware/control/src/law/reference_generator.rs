@@ -18,7 +18,7 @@
 //! reference at most 3 ℓ ahead of itself (2 ℓ and the way of braking): whoever watches the piston must compare it with the
 //! command.
 
-use crate::axis::square_root;
+use crate::math::square_root;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Ticks of 1 ms in a second.

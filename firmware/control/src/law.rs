@@ -1,0 +1,274 @@
+//! The predictive law: position of one axis with four on/off valves and one potentiometer.
+//!
+//! ```text
+//! observer ──► dead-time predictor ──► switching curve ──► inverse dynamics ──► allocation ──► pulse planner
+//! p, x, v, load     p, x, v at T_d        v*(e), dv*/de         F*                pA*, pB*       µs of each valve
+//!                        standstill (seat, preload): instead of F* all valves shut, or a force of its own
+//! ```
+//!
+//! | file | concept |
+//! |---|---|
+//! | [`reference_generator`] | second-order reference with a lead-limiting governor; runs ahead of the law, each tick |
+//! | `dead_time_predictor` | motion at the end of the dead time, where a pulse begun now acts |
+//! | `switching_curve` | proximate time-optimal: parabola of braking, straight line at the target |
+//! | `inverse_dynamics` | force for the speed that is wanted, with friction fed forward and the break-away ramp |
+//! | `allocation` | from a force to two chamber pressures about their mean; the pressure swap |
+//! | `pulse_planner` | from a pressure to the on-times of the next period |
+//! | `standstill` | when the valves stay shut: a state machine |
+//! | `seat` | a force instead of a position at an end stop |
+//! | `preload` | the edge of slipping ahead of an announced move |
+//! | `handover` | who decides about the valves, the law or others |
+//!
+//! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
+//! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
+//! Gains and thresholds stand in [`crate::tuning`], all of them; formats are those of [`crate::observer`].
+
+mod allocation;
+mod dead_time_predictor;
+mod handover;
+mod inverse_dynamics;
+mod preload;
+mod pulse_planner;
+pub mod reference_generator;
+mod seat;
+mod standstill;
+mod switching_curve;
+
+use crate::axis::{AxisModel, PERIOD_TICKS};
+use crate::joint::JointInput;
+use crate::observer::Observer;
+use crate::observer::motion::Motion;
+use crate::observer::pressure::{Period, Pressures};
+use crate::pwm::OnTimes;
+use crate::tuning::STILL_SPEED;
+use allocation::PressureSwap;
+use dead_time_predictor::PredictedState;
+use inverse_dynamics::{BreakawayRamp, ForceDemand};
+use preload::{Awaited, Preload};
+use seat::Seat;
+use standstill::{Approach, Standstill};
+use switching_curve::SpeedGains;
+use wheeleg_units::{Duty, VelocityMmS};
+
+/// What the law gives in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drive {
+    /// On-times of the next tick, µs.
+    pub on: OnTimes,
+    /// Estimated speed.
+    pub velocity: VelocityMmS,
+    /// Force asked for as a share of what the supply can give, in steps of 2^-14.
+    pub duty: Duty,
+    /// At rest at the reference.
+    pub settled: bool,
+    /// The force asked for is beyond what the supply can give.
+    pub limited: bool,
+}
+
+/// State of the law and of its observer. It keeps no coefficients: every call is given those of the
+/// axis, which must be the same from call to call.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Predictive {
+    observer: Observer,
+    gains: SpeedGains,
+    ramp: BreakawayRamp,
+    standstill: Standstill,
+    preload: Preload,
+    swap: PressureSwap,
+
+    /// A stroke has been measured.
+    primed: bool,
+    /// The law decides about the coils, not somebody else.
+    drives: bool,
+    /// Tick of the period that comes next.
+    turn: u8,
+    /// Begin of the present period, µs; wraps. In the last tick of a period, once that is observed, of the next.
+    begin: u32,
+    /// Stroke of the last tick, raw mm.
+    measured: i32,
+    /// On-times of the present period from its begin, µs.
+    plan: OnTimes,
+    /// For how long somebody else had the valves open in it, without their delays, µs.
+    external: OnTimes,
+
+    /// For the record: the share of the force that was asked for, as far as it is possible, and whether it
+    /// is not.
+    duty: Duty,
+    limited: bool,
+}
+
+impl Predictive {
+    /// At rest. Chambers that a precharge fills before the law drives count as half full and in balance
+    /// from power-up on: the middle is wrong by the least. Others count as vented.
+    #[must_use]
+    pub fn new(model: &AxisModel) -> Self {
+        let pressures = if model.precharged {
+            allocation::targets(model, 0)
+        } else {
+            Pressures {
+                a: model.ambient,
+                b: model.ambient,
+            }
+        };
+        Self {
+            observer: Observer::new(model, pressures),
+            gains: SpeedGains::new(model, model.mass),
+            ramp: BreakawayRamp::default(),
+            standstill: Standstill::default(),
+            preload: Preload::default(),
+            swap: PressureSwap::No,
+            primed: false,
+            drives: false,
+            turn: 0,
+            begin: 0,
+            measured: 0,
+            plan: [0; 4],
+            external: [0; 4],
+            duty: Duty::ZERO,
+            limited: false,
+        }
+    }
+
+    /// Its observer.
+    #[must_use]
+    pub const fn observer(&self) -> &Observer {
+        &self.observer
+    }
+
+    /// Estimated motion and load.
+    #[must_use]
+    pub const fn motion(&self) -> &Motion {
+        &self.observer.motion
+    }
+
+    /// Estimated pressures.
+    #[must_use]
+    pub const fn pressures(&self) -> Pressures {
+        self.observer.pressures()
+    }
+
+    /// Mass in use, kg × 2^16: as told, or learnt.
+    #[must_use]
+    pub const fn mass(&self) -> i32 {
+        self.observer.inertia.mass
+    }
+
+    /// At rest at its reference.
+    #[must_use]
+    pub const fn is_settled(&self) -> bool {
+        self.standstill.is_at_rest()
+    }
+
+    /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the
+    /// end of a period, once all is counted that somebody else has sent.
+    pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
+        if self.ends_period(input.measured) {
+            self.observe_period(model, input.measured);
+            self.drives = true;
+            self.plan_period(model, input);
+        }
+        let on = self.due(model);
+        self.next_tick(input.measured);
+        Drive {
+            on,
+            velocity: VelocityMmS::from_raw(self.observer.motion.speed),
+            duty: self.duty,
+            settled: self.is_settled(),
+            limited: self.limited,
+        }
+    }
+
+    /// The present period on the clock of the valves.
+    const fn period(&self, model: &AxisModel) -> Period {
+        Period {
+            begin: self.begin,
+            next: self.begin.wrapping_add(model.times.period as u32),
+            moment: self.begin.wrapping_add(model.moment as u32),
+        }
+    }
+
+    /// On-times of the next tick by the plan.
+    fn due(&self, model: &AxisModel) -> OnTimes {
+        let tick = model.times.tick as u16;
+        // The tick after the last of a period is the first of the next one, whose plan is new.
+        let next = self.turn.wrapping_add(1) % PERIOD_TICKS;
+        let gone = tick.wrapping_mul(u16::from(next));
+        self.plan.map(|on| on.saturating_sub(gone).min(tick))
+    }
+
+    /// The pulses of the next period.
+    fn plan_period(&mut self, model: &AxisModel, input: &JointInput) {
+        let reference = input.reference.raw();
+        let reference_speed = input.reference_velocity.raw();
+        if self.standstill.aim(model, reference) {
+            self.ramp = BreakawayRamp::default();
+        }
+        let stands = self.is_settled() || self.observer.motion.speed.wrapping_abs() < STILL_SPEED;
+        let preload = self.preload(model, input, stands);
+        let seat = match preload {
+            Some(_) => None,
+            None => self.seat(model, input),
+        };
+        match (preload, seat) {
+            (Some(_), _) => {}
+            (None, Some(seat)) => self.standstill.seat(seat == Seat::Seated),
+            (None, None) => self.standstill.update(
+                model,
+                &Approach {
+                    reference,
+                    reference_speed,
+                    measured: input.measured.raw(),
+                    motion: &self.observer.motion,
+                    force: self.observer.force,
+                    mass: self.observer.inertia.mass,
+                },
+            ),
+        }
+        if preload.is_some() || (stands && self.observer.motion.at_stop(model)) {
+            let to = match (preload, input.announced) {
+                (Some(_), Some(announced)) => announced.reference.raw(),
+                _ => reference,
+            };
+            self.swap = PressureSwap::towards(to, self.observer.motion.stroke);
+        }
+        let force = match (preload, seat) {
+            (Some(Awaited::Ready), _) => return self.shut(model),
+            (Some(Awaited::Force(force)), _) | (None, Some(Seat::Press(force))) => force,
+            (None, _) if self.standstill.valves_closed() => return self.shut(model),
+            (None, _) => self.force_demand(model, reference, reference_speed),
+        };
+        self.make_force(model, force, preload.is_none() && self.standstill.is_near());
+    }
+
+    /// F* of the position servo, mN.
+    fn force_demand(&mut self, model: &AxisModel, reference: i32, reference_speed: i32) -> i32 {
+        let demand = ForceDemand {
+            reference,
+            reference_speed,
+            observer: &self.observer,
+            ahead: PredictedState::new(model, &self.observer),
+            gains: &self.gains,
+        };
+        demand.ramp(model, &mut self.ramp);
+        demand.force(model, self.ramp, &self.standstill)
+    }
+
+    /// All valves shut as soon as the pulses under way allow.
+    fn shut(&mut self, model: &AxisModel) {
+        self.plan = pulse_planner::shut(model, &self.observer, self.begin);
+        self.limited = false;
+        self.duty = Duty::ZERO;
+    }
+
+    /// Pulses that make a force, mN; near the target, of one chamber alone.
+    fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
+        let possible = allocation::possible_force(model, force);
+        let target = self.swap.targets(model, possible, self.observer.expected());
+        self.plan = pulse_planner::plan(model, &self.observer, target, self.begin, near);
+        self.limited = possible != force;
+        self.duty = allocation::duty(model, possible);
+    }
+}
+
+#[cfg(test)]
+mod tests;

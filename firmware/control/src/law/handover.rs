@@ -1,0 +1,98 @@
+//! Who decides about the valves: the law, or somebody else.
+//!
+//! The estimates live on what was sent. Where somebody else drives (exhaust, precharge, hold), who tells it by
+//! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
+//! that is cut counts as far as it was sent.
+
+use super::Predictive;
+use super::inverse_dynamics::BreakawayRamp;
+use super::preload::Preload;
+use super::standstill::Standstill;
+use super::switching_curve::SpeedGains;
+use crate::axis::{AxisModel, PERIOD_TICKS};
+use crate::observer::by_chamber;
+use crate::pwm::OnTimes;
+use wheeleg_units::{Duty, PositionMm, VelocityMmS};
+
+impl Predictive {
+    /// A tick after which somebody else drives. Follows chambers and piston, and forgets that the piston rests.
+    pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
+        if self.drives {
+            self.release_valves(model);
+        }
+        if self.ends_period(measured) {
+            self.observe_period(model, measured);
+            self.ramp = BreakawayRamp::default();
+            self.preload = Preload::default();
+            self.standstill = Standstill::at(self.observer.motion.stroke);
+        }
+        self.next_tick(measured);
+        VelocityMmS::from_raw(self.observer.motion.speed)
+    }
+
+    /// What somebody else has sent for the next tick: for how much of it each valve counts as open
+    /// without its switching delays, µs. It counts at once: the delays are not waited for.
+    pub fn external_on_times(&mut self, open: &OnTimes) {
+        if self.drives {
+            return;
+        }
+        for (open, more) in self.external.iter_mut().zip(open) {
+            *open = open.saturating_add(*more);
+        }
+    }
+
+    /// Nothing of the plan has been sent in the tick to come, nor will be.
+    pub fn stopped(&mut self, model: &AxisModel) {
+        let sent = (model.times.tick as u16).wrapping_mul(u16::from(self.turn));
+        self.plan = self.plan.map(|on| on.min(sent));
+    }
+
+    /// Whether the tick that begins is the last of its period; the first stroke that is measured is where the
+    /// piston stands.
+    pub(super) fn ends_period(&mut self, measured: PositionMm) -> bool {
+        if !self.primed {
+            self.primed = true;
+            self.measured = measured.raw();
+            self.observer.start_at(self.measured);
+            self.standstill = Standstill::at(self.measured);
+        }
+        self.turn.wrapping_add(1) >= PERIOD_TICKS
+    }
+
+    /// To the next tick.
+    pub(super) const fn next_tick(&mut self, measured: PositionMm) {
+        self.measured = measured.raw();
+        self.turn = self.turn.wrapping_add(1) % PERIOD_TICKS;
+    }
+
+    /// The end of a period: observes it, and begins the next.
+    pub(super) fn observe_period(&mut self, model: &AxisModel, measured: PositionMm) {
+        let period = self.period(model);
+        let stroke = self.measured.saturating_add(measured.raw()) >> 1;
+        let learnt = self
+            .observer
+            .update(model, &period, self.plan, self.external, stroke);
+        if let Some(mass) = learnt {
+            self.gains = SpeedGains::new(model, mass);
+        }
+        self.begin = period.next;
+        self.plan = [0; 4];
+        self.external = [0; 4];
+    }
+
+    /// Somebody else drives from the tick on that begins: what is planned for after it does not happen.
+    #[cold]
+    fn release_valves(&mut self, model: &AxisModel) {
+        let ticks = i32::from(self.turn).wrapping_add(1);
+        let end = self
+            .begin
+            .wrapping_add(model.times.tick.wrapping_mul(ticks) as u32);
+        let [plan_a, plan_b] = by_chamber(self.plan);
+        self.observer.a.release(model, self.begin, end, plan_a);
+        self.observer.b.release(model, self.begin, end, plan_b);
+        self.drives = false;
+        self.plan = [0; 4];
+        self.duty = Duty::ZERO;
+        self.limited = false;
+    }
+}

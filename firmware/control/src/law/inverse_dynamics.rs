@@ -1,0 +1,141 @@
+//! Inverse dynamics: the force that gives the wanted speed, with friction fed forward.
+//!
+//! ```text
+//! e  = r + v_r T − x'                      v* = v_r + curve(e)        primes: at the end of the dead time
+//! a* = k(e) (v_r − v') + D (v* − v')       limited to 5/2 b           k: slope of the curve, D: damping
+//! F* = m a* + Fc sgn + d v* + ramp − load
+//! ```
+//!
+//! Computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
+//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The fed-forward friction
+//! is faded out where the piston does not come to rest: more than there is makes a relay. A piston
+//! that sticks outside its band is pushed with a growing force until it slips, [`BreakawayRamp`].
+//!
+//! What it learns: the load by the observer, the break-away force by the ramp. Coulomb friction is as told.
+//!
+//! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and
+//! [`ForceDemand::force`].
+
+use super::dead_time_predictor::PredictedState;
+use super::standstill::Standstill;
+use super::switching_curve::SpeedGains;
+use crate::axis::AxisModel;
+use crate::math::{clip, mul_shr, mul_shr_sat, within};
+use crate::observer::Observer;
+use crate::tuning::{
+    ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED, RAMP_DECAY,
+    REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED,
+};
+
+/// Extra force on a piston that sticks: it grows until the piston slips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct BreakawayRamp {
+    /// mN × 2^8.
+    force: i32,
+}
+
+impl BreakawayRamp {
+    /// One period at `speed` raw mm/s with `missing` raw mm to a reference of
+    /// `reference_speed`. What moves slower than it slides only gives way by the spring
+    /// of its friction: that takes nothing back.
+    fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {
+        if speed > SLIDING_SPEED {
+            let decay = mul_shr(self.force, RAMP_DECAY, 16);
+            self.force = self.force.saturating_sub(decay);
+        } else if speed < STILL_SPEED && reference_speed.wrapping_abs() <= REFERENCE_RESTS {
+            let step = if missing > 0 {
+                model.stick_step
+            } else {
+                model.stick_step.wrapping_neg()
+            };
+            let most = model.force_out.min(1 << 22).wrapping_shl(8);
+            self.force = within(self.force.saturating_add(step), most);
+        }
+    }
+}
+
+/// What is asked for, and with what.
+pub(super) struct ForceDemand<'a> {
+    /// Raw mm.
+    pub(super) reference: i32,
+    /// Raw mm/s.
+    pub(super) reference_speed: i32,
+    /// What is known now.
+    pub(super) observer: &'a Observer,
+    /// Motion at the end of the dead time.
+    pub(super) ahead: PredictedState,
+    /// Gains for the mass.
+    pub(super) gains: &'a SpeedGains,
+}
+
+impl ForceDemand<'_> {
+    /// One period in which the law acts on the piston.
+    pub(super) fn ramp(&self, model: &AxisModel, ramp: &mut BreakawayRamp) {
+        let motion = &self.observer.motion;
+        let missing = self.reference.saturating_sub(motion.stroke);
+        let speed = if motion.stuck {
+            0
+        } else {
+            motion.speed.wrapping_abs()
+        };
+        ramp.update(model, speed, missing, self.reference_speed);
+    }
+
+    /// F*, mN.
+    pub(super) fn force(&self, model: &AxisModel, ramp: BreakawayRamp, rest: &Standstill) -> i32 {
+        let Self {
+            reference,
+            reference_speed,
+            observer,
+            ahead,
+            gains,
+        } = *self;
+        let Observer {
+            motion, inertia, ..
+        } = observer;
+        let load = motion.load;
+        let error = reference
+            .saturating_add(mul_shr(reference_speed, model.horizon_reference, 32))
+            .saturating_sub(ahead.stroke);
+        // The force that can brake, beside the load.
+        let left = if error > 0 {
+            model.force_in.saturating_sub(load)
+        } else {
+            model.force_out.saturating_add(load)
+        };
+        let possible = inertia.acceleration(mul_shr(clip::<26>(left), BRAKE_FORCE_USED, 16));
+        let brake = gains.brake.min(possible).max(BRAKE_LEAST);
+        let (speed, slope) = gains.speed(error, brake, model.top_speed);
+        let wanted = reference_speed.saturating_add(speed);
+        // 1/s × 2^8 times raw mm/s: mm/s² × 2^24.
+        let pull = mul_shr_sat(slope, reference_speed.saturating_sub(ahead.speed), 24);
+        let damp = mul_shr(gains.damping, wanted.saturating_sub(ahead.speed), 24);
+        let limit = gains.brake.saturating_mul(ACCELERATION_LIMIT_HALVES) >> 1;
+        let acceleration = within(pull.saturating_add(damp), limit);
+
+        let full = rest.faded(if motion.speed.wrapping_abs() < STILL_SPEED {
+            model.breakaway
+        } else {
+            model.coulomb
+        });
+        let along = if ahead.speed.wrapping_abs() > SLIDING_SPEED {
+            ahead.speed
+        } else {
+            wanted
+        };
+        // In proportion up to the speed of full friction, 10 mm/s.
+        let friction = mul_shr(
+            within(along, FULL_FRICTION_SPEED << 16),
+            full / FULL_FRICTION_SPEED,
+            16,
+        );
+        mul_shr_sat(inertia.mass, acceleration, 16)
+            .saturating_add(friction)
+            .saturating_add(mul_shr(wanted, model.viscous, 24))
+            .saturating_add(ramp.force.wrapping_shr(8))
+            .saturating_sub(load)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,153 @@
+//! The force demand against the formulas of the text.
+
+use super::*;
+use crate::axis::AxisData;
+use crate::law::Predictive;
+use wheeleg_units::{Micros, PositionMm};
+
+fn model() -> AxisModel {
+    AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
+}
+
+/// A piston at 90 mm under a force demand for a reference `error_mm` away, with a load and speeds, mm/s.
+fn demanded(model: &AxisModel, error_mm: f64, load: i32, speed: i32, wanted: i32) -> i32 {
+    let mut law = Predictive::new(model);
+    law.observer.start_at(90 << 16);
+    law.observer.motion.load = load;
+    law.observer.motion.speed = speed << 16;
+    let demand = ForceDemand {
+        reference: (90 << 16) + (error_mm * 65_536.0) as i32,
+        reference_speed: wanted << 16,
+        observer: &law.observer,
+        ahead: PredictedState {
+            stroke: 90 << 16,
+            speed: speed << 16,
+        },
+        gains: &law.gains,
+    };
+    demand.force(model, law.ramp, &law.standstill)
+}
+
+/// In balance a piston at its target needs nothing but the load's counterpart; friction comes with the speed
+/// that is wanted, in proportion up to 10 mm/s.
+#[test]
+fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
+    let model = AxisModel::new(
+        &AxisData {
+            viscous: PositionMm::ZERO,
+            ..AxisData::default()
+        },
+        Micros(1000),
+    )
+    .expect("in range");
+    assert_eq!(demanded(&model, 0.0, 20_000, 0, 0), -20_000);
+    // At the speed that is wanted, at the place that the reference has in the dead time: friction alone.
+    let at = |speed: i32| {
+        let lead = f64::from(speed) * f64::from(model.horizon_reference) / 2_f64.powi(32);
+        demanded(&model, -lead, 0, speed, speed)
+    };
+    for (speed, expected) in [
+        (5, 5_000),
+        (9, 9_000),
+        (10, 10_000),
+        (40, 10_000),
+        (-40, -10_000),
+    ] {
+        let found = at(speed);
+        assert!((found - expected).abs() < 150, "{speed}: {found}");
+    }
+}
+
+/// The less force a load leaves for braking, the slower the approach; it never stops, and the acceleration is
+/// limited.
+#[test]
+fn what_a_load_leaves_for_braking_slows_the_approach() {
+    let model = model();
+    let gains = SpeedGains::new(&model, model.mass);
+    let mass = f64::from(model.mass) / 65_536.0;
+    // Far away at rest: the limit of the acceleration, and break-away.
+    let far = f64::from(demanded(&model, 80.0, 0, 0, 0));
+    let top = f64::from(model.top_speed) / 65_536.0 * f64::from(model.viscous) / 256.0;
+    let limit = 2.5 * f64::from(gains.brake) * mass + 15e3 + top;
+    assert!((far / limit - 1.0).abs() < 0.02, "{far} {limit}");
+    // The speed at which no force but friction and load is asked for, 20 mm before the target.
+    let speed_at = |load: i32| {
+        (1..700)
+            .find(|speed| {
+                let friction = 10_000 + speed * model.viscous / 256;
+                demanded(&model, 20.0, load, *speed, 0) + load - friction <= 0
+            })
+            .expect("it brakes")
+    };
+    let pushing = |share: f64| (share * f64::from(model.force_in)) as i32;
+    let (free, half, most) = (speed_at(0), speed_at(pushing(0.99)), speed_at(pushing(1.2)));
+    let left = 0.7 * 0.01 * f64::from(model.force_in) / mass;
+    for (found, brake) in [(free, f64::from(gains.brake)), (half, left), (most, 200.0)] {
+        let slope = f64::from(gains.slope) / 256.0;
+        let expected = (2.0 * brake * (20.0 - 0.5 * brake / slope.powi(2))).sqrt();
+        let expected = expected.min(f64::from(model.top_speed) / 65_536.0);
+        let ratio = f64::from(found) / expected;
+        assert!((0.9..1.1).contains(&ratio), "{found} {expected}");
+    }
+}
+
+/// Five break-away forces in a second while it sticks; nothing between; four tenths less in each period of sliding.
+#[test]
+fn the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides() {
+    let model = model();
+    let ramped = |speed: i32, reference_speed: i32, periods: u32| {
+        let mut law = Predictive::new(&model);
+        law.observer.motion.speed = speed << 16;
+        let mut ramp = BreakawayRamp::default();
+        for _ in 0..periods {
+            let demand = ForceDemand {
+                reference: 5 << 16,
+                reference_speed: reference_speed << 16,
+                observer: &law.observer,
+                ahead: PredictedState {
+                    stroke: 0,
+                    speed: 0,
+                },
+                gains: &law.gains,
+            };
+            demand.ramp(&model, &mut ramp);
+        }
+        ramp
+    };
+    let newton = |ramp: BreakawayRamp| {
+        let mut law = Predictive::new(&model);
+        law.observer.start_at(90 << 16);
+        let demand = ForceDemand {
+            reference: 90 << 16,
+            reference_speed: 0,
+            observer: &law.observer,
+            ahead: PredictedState {
+                stroke: 90 << 16,
+                speed: 0,
+            },
+            gains: &law.gains,
+        };
+        f64::from(demand.force(&model, ramp, &law.standstill)) / 1e3
+    };
+    let grown = newton(ramped(2, 0, 50));
+    assert!((grown - 5.0 * 15.0 * 0.2).abs() < 0.2, "{grown}");
+    for (speed, reference_speed) in [(4, 0), (9, 0), (0, 2)] {
+        assert_eq!(newton(ramped(speed, reference_speed, 50)), 0.0, "{speed}");
+    }
+    let mut ramp = ramped(0, 0, 50);
+    let mut law = Predictive::new(&model);
+    law.observer.motion.speed = 11 << 16;
+    let demand = ForceDemand {
+        reference: 5 << 16,
+        reference_speed: 0,
+        observer: &law.observer,
+        ahead: PredictedState {
+            stroke: 0,
+            speed: 0,
+        },
+        gains: &law.gains,
+    };
+    demand.ramp(&model, &mut ramp);
+    let left = newton(ramp) / grown;
+    assert!((0.57..0.61).contains(&left), "{left}");
+}

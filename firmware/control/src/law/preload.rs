@@ -1,0 +1,94 @@
+//! Preload: ahead of an announced move the force stands at the edge of slipping in its direction.
+//!
+//! ```text
+//! F* = ½ Fc sgn(next − x) − load
+//! ```
+//!
+//! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
+//! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`). It ends with the announcement, or when
+//! the piston has moved by two bands. Once the force is there, and the counter chamber no longer lags, the valves
+//! stay shut until the force is half the friction off: a piston that rests is not kept at the edge by pulses. The
+//! force alone is not enough: by the pressure swap two full chambers make it, too, and one of them would have to vent
+//! when the move begins.
+//!
+//! Config [`AxisModel`], state [`Preload`], update [`Predictive::preload`].
+
+use super::Predictive;
+use super::allocation::{self, PressureSwap};
+use crate::axis::AxisModel;
+use crate::joint::JointInput;
+use crate::tuning::{PRELOAD_MOVED_BANDS, PRELOAD_THERE_SHIFT, REFERENCE_RESTS};
+
+/// A move that is awaited.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Preload {
+    /// Where the piston stood when it was announced, raw mm; `None` without one.
+    place: Option<i32>,
+    /// The force is not there yet, or made by a counter chamber that lags.
+    acts: bool,
+}
+
+/// What an announced move asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Awaited {
+    /// A force, mN.
+    Force(i32),
+    /// Nothing: the force is there.
+    Ready,
+}
+
+impl Predictive {
+    /// What an announced move asks for, as it is awaited; `None` if there is none, the piston is on its way,
+    /// or it has begun to move.
+    pub(super) fn preload(
+        &mut self,
+        model: &AxisModel,
+        input: &JointInput,
+        stands: bool,
+    ) -> Option<Awaited> {
+        // A move is awaited where the last one ended, not in the midst of that; against a stop with the target
+        // behind it, or where patience is over, the piston need not rest.
+        let reference_rests = input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS;
+        let motion = &self.observer.motion;
+        let leans = stands
+            && !self.is_settled()
+            && reference_rests
+            && motion.at_end_stop(model, input.reference.raw(), self.standstill.lingers());
+        let next = input.announced.filter(|_| self.standstill.holds() || leans);
+        let Some(next) = next else {
+            self.preload = Preload::default();
+            return None;
+        };
+        let stroke = motion.stroke;
+        let place = *self.preload.place.get_or_insert(stroke);
+        let distance = next.reference.raw().saturating_sub(place);
+        let gone = stroke.saturating_sub(place).saturating_abs();
+        if distance.saturating_abs() <= model.band
+            || gone > model.band.saturating_mul(PRELOAD_MOVED_BANDS)
+        {
+            return None;
+        }
+        let edge = model.coulomb.wrapping_shr(1);
+        let edge = if distance > 0 {
+            edge
+        } else {
+            edge.wrapping_neg()
+        };
+        let force = edge.saturating_sub(motion.load);
+        let expected = self.observer.expected();
+        let now = model.pressure_force(expected);
+        let missing = force.saturating_sub(now).saturating_abs();
+        self.preload.acts = if self.preload.acts {
+            let possible = allocation::possible_force(model, force);
+            let swap = PressureSwap::towards(next.reference.raw(), stroke);
+            missing > model.coulomb >> PRELOAD_THERE_SHIFT || swap.lags(model, possible, expected)
+        } else {
+            missing > model.coulomb >> 1
+        };
+        Some(if self.preload.acts {
+            Awaited::Force(force)
+        } else {
+            Awaited::Ready
+        })
+    }
+}

@@ -1,0 +1,211 @@
+//! Pulse planner: from the pressure that a chamber lacks to the on-times of the next period.
+//!
+//! ```text
+//! opening = (p* − p expected) / (dp/dt of the open valve)
+//! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
+//! ```
+//!
+//! Pulses are timed to the microsecond and may outlast a period. Of what is less than half of the shortest
+//! opening nothing is sent, from there on the shortest. The valve that would undo it shuts as soon as its own pulse
+//! allows, and a chamber's two valves are never on together. Near the target a pulse of one chamber alone: two may
+//! be too much of valves that cannot open for less.
+//!
+//! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
+
+use crate::axis::AxisModel;
+use crate::math::mul_shr;
+use crate::observer::Observer;
+use crate::observer::pressure::{Chamber, Pressures};
+use crate::observer::valve_delay::{ValveTimes, ValveTrack};
+use crate::pwm::OnTimes;
+use crate::tuning::{PRESSURE_RATE_LEAST, PULSE_LENGTHENED_LEAST};
+
+/// What a valve can do in the next period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ready {
+    /// Its coil is on, and this is left of its shortest pulse, µs.
+    On(i32),
+    /// Shut, for long enough to begin a pulse.
+    Shut,
+    /// It would not shut in between.
+    Shuts,
+}
+
+impl Ready {
+    /// In the period that begins `next`, up to which the coil is decided.
+    fn of(track: &ValveTrack, next: u32, times: &ValveTimes) -> Self {
+        let lasts = track.lasts(next);
+        if track.coil() {
+            Self::On((times.shortest_pulse as u32).saturating_sub(lasts) as i32)
+        } else if lasts < times.shortest_gap as u32 {
+            Self::Shuts
+        } else {
+            Self::Shut
+        }
+    }
+
+    /// On-time of the period for no opening beyond what is [`ValveTrack::committed`].
+    fn rest(self, times: &ValveTimes) -> u16 {
+        match self {
+            Self::On(left) => microseconds(left, times),
+            Self::Shut | Self::Shuts => 0,
+        }
+    }
+
+    /// On-time of the period for `need` µs of opening beyond what is
+    /// [`ValveTrack::committed`]; `rival` is the chamber's other valve.
+    fn on_time(self, need: i32, rival: Self, times: &ValveTimes) -> u16 {
+        match self {
+            Self::On(left) if need < PULSE_LENGTHENED_LEAST => microseconds(left, times),
+            Self::On(left) => microseconds(left.saturating_add(need), times),
+            Self::Shut if !matches!(rival, Self::On(_)) => {
+                let shortest = times.shortest_opening();
+                if need <= shortest >> 1 {
+                    return 0;
+                }
+                let opening = need.max(shortest);
+                microseconds(
+                    opening.saturating_add(times.on).saturating_sub(times.off),
+                    times,
+                )
+            }
+            Self::Shut | Self::Shuts => 0,
+        }
+    }
+}
+
+/// An on-time, 0…period (at most 8000).
+fn microseconds(on: i32, times: &ValveTimes) -> u16 {
+    on.max(0).min(times.period) as u16
+}
+
+/// What both valves of a chamber can do.
+fn ready(chamber: &Chamber, next: u32, times: &ValveTimes) -> [Ready; 2] {
+    [&chamber.fill, &chamber.vent].map(|track| Ready::of(track, next, times))
+}
+
+/// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa, not
+/// negative) in a chamber of `stiffness`.
+fn opening(power: i32, change: i32, stiffness: i32) -> i32 {
+    // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
+    let rate = mul_shr(power, stiffness, 22).max(PRESSURE_RATE_LEAST);
+    // Below 2^31.
+    let size = change.min(500_000 << 8).wrapping_shl(4);
+    size.checked_div(rate).unwrap_or(0)
+}
+
+/// On-times of the next period that bring a chamber of `length` (raw mm) from what is expected to `target`,
+/// fill and vent.
+fn pulses(
+    model: &AxisModel,
+    chamber: &Chamber,
+    [flow, length]: [i32; 2],
+    target: i32,
+    next: u32,
+) -> [u16; 2] {
+    let times = &model.times;
+    let [fill, vent] = ready(chamber, next, times);
+    let stiffness = model.stiffness(length);
+    let change = target.saturating_sub(chamber.expected);
+    // Of the pressure between now and the end of the dead time.
+    let mean = chamber.pressure.saturating_add(chamber.expected) >> 1;
+    if change > 0 {
+        let need = opening(model.fill_power(flow, mean), change, stiffness);
+        [fill.on_time(need, vent, times), vent.rest(times)]
+    } else {
+        let need = opening(
+            model.vent_power(flow, mean),
+            change.saturating_neg(),
+            stiffness,
+        );
+        [fill.rest(times), vent.on_time(need, fill, times)]
+    }
+}
+
+/// On-times of the next period, which begins `next`, for these pressures.
+pub(super) fn plan(
+    model: &AxisModel,
+    observer: &Observer,
+    target: Pressures,
+    next: u32,
+    near: bool,
+) -> OnTimes {
+    let Observer { a, b, .. } = observer;
+    let end = observer.end_of_dead_time(model);
+    let [fill_a, vent_a] = pulses(
+        model,
+        a,
+        [model.flow_a, model.length_a(end)],
+        target.a,
+        next,
+    );
+    let [fill_b, vent_b] = pulses(
+        model,
+        b,
+        [model.flow_b, model.length_b(end)],
+        target.b,
+        next,
+    );
+    let idle = |chamber: &Chamber| !chamber.fill.coil() && !chamber.vent.coil();
+    if near && fill_a | vent_a != 0 && fill_b | vent_b != 0 && idle(a) && idle(b) {
+        return if fill_a.max(vent_a) > fill_b.max(vent_b) {
+            [fill_a, vent_a, 0, 0]
+        } else {
+            [0, 0, fill_b, vent_b]
+        };
+    }
+    [fill_a, vent_a, fill_b, vent_b]
+}
+
+/// Everything shut as soon as the pulses under way allow.
+pub(super) fn shut(model: &AxisModel, observer: &Observer, next: u32) -> OnTimes {
+    let times = &model.times;
+    let rest = |chamber: &Chamber| ready(chamber, next, times).map(|valve| valve.rest(times));
+    let ([fill_a, vent_a], [fill_b, vent_b]) = (rest(&observer.a), rest(&observer.b));
+    [fill_a, vent_a, fill_b, vent_b]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMES: ValveTimes = ValveTimes {
+        tick: 1000,
+        period: 4000,
+        on: 3500,
+        off: 2000,
+        line: 900,
+        shortest_pulse: 3850,
+        shortest_gap: 2350,
+    };
+
+    /// From half of the shortest opening on a pulse is sent, which is never shorter than the
+    /// shortest, nor longer than the period.
+    #[test]
+    fn a_pulse_is_worth_its_opening() {
+        let on = |need| Ready::Shut.on_time(need, Ready::Shut, &TIMES);
+        let shortest = TIMES.shortest_opening();
+        assert_eq!(shortest, 2350);
+        assert_eq!(
+            (on(shortest / 2), on(shortest / 2 + 1), on(2350)),
+            (0, 3850, 3850)
+        );
+        assert_eq!((on(2400), on(60_000)), (3900, 4000));
+        assert_eq!(Ready::Shuts.on_time(2400, Ready::Shut, &TIMES), 0);
+        assert_eq!(Ready::Shut.on_time(2400, Ready::On(0), &TIMES), 0);
+    }
+
+    /// Where nothing flows any more, 50 Pa are asked for in a millisecond.
+    #[test]
+    fn a_chamber_at_its_end_asks_for_a_pulse_that_ends() {
+        let ms = opening(0, 1000 << 8, 1 << 20);
+        assert!((ms - 20_000).abs() < 100, "{ms}");
+    }
+
+    #[test]
+    fn a_pulse_under_way_is_lengthened_by_what_is_worth_it() {
+        let on = |need| Ready::On(850).on_time(need, Ready::Shut, &TIMES);
+        assert_eq!((on(19), on(20), on(9000)), (850, 870, 4000));
+        assert_eq!(Ready::On(850).rest(&TIMES), 850);
+    }
+}

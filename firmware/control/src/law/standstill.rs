@@ -1,0 +1,329 @@
+//! Standstill: when the valves stay shut, a state machine.
+//!
+//! ```text
+//!           in the band and slow, or friction stops it there      for REST_PERIODS
+//!  SERVO ───────────────────────────────────────────────► CATCH ─────────────────► REST
+//!    ▲ │ ▲                                                  │                        │
+//!    │ │ └──────────────────────────────────────────────────┘                        │
+//!    │ └─► PAUSE   patience is over and it entered the band: one swing with the valves shut
+//!    └──────────────────────────────────────────────────── out of the release band ──┘
+//!  PRESS: at an end stop a force is controlled (`seat`); it ends in REST
+//! ```
+//!
+//! * **Stopping way.** Friction alone stops the piston in the band if m v²/2 lies between the work of what friction
+//!   has left beside the forces that act, over the ways to both edges of the band.
+//! * **Patience.** What does not come to rest near its target for long may do so in a wider band, up to 2.4 times
+//!   and 0.4 mm, and the friction that is fed forward fades. Each time it enters that band the law waits with the
+//!   valves shut for a swing of the mass on the air, 2π √(m / k), k = n p (AA²/VA + AB²/VB): no limit
+//!   cycle lasts.
+//! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
+//!   a new target.
+//!
+//! The hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
+//! pause are ours, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
+//!
+//! Config [`AxisModel`], state [`Standstill`], update [`Standstill::update`].
+
+use crate::axis::AxisModel;
+use crate::math::{mul_shr, mul_shr_sat, square_root};
+use crate::observer::motion::Motion;
+use crate::tuning::{
+    BAND_WIDEST, CATCH_SPEED, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
+    PATIENCE, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST,
+    REST_PERIODS, START_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX,
+    SWING_PERIODS_MIN, WIDENS_AFTER, WIDENS_SHIFT,
+};
+
+/// Periods in which the band widens by one.
+const WIDENS_STEP: i32 = 1 << WIDENS_SHIFT;
+
+/// What the standstill logic has decided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) enum State {
+    /// The position servo acts.
+    #[default]
+    Servo,
+    /// Valves shut for what is left of a swing.
+    Pause,
+    /// Valves shut: friction stops the piston.
+    Catch,
+    /// At rest, valves shut.
+    Rest,
+    /// Pressed against an end stop.
+    Press,
+}
+
+/// Rest at a target, and how long it has been tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Standstill {
+    state: State,
+    /// Raw mm.
+    target: i32,
+    /// The target has changed since the piston came to rest.
+    aimed: bool,
+    /// Periods near the target without coming to rest.
+    near: u16,
+    /// In the band in the last period.
+    inside: bool,
+    /// Periods in [`State::Catch`].
+    caught: u16,
+    /// What is left of the pause under way, periods.
+    pause: u16,
+    /// Periods outside the band of release.
+    outside: u16,
+}
+
+impl Standstill {
+    /// Shut valves from power-up on, with the piston at `stroke`, raw mm.
+    pub(super) fn at(stroke: i32) -> Self {
+        Self {
+            target: stroke,
+            ..Self::default()
+        }
+    }
+
+    /// At rest.
+    pub(super) const fn is_at_rest(&self) -> bool {
+        matches!(self.state, State::Rest)
+    }
+
+    /// Whether the valves are to stay shut.
+    pub(super) const fn valves_closed(&self) -> bool {
+        matches!(self.state, State::Pause | State::Catch | State::Rest)
+    }
+
+    /// Whether it rests at the present target.
+    pub(super) const fn holds(&self) -> bool {
+        self.is_at_rest() && !self.aimed
+    }
+
+    /// Whether it has been near its target without coming to rest for longer than patience allows.
+    pub(super) const fn lingers(&self) -> bool {
+        self.near > PATIENCE
+    }
+
+    /// Whether the piston has been near its target for some time.
+    pub(super) const fn is_near(&self) -> bool {
+        self.near > NEAR_PERIODS
+    }
+
+    /// Takes over the reference; gives whether it is another target.
+    pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
+        let other = reference.saturating_sub(self.target).saturating_abs() > model.band;
+        if other {
+            self.target = reference;
+            self.near = 0;
+            self.pause = 0;
+            self.aimed = true;
+        }
+        other
+    }
+
+    /// At an end stop: pressed against it, or at rest there.
+    pub(super) const fn seat(&mut self, seated: bool) {
+        if seated {
+            self.rest();
+            self.near = 0;
+            self.pause = 0;
+        } else {
+            self.state = State::Press;
+            self.caught = 0;
+        }
+    }
+
+    const fn rest(&mut self) {
+        self.state = State::Rest;
+        self.aimed = false;
+        self.outside = 0;
+    }
+
+    /// One period.
+    pub(super) fn update(&mut self, model: &AxisModel, now: &Approach) {
+        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        if self.is_at_rest() {
+            if self.stays(model, now, steps) {
+                return;
+            }
+            self.caught = 0;
+            self.near = self.near.max(PATIENCE);
+        }
+        if !steps {
+            self.state = State::Servo;
+            self.near = self.near.saturating_sub(1);
+            self.caught = 0;
+            self.pause = 0;
+            self.inside = false;
+            return;
+        }
+        let error = now
+            .reference
+            .saturating_sub(now.motion.stroke)
+            .saturating_abs();
+        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
+        self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
+            self.near.wrapping_add(1).min(PATIENCE * 4)
+        } else {
+            self.near.saturating_sub(1)
+        };
+        let band = self.band(model);
+        let catch = CATCH_SPEED.wrapping_add(self.widened(CATCH_SPEED));
+        let speed = now.motion.speed.wrapping_abs();
+        let inside = error < band;
+        self.wait(model, now, speed, error, inside);
+        if (inside && speed < catch) || now.stops_within(model, band) {
+            self.state = State::Catch;
+            self.caught = self.caught.wrapping_add(1);
+            if self.caught > REST_PERIODS {
+                self.rest();
+            }
+        } else {
+            self.caught = 0;
+            self.state = if self.pause > 0 {
+                State::Pause
+            } else {
+                State::Servo
+            };
+        }
+    }
+
+    /// Whether a piston at rest stays so.
+    fn stays(&mut self, model: &AxisModel, now: &Approach, steps: bool) -> bool {
+        let band = self.band(model);
+        let half = model.band >> 1;
+        let release = model
+            .band
+            .wrapping_mul(RELEASE_SIXTEENTHS)
+            .wrapping_shr(4)
+            .wrapping_add(band)
+            .min(RELEASE_WIDEST.max(band.wrapping_add(half)));
+        // The ground pushes a standing joint to and fro. A target that has moved is another matter.
+        let release = if self.aimed {
+            release
+        } else {
+            release.max(model.release)
+        };
+        let away = now.reference.saturating_sub(now.measured).saturating_abs();
+        if steps && away <= release {
+            self.outside = 0;
+            self.aimed = false;
+            return true;
+        }
+        self.outside = self.outside.wrapping_add(1);
+        let periods = if self.aimed {
+            START_PERIODS
+        } else {
+            RELEASE_PERIODS
+        };
+        steps && self.outside < periods
+    }
+
+    /// Act and wait. Where acting alone has not brought the piston to rest for long,
+    /// each gentle entry into the band is followed by a pause with the valves shut, about one
+    /// swing on the air of the chambers: a piston that swings on it, or on the bristles of
+    /// its friction, comes to rest by itself, and every pulse meant to help would keep it
+    /// going. One that flees, because the forces on it are not in balance, is not waited for.
+    fn wait(&mut self, model: &AxisModel, now: &Approach, speed: i32, error: i32, inside: bool) {
+        let entered = inside && !self.inside;
+        self.inside = inside;
+        if speed > GENTLE_SPEED || (error > FLED && !inside) {
+            self.pause = 0;
+        } else if self.pause > 0 {
+            let spent = if inside || speed >= STILL_SPEED {
+                1
+            } else {
+                PAUSE_SPENT
+            };
+            self.pause = self.pause.saturating_sub(spent);
+        } else if entered && self.beyond() > 0 {
+            self.pause = swing(model, now.mass);
+        }
+    }
+
+    /// Periods near the target beyond what patience allows.
+    fn beyond(&self) -> i32 {
+        i32::from(self.near.saturating_sub(PATIENCE))
+    }
+
+    /// What is added to `base`, up to 1.4 times it, where patience is over for long.
+    fn widened(&self, base: i32) -> i32 {
+        let beyond = self.beyond().wrapping_sub(WIDENS_AFTER);
+        let beyond = beyond.max(0);
+        // Both below 2^19, times up to 2^8.
+        base.wrapping_mul(beyond).wrapping_shr(WIDENS_SHIFT)
+    }
+
+    /// Rest band, raw mm.
+    fn band(&self, model: &AxisModel) -> i32 {
+        let narrow = model.band;
+        narrow
+            .wrapping_add(self.widened(narrow))
+            .min(BAND_WIDEST.max(narrow))
+    }
+
+    /// What is fed forward for friction that is less than told makes a relay: where
+    /// the piston does not come to rest, it fades.
+    pub(super) fn faded(&self, grip: i32) -> i32 {
+        let left = (WIDENS_STEP + WIDENS_STEP / 4)
+            .saturating_sub(self.beyond())
+            .max(0);
+        mul_shr(grip, left.min(WIDENS_STEP), WIDENS_SHIFT)
+    }
+}
+
+/// Periods of a swing of a mass (kg × 2^16) on the air of both chambers, 25…250.
+#[inline]
+fn swing(model: &AxisModel, mass: i32) -> u16 {
+    let square_8 = mul_shr_sat(mass, model.swing, 16);
+    let periods = square_root(square_8.unsigned_abs()).wrapping_shr(4);
+    periods.clamp(SWING_PERIODS_MIN, SWING_PERIODS_MAX) as u16
+}
+
+/// How the piston comes to its target.
+pub(super) struct Approach<'a> {
+    /// Raw mm.
+    pub(super) reference: i32,
+    /// Raw mm/s.
+    pub(super) reference_speed: i32,
+    /// As measured, raw mm.
+    pub(super) measured: i32,
+    /// As estimated.
+    pub(super) motion: &'a Motion,
+    /// Pressure force, mN.
+    pub(super) force: i32,
+    /// kg × 2^16.
+    pub(super) mass: i32,
+}
+
+impl Approach<'_> {
+    /// Whether friction alone stops the piston within the band, if the valves shut:
+    /// the way is the kinetic energy over what friction has left beside the
+    /// forces that act.
+    #[inline]
+    fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
+        let speed = self.motion.speed.wrapping_shr(8);
+        let error = self.reference.saturating_sub(self.motion.stroke);
+        if error.saturating_abs() > band.wrapping_mul(STOP_ZONE_BANDS) {
+            return false;
+        }
+        let net = self.force.saturating_add(self.motion.load);
+        let along = if speed < 0 { net.saturating_neg() } else { net };
+        let stopping = mul_shr(model.coulomb, FRICTION_STOPS, 16).saturating_sub(along);
+        if stopping < model.coulomb >> STOP_LEAST_SHIFT {
+            return false;
+        }
+        // kg × mm²/s² = µJ = mN × mm, all × 2^16.
+        let energy = i64::from(self.mass)
+            .wrapping_mul(i64::from(speed).wrapping_mul(i64::from(speed)))
+            .wrapping_shr(17);
+        let ahead = if speed < 0 {
+            error.saturating_neg()
+        } else {
+            error
+        };
+        let work = |way: i32| i64::from(stopping).wrapping_mul(i64::from(way));
+        energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! Proximate time-optimal switching curve: the speed towards a target, by the way that is left.
+//!
+//! ```text
+//! e_l  = b / k²                              where straight line and parabola meet, with one slope
+//! v*   = k e                                 |e| ≤ e_l
+//!      = sgn(e) min(v_top, √(2 b (|e| − e_l/2)))   beyond
+//! ```
+//!
+//! The parabola is the time-optimal curve of a mass that brakes with `b`; the straight line at its foot
+//! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
+//! serves 1 and 400 mm. Gains scale with the dead time and fall with the cube root of what the mass exceeds
+//! the axis's nimble mass by: slope and damping once, the deceleration twice.
+//!
+//! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].
+
+use crate::axis::AxisModel;
+use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root};
+use crate::tuning::MASS_MIN;
+
+/// What of the law follows from the moving mass; worked out when that changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct SpeedGains {
+    /// Slope of the straight line k, 1/s × 2^8.
+    pub(super) slope: i32,
+    /// Gain of the speed error, 1/s × 2^8.
+    pub(super) damping: i32,
+    /// Deceleration towards the target b, mm/s².
+    pub(super) brake: i32,
+    /// 1/(2 k²), s² × 2^32.
+    linear: i32,
+}
+
+impl SpeedGains {
+    /// For a mass in kg × 2^16.
+    pub(super) fn new(model: &AxisModel, mass: i32) -> Self {
+        let mass = mass.max(MASS_MIN);
+        let share = if mass > model.nimble_mass {
+            // Nimble mass over mass, × 2^30.
+            let per_mass = quotient(1 << 40, mass.cast_unsigned(), 0);
+            cube_root(mul_shr(model.nimble_mass, per_mass, 10).cast_unsigned())
+        } else {
+            1 << 16
+        };
+        let slope = mul_shr(model.slope, share, 16).max(1 << 8);
+        // 2^32 / (2 k²) with k × 2^8, below 2^16: 2^47 / k².
+        let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
+        Self {
+            slope,
+            damping: mul_shr(model.damping, share, 16),
+            // Below 2^18 mm/s², 27 g: the curve takes it × 2^13.
+            brake: mul_shr(model.brake, mul_shr(share, share, 16), 16).min((1 << 18) - 1),
+            linear: quotient(1 << 47, square, 0),
+        }
+    }
+
+    /// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8, for a
+    /// deceleration of at most `brake` (mm/s²).
+    pub(super) fn speed(&self, error: i32, brake: i32, top: i32) -> (i32, i32) {
+        // Half of e_l: b / (2 k²), mm/s² × s² × 2^32 to raw mm.
+        let half = mul_shr_sat(brake, self.linear, 16);
+        let size = error.saturating_abs();
+        if size <= half.saturating_mul(2) {
+            return (mul_shr_sat(self.slope, error, 8), self.slope);
+        }
+        // (32 v)² = 2 b e × 2^10, e raw: × 2^11 / 2^16.
+        let square = i64::from(brake)
+            .wrapping_mul(i64::from(size.saturating_sub(half)))
+            .wrapping_shr(5);
+        let square = u32::try_from(square).unwrap_or(u32::MAX);
+        // At most 65 536 / 32 mm/s: fits raw mm/s.
+        let root = square_root(square).max(1) as i32;
+        let (speed, slope) = if root.wrapping_shl(11) >= top {
+            (top, 0)
+        } else {
+            let slope = brake.wrapping_shl(13).checked_div(root).unwrap_or(0);
+            (root.wrapping_shl(11), slope)
+        };
+        (
+            if error < 0 {
+                speed.wrapping_neg()
+            } else {
+                speed
+            },
+            slope,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::{Micros, PositionMm};
+
+    /// Against the formulas of the text, from a tenth of a millimetre to the whole stroke; and the line
+    /// meets the parabola without a step in speed or slope.
+    #[test]
+    fn the_curve_is_a_line_and_a_parabola_that_meet_smoothly() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        let gains = SpeedGains::new(&model, model.mass);
+        let (k, b) = (f64::from(gains.slope) / 256.0, f64::from(gains.brake));
+        let meet = b / (k * k);
+        let top = f64::from(model.top_speed) / 65_536.0;
+        for e in [0.1, 0.5 * meet, 0.99 * meet, 1.01 * meet, 2.0 * meet, 180.0] {
+            let exact = if e <= meet {
+                k * e
+            } else {
+                f64::min(top, (2.0 * b * (e - meet / 2.0)).sqrt())
+            };
+            for sign in [-1.0, 1.0] {
+                let raw = (sign * e * 65_536.0) as i32;
+                let (speed, _) = gains.speed(raw, gains.brake, model.top_speed);
+                let off = f64::from(speed) / 65_536.0 - sign * exact;
+                assert!(off.abs() < 0.1 + 3e-3 * exact, "{e}: {off} of {exact}");
+            }
+        }
+        let slope = |e: f64| {
+            gains
+                .speed((e * 65_536.0) as i32, gains.brake, model.top_speed)
+                .1
+        };
+        let ratio = f64::from(slope(1.01 * meet)) / f64::from(slope(0.99 * meet));
+        assert!((0.97..=1.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn gains_of_a_mass_are_good_to_two_thousandths() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        for mass_kg in [0.05, 0.3, 1.0, 1.5, 6.0, 40.0, 200.0] {
+            let raw = (mass_kg * 65_536.0) as i32;
+            let gains = SpeedGains::new(&model, raw);
+            let share = (f64::from(model.nimble_mass) / f64::from(raw))
+                .cbrt()
+                .min(1.0);
+            let slope = f64::from(model.slope) * share;
+            for (value, exact) in [
+                (gains.slope, slope),
+                (gains.damping, f64::from(model.damping) * share),
+                (gains.brake, f64::from(model.brake) * share * share),
+                (gains.linear, 2_f64.powi(47) / (slope * slope)),
+            ] {
+                let difference = (f64::from(value) - exact).abs();
+                assert!(
+                    difference <= 2.0 + 2e-3 * exact,
+                    "{mass_kg}: {value} {exact}"
+                );
+            }
+        }
+    }
+
+    /// A light piston behind large and fast valves: brake × 2^13 must fit 32 bits, or the
+    /// curve would turn its sign.
+    #[test]
+    fn the_brake_of_the_lightest_and_fastest_axis_fits_its_format() {
+        let data = AxisData {
+            bore: PositionMm::from_int(10),
+            rod: PositionMm::from_int(4),
+            stroke: PositionMm::from_int(100),
+            dead_a: PositionMm::from_int(1),
+            dead_b: PositionMm::from_int(1),
+            conductance: "0.42".parse().expect("a number"),
+            mass: PositionMm::from_f64(0.05),
+            valve_on: Micros(1000),
+            valve_off: Micros(1000),
+            line_delay: Micros(100),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+        assert!(model.brake > 1 << 18, "{}", model.brake);
+        // The largest that still fits times 2^13.
+        let gains = SpeedGains::new(&model, model.mass);
+        assert_eq!(gains.brake, i32::MAX >> 13);
+    }
+}

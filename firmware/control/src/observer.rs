@@ -1,0 +1,175 @@
+//! The observer: pressures, motion, load and mass of an axis with one potentiometer.
+//!
+//! | file | what it estimates | from |
+//! |---|---|---|
+//! | [`valve_delay`] | for how long each valve is open at its chamber | on-times |
+//! | [`flow`] | flow through an open valve, ISO 6358 | pressures |
+//! | [`pressure`] | pressure of a chamber, and its bounds | openings, motion |
+//! | [`motion`] | stroke, speed, load | pressure force, measured stroke |
+//! | `trajectory` | where the piston goes in the dead time | motion |
+//! | [`mass`] | moving mass | pressure force, speed |
+//!
+//! All of it once in a period of [`PERIOD_TICKS`] ticks, in this order ([`Observer::update`]). The law in
+//! [`crate::law`] only reads it.
+//!
+//! Stroke and speed are raw I16F16 mm and mm/s, pressures 1/256 Pa absolute, forces mN, accelerations mm/s²,
+//! times µs or s × 2^32. Chamber A extends the piston; positive forces and speeds extend.
+
+pub mod flow;
+pub mod mass;
+pub mod motion;
+pub mod pressure;
+mod trajectory;
+pub mod valve_delay;
+
+use crate::axis::AxisModel;
+use crate::math::mul_shr;
+use crate::pwm::OnTimes;
+use mass::MassEstimator;
+use motion::{Inertia, Motion};
+use pressure::{Chamber, ChamberMotion, Period, Pressures, Sent};
+use trajectory::PeriodTrajectory;
+
+pub use crate::axis::PERIOD_TICKS;
+
+/// State of the observer of one axis.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Observer {
+    pub(crate) a: Chamber,
+    pub(crate) b: Chamber,
+    /// Estimated motion and load.
+    pub(crate) motion: Motion,
+    /// Pressure force at the moment, mN.
+    pub(crate) force: i32,
+    /// What follows from the mass, as told or learnt.
+    pub(crate) inertia: Inertia,
+    mass: MassEstimator,
+    trajectory: PeriodTrajectory,
+}
+
+impl Observer {
+    /// At rest, with chambers that count as at `pressures` but may be anywhere between the atmosphere and the
+    /// supply.
+    #[must_use]
+    pub(crate) fn new(model: &AxisModel, pressures: Pressures) -> Self {
+        let unknown = [model.ambient, model.supply];
+        Self {
+            a: Chamber::new(pressures.a, unknown),
+            b: Chamber::new(pressures.b, unknown),
+            motion: Motion::default(),
+            force: model.pressure_force(pressures),
+            inertia: Inertia::new(model, model.mass),
+            mass: MassEstimator::default(),
+            trajectory: PeriodTrajectory::default(),
+        }
+    }
+
+    /// The first stroke that is measured (raw mm) is where the piston stands.
+    pub(crate) const fn start_at(&mut self, stroke: i32) {
+        self.motion.stroke = stroke;
+        self.trajectory = PeriodTrajectory::at(stroke);
+    }
+
+    /// Pressures at the moment.
+    #[must_use]
+    pub const fn pressures(&self) -> Pressures {
+        Pressures {
+            a: self.a.pressure,
+            b: self.b.pressure,
+        }
+    }
+
+    /// Pressures at the end of the dead time, with the pulses that are under way.
+    #[must_use]
+    pub const fn expected(&self) -> Pressures {
+        Pressures {
+            a: self.a.expected,
+            b: self.b.expected,
+        }
+    }
+
+    /// Where the piston is at the end of the dead time at its present speed, raw mm.
+    pub(crate) fn end_of_dead_time(&self, model: &AxisModel) -> i32 {
+        let way = mul_shr(self.motion.speed, model.horizon, 32);
+        self.motion
+            .stroke
+            .saturating_add(way)
+            .max(0)
+            .min(model.stroke)
+    }
+
+    /// By how much the pressure force can be wrong, mN.
+    #[must_use]
+    pub fn uncertainty(&self, model: &AxisModel) -> i32 {
+        let [[low_a, high_a], [low_b, high_b]] = self.bounds();
+        mul_shr(high_a.saturating_sub(low_a), model.force_a, 32).saturating_add(mul_shr(
+            high_b.saturating_sub(low_b),
+            model.force_b,
+            32,
+        ))
+    }
+
+    /// Bounds of the pressures of A and of B, lowest and highest.
+    #[must_use]
+    pub const fn bounds(&self) -> [[i32; 2]; 2] {
+        [self.a.bounds, self.b.bounds]
+    }
+
+    /// Estimated motion and load.
+    #[must_use]
+    pub const fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// One period, with the on-times that were planned for it and those that others made in it, and with
+    /// the stroke at its moment, raw mm. Gives a mass that was learnt in it, kg × 2^16.
+    pub(crate) fn update(
+        &mut self,
+        model: &AxisModel,
+        period: &Period,
+        plan: OnTimes,
+        external: OnTimes,
+        stroke: i32,
+    ) -> Option<i32> {
+        let PeriodTrajectory {
+            middle,
+            speed,
+            end,
+            ahead,
+        } = self.trajectory;
+        let a = ChamberMotion {
+            flow: model.flow_a,
+            lengths: [model.length_a(middle), model.length_a(end)],
+            speeds: [speed.wrapping_neg(), ahead.wrapping_neg()],
+        };
+        let b = ChamberMotion {
+            flow: model.flow_b,
+            lengths: [model.length_b(middle), model.length_b(end)],
+            speeds: [speed, ahead],
+        };
+        let [plan_a, plan_b] = by_chamber(plan);
+        let [external_a, external_b] = by_chamber(external);
+        let sent = |plan, external| Sent { plan, external };
+        self.a.update(model, period, &a, sent(plan_a, external_a));
+        self.b.update(model, period, &b, sent(plan_b, external_b));
+
+        let before = self.force;
+        self.force = model.pressure_force(self.pressures());
+        let force = before.saturating_add(self.force) >> 1;
+        self.motion.predict(model, &self.inertia, force);
+        self.motion.correct(model, &self.inertia, stroke);
+        self.trajectory = PeriodTrajectory::of(model, &self.motion);
+
+        if !model.learns_mass {
+            return None;
+        }
+        let mass = self.mass.update(model, self.motion.speed, force)?;
+        self.inertia = Inertia::new(model, mass);
+        Some(mass)
+    }
+}
+
+/// On-times of chamber A and of chamber B: fill, vent.
+pub(crate) const fn by_chamber([fill_a, vent_a, fill_b, vent_b]: OnTimes) -> [[u16; 2]; 2] {
+    [[fill_a, vent_a], [fill_b, vent_b]]
+}

@@ -1,0 +1,285 @@
+//! Motion and load observer: a fading-memory filter of second order around the equation of motion.
+//!
+//! ```text
+//! predict   m dv/dt = F + load − d v − Fc sgn v             F = pA AA − pB AB − pa (AA − AB)
+//!           stuck: |v| small and |F + load| < Fb, or pressed against an end stop
+//! correct   ε = x measured − x predicted                    θ: weight of a period against the next
+//!           x += (1 − θ³) ε
+//!           v += 3/2 (1 − θ)² (1 + θ) ε / T
+//!           load += c m (1 − θ)³ ε / T²                     not while stuck, nor in a cushion
+//! ```
+//!
+//! Gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
+//! Fundamentals of Kalman Filtering, ch. 7), which has one parameter, θ. The load takes what the pressures
+//! have wrong, too, so only a share c of its gain is used. Friction: Coulomb, viscous and break-away, as told.
+//!
+//! Assumes: the mass of the estimator beside it, friction within a few tenths of the data.
+//!
+//! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
+
+use crate::axis::AxisModel;
+use crate::math::{clip, mul_shr, mul_shr_sat, quotient, within};
+use crate::tuning::{
+    CUSHION, FRICTION_COUNTED, INNOVATION_MAX, MASS_MIN, REBOUND_SPEED, STOP_ZONE, STUCK_DECAY,
+    STUCK_SPEED,
+};
+
+/// What of the observer follows from the moving mass; worked out when that changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Inertia {
+    /// Mass, kg × 2^16.
+    pub mass: i32,
+    /// mm/s² per mN, × 2^24.
+    pub per_force: i32,
+    /// Load per innovation, mN/mm.
+    pub load_gain: i32,
+    /// Speed that Coulomb friction takes off in a period, raw mm/s.
+    pub coulomb_speed: i32,
+    /// Speed that it takes off in the dead time, raw mm/s.
+    pub coulomb_speed_ahead: i32,
+}
+
+impl Inertia {
+    /// For a mass in kg × 2^16.
+    #[must_use]
+    pub fn new(model: &AxisModel, mass: i32) -> Self {
+        let mass = mass.max(MASS_MIN);
+        // 1/kg = mm/s² per mN: 2^(24+16) / raw kg.
+        let per_force = quotient(1 << 40, mass.cast_unsigned(), 0);
+        let friction = mul_shr_sat(mul_shr(model.coulomb, FRICTION_COUNTED, 16), per_force, 24);
+        Self {
+            mass,
+            per_force,
+            // Below 2^27: times an innovation it fits.
+            load_gain: mul_shr(model.observe_load, mass, 16).min((1 << 27) - 1),
+            coulomb_speed: mul_shr_sat(friction, model.period, 16),
+            coulomb_speed_ahead: mul_shr_sat(friction, model.horizon, 16),
+        }
+    }
+
+    /// Acceleration of a force in mN, mm/s², within ±2^21 (213 g): what it gains in 8 ms fits
+    /// raw mm/s.
+    #[inline]
+    #[must_use]
+    pub fn acceleration(&self, force: i32) -> i32 {
+        // Forces below 2^25 mN (33 kN), 2^40 over the least mass below 2^30: it fits.
+        clip::<22>(mul_shr(clip::<26>(force), self.per_force, 24))
+    }
+}
+
+/// Estimated motion, of the moment of a period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Motion {
+    /// Stroke, raw mm.
+    pub stroke: i32,
+    /// Speed, raw mm/s.
+    pub speed: i32,
+    /// Force from outside and what the model does not know, mN, positive extends.
+    pub load: i32,
+    /// Speed gained in the last period, raw mm/s.
+    pub gained: i32,
+    /// Held by its friction.
+    pub stuck: bool,
+}
+
+/// What is left of a speed that loses `taken` to friction, which turns nothing round.
+#[inline]
+pub(crate) fn after_coulomb(speed: i32, taken: i32) -> i32 {
+    speed.saturating_sub(within(speed, taken))
+}
+
+impl Motion {
+    /// Within a millimetre of an end stop.
+    #[must_use]
+    pub fn at_stop(&self, model: &AxisModel) -> bool {
+        self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
+    }
+
+    /// Within a millimetre of an end stop, with a `target` (raw mm) more than one behind it; or, for a
+    /// piston that `lingers` there, less than one before it.
+    #[inline]
+    #[must_use]
+    pub fn at_end_stop(&self, model: &AxisModel, target: i32, lingers: bool) -> bool {
+        let zone = if lingers { STOP_ZONE } else { -STOP_ZONE };
+        let far = model.stroke.saturating_sub(STOP_ZONE);
+        (self.stroke < STOP_ZONE && target < zone)
+            || (self.stroke > far && target > model.stroke.saturating_sub(zone))
+    }
+
+    /// One period, in which the chambers made `force` in the mean.
+    #[inline]
+    pub fn predict(&mut self, model: &AxisModel, inertia: &Inertia, force: i32) {
+        let drive = force.saturating_add(self.load);
+        // Pressed against an end stop, the stop takes what is left of the force.
+        let against_stop = if drive > 0 {
+            self.stroke > model.stroke.saturating_sub(STOP_ZONE)
+        } else {
+            self.stroke < STOP_ZONE
+        };
+        // A rebound from it is over within the period.
+        self.stuck = if against_stop {
+            (self.speed ^ drive) >= 0 || self.speed.wrapping_abs() < REBOUND_SPEED
+        } else {
+            self.speed.wrapping_abs() < STUCK_SPEED && drive.saturating_abs() < model.breakaway
+        };
+        let speed = if self.stuck {
+            mul_shr(self.speed, STUCK_DECAY, 16)
+        } else {
+            let sliding = drive.saturating_sub(mul_shr(self.speed, model.viscous, 24));
+            // mm/s² × s × 2^32 to raw mm/s: / 2^16.
+            let gained = mul_shr(inertia.acceleration(sliding), model.period, 16);
+            after_coulomb(self.speed.saturating_add(gained), inertia.coulomb_speed)
+        };
+        self.gained = speed.saturating_sub(self.speed);
+        let mean = self.speed.saturating_add(self.gained.wrapping_shr(1));
+        self.stroke = self.stroke.saturating_add(mul_shr(mean, model.period, 32));
+        self.speed = speed;
+    }
+
+    /// Corrects with the stroke measured at the moment; gives by how much that is more.
+    #[inline]
+    pub fn correct(&mut self, model: &AxisModel, inertia: &Inertia, measured: i32) {
+        // Below 2^19; the shares below 2^24: what follows fits.
+        let innovation = within(measured.saturating_sub(self.stroke), INNOVATION_MAX);
+        self.stroke = self
+            .stroke
+            .saturating_add(mul_shr(innovation, model.observe_stroke, 16));
+        self.speed = self
+            .speed
+            .saturating_add(mul_shr(innovation, model.observe_speed, 16));
+        // Near an end the cushion brakes: that is no load.
+        let cushioned = if self.speed > 0 {
+            self.stroke > model.stroke.saturating_sub(CUSHION)
+        } else {
+            self.stroke < CUSHION
+        };
+        if !self.stuck && !cushioned {
+            let load = self
+                .load
+                .saturating_add(mul_shr(innovation, inertia.load_gain, 16));
+            self.load = within(load, model.force_out.max(model.force_in));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::Micros;
+
+    fn model() -> AxisModel {
+        AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
+    }
+
+    fn at(stroke_mm: i32, speed_mm_s: i32) -> Motion {
+        Motion {
+            stroke: stroke_mm << 16,
+            speed: speed_mm_s << 16,
+            ..Motion::default()
+        }
+    }
+
+    #[test]
+    fn a_light_piston_that_stands_is_seen_to_stand() {
+        let model = model();
+        for mass in [1 << 14, 1 << 15, 1 << 16, 3 << 16] {
+            let inertia = Inertia::new(&model, mass);
+            for speed in [-40, -7, 7, 40] {
+                let mut motion = at(90, speed);
+                for _ in 0..50 {
+                    motion.predict(&model, &inertia, 0);
+                    motion.correct(&model, &inertia, 90 << 16);
+                }
+                assert!(
+                    motion.stuck && motion.speed.abs() < STUCK_SPEED / 4,
+                    "{mass}: {motion:?}"
+                );
+            }
+        }
+        // One of 3.9 mm/s is stuck, and is slowed to less in a period; one of 4.1 slides.
+        let after = |tenths: i32| {
+            let mut motion = at(90, 0);
+            motion.speed = (tenths << 16) / 10;
+            motion.predict(&model, &Inertia::new(&model, 3 << 16), 12_000);
+            (motion.stuck, f64::from(motion.speed) / 65_536.0)
+        };
+        let (stuck, left) = after(39);
+        assert!(stuck && (2.25..2.32).contains(&left), "{left}");
+        assert!(!after(41).0);
+    }
+
+    /// A force of 30 N on 3 kg: what is left beside 0.92 of 10 N, and what is viscous, accelerates.
+    #[test]
+    fn a_sliding_piston_loses_speed_to_friction() {
+        let model = model();
+        let inertia = Inertia::new(&model, 3 << 16);
+        for sign in [-1, 1] {
+            let mut motion = at(90, sign * 100);
+            motion.predict(&model, &inertia, sign * 30_000);
+            let gained = f64::from(sign * motion.speed) / 65_536.0 - 100.0;
+            let exact = (30.0 - 0.92 * 10.0 - 40.0 * 0.1) / 3.0 * 4.0;
+            assert!((gained / exact - 1.0).abs() < 0.01, "{gained} {exact}");
+        }
+        // Friction turns nothing round.
+        let mut motion = at(90, 5);
+        motion.predict(&model, &inertia, -16_000);
+        motion.predict(&model, &inertia, 0);
+        assert!(
+            motion.speed <= 0 && motion.speed > -(20 << 16),
+            "{motion:?}"
+        );
+    }
+
+    /// Within a millimetre of an end stop, pressed against it, a piston stands, and rebounds of up to 20 mm/s
+    /// are over; in the cushion before it braking is no load.
+    #[test]
+    fn an_end_stop_holds_a_piston_and_its_cushion_is_no_load() {
+        let model = model();
+        let inertia = Inertia::new(&model, 3 << 15);
+        let stuck = |tenths: i32, speed: i32| {
+            let mut motion = Motion {
+                stroke: (tenths << 16) / 10,
+                speed: speed << 16,
+                ..Motion::default()
+            };
+            motion.predict(&model, &inertia, -40_000);
+            motion.stuck
+        };
+        assert!(stuck(9, 0) && !stuck(11, 0), "one millimetre");
+        assert!(stuck(9, 19) && !stuck(9, 21), "rebound");
+        let load = |stroke_mm: i32, speed: i32| {
+            let mut motion = at(stroke_mm, speed);
+            motion.correct(&model, &inertia, (stroke_mm << 16) + (1 << 15));
+            motion.load
+        };
+        assert!(load(90, -200) > 0 && load(7, -200) > 0 && load(5, 200) > 0);
+        assert_eq!((load(5, -200), load(175, 200)), (0, 0));
+    }
+
+    /// A stroke that jumps by the whole stroke counts as 8 mm.
+    #[test]
+    fn a_stroke_that_cannot_be_moves_the_estimate_by_little() {
+        let model = model();
+        let inertia = Inertia::new(&model, 3 << 15);
+        let after = |jump_mm: i32| {
+            let mut motion = at(90, 0);
+            motion.correct(&model, &inertia, (90 + jump_mm) << 16);
+            motion
+        };
+        assert_eq!(after(80), after(8));
+        assert_ne!(after(7), after(8));
+    }
+
+    #[test]
+    fn what_follows_from_a_mass_is_good_to_two_thousandths() {
+        let model = model();
+        for mass_kg in [0.05, 0.3, 1.0, 1.5, 6.0, 40.0, 200.0] {
+            let raw = (mass_kg * 65_536.0) as i32;
+            let inertia = Inertia::new(&model, raw);
+            let exact = 2_f64.powi(40) / f64::from(raw);
+            let difference = (f64::from(inertia.per_force) - exact).abs();
+            assert!(difference <= 2.0 + 2e-3 * exact, "{mass_kg}: {exact}");
+        }
+    }
+}

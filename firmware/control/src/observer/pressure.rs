@@ -1,0 +1,358 @@
+//! Pressure observer: ISO 6358 flow into a polytropic chamber, with the bounds of what is known.
+//!
+//! ```text
+//! dp/dt = n (K p_s ψ(p/p_s) t_fill − K p ψ(p_a/p) t_vent − p v) / L        K = C ρ0 R T / A
+//! dp⁻/dt, dp⁺/dt: the same, from the lowest and the highest pressure that can be
+//! ```
+//!
+//! Open loop: there is no pressure sensor. `n` = 1.2 lies between isothermal (1) and adiabatic (1.4);
+//! volumes are lengths, `L` = volume / area, and flows speeds of the piston (Bobrow and McDonell 1998, Pandian
+//! et al. 2002 for the chamber; ISO 6358-1 for the flow). Errors die out by themselves: a filling chamber
+//! ends at the supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone
+//! in p, so both bounds keep their order, and their distance says how far the estimate can be off.
+//!
+//! Assumes: supply and atmosphere as told, tight seals, no flow but through the valves.
+//!
+//! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
+
+use super::flow::power;
+use super::valve_delay::ValveTrack;
+use crate::axis::AxisModel;
+use crate::math::{mul_shr, mul_shr_sat};
+use crate::tuning::{CHAMBER_LENGTH_MIN, PRESSURE_MAX};
+
+/// Pressures of A and B in 1/256 Pa absolute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Pressures {
+    /// Bore side.
+    pub a: i32,
+    /// Rod side.
+    pub b: i32,
+}
+
+/// The present period on the clock of the valves, µs; wraps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Period {
+    /// When it begins.
+    pub(crate) begin: u32,
+    /// When the next one begins, up to which the coils are decided.
+    pub(crate) next: u32,
+    /// The moment for which pressures and motion are worked out: [`AxisModel::moment`] after the begin.
+    pub(crate) moment: u32,
+}
+
+/// A chamber's geometry, and what the piston does to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ChamberMotion {
+    /// Flow of an open valve as a speed of the piston, raw mm/s.
+    pub(crate) flow: i32,
+    /// Length of the chamber in the middle of the period that ends at the moment, and where the
+    /// dead time ends, raw mm.
+    pub(crate) lengths: [i32; 2],
+    /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
+    pub(crate) speeds: [i32; 2],
+}
+
+/// What the valves of a chamber sent, and for how long something else had them open.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sent {
+    /// On-times of the period from its begin, µs: fill, vent.
+    pub(crate) plan: [u16; 2],
+    /// Openings that others made in it, without their delays, µs: fill, vent.
+    pub(crate) external: [u16; 2],
+}
+
+/// Pulses under way and pressure of one chamber.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Chamber {
+    pub(crate) fill: ValveTrack,
+    pub(crate) vent: ValveTrack,
+    /// Pressure at the moment, 1/256 Pa.
+    pub(crate) pressure: i32,
+    /// The same at the end of the dead time, with what has been committed to by then.
+    pub(crate) expected: i32,
+    /// Bounds p⁻ and p⁺ of the pressure at the moment.
+    pub(crate) bounds: [i32; 2],
+}
+
+impl Chamber {
+    /// Valves shut, at `pressure`, which lies somewhere within `bounds` (1/256 Pa absolute).
+    pub(crate) const fn new(pressure: i32, bounds: [i32; 2]) -> Self {
+        Self {
+            fill: ValveTrack::new(),
+            vent: ValveTrack::new(),
+            pressure,
+            expected: pressure,
+            bounds,
+        }
+    }
+
+    /// One period: pressures at its moment and at the end of the dead time.
+    pub(crate) fn update(
+        &mut self,
+        model: &AxisModel,
+        period: &Period,
+        motion: &ChamberMotion,
+        sent: Sent,
+    ) {
+        let times = &model.times;
+        let from = period.moment.wrapping_sub(times.period as u32);
+        let mut open = [0; 2];
+        let mut committed = [0; 2];
+        let tracks = [&mut self.fill, &mut self.vent];
+        for (valve, track) in tracks.into_iter().enumerate() {
+            let (plan, external) = (sent.plan.get(valve), sent.external.get(valve));
+            let external = external.map_or(0, |on| i32::from(*on));
+            track.energise(
+                period.begin,
+                plan.map_or(0, |on| i32::from(*on)),
+                times.period,
+                times,
+            );
+            if external > 0 {
+                // Nobody knows when its coil fell.
+                track.shuts(period.next);
+            }
+            let seen = track.passes(from, times.period).wrapping_add(external);
+            let later = track.committed(period.moment, period.next, times);
+            if let (Some(open), Some(committed)) = (open.get_mut(valve), committed.get_mut(valve)) {
+                *open = seen;
+                *committed = later;
+            }
+        }
+
+        let [length, length_ahead] = motion.lengths;
+        let [speed, speed_ahead] = motion.speeds;
+        let stiffness = model.stiffness(length);
+        let both = [open[0] | committed[0], open[1] | committed[1]];
+        let limits = limits(model, both);
+        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
+        let mean = self.pressure.saturating_add(self.expected) >> 1;
+        let flows = Flows::at(model, motion.flow, mean, both);
+        let step = |p: i32, flows: &Flows, open, speed, span, stiffness| {
+            within_limits(
+                p.saturating_add(flows.change(open, power(p, speed), span, stiffness)),
+                limits,
+            )
+        };
+        self.pressure = step(self.pressure, &flows, open, speed, times.period, stiffness);
+        self.expected = step(
+            self.pressure,
+            &flows,
+            committed,
+            speed_ahead,
+            model.horizon_us,
+            model.stiffness(length_ahead),
+        );
+        self.bounds = self.bounds.map(|p| {
+            let flows = Flows::at(model, motion.flow, p, open);
+            step(p, &flows, open, speed, times.period, stiffness)
+        });
+    }
+
+    /// Everything that others have sent is over with the tick that ends at `end`: `plan` is what of
+    /// the period that began at `begin` was sent, fill and vent, µs.
+    pub(crate) fn release(&mut self, model: &AxisModel, begin: u32, end: u32, plan: [u16; 2]) {
+        let span = end.wrapping_sub(begin) as i32;
+        for (track, on) in [&mut self.fill, &mut self.vent].into_iter().zip(plan) {
+            track.energise(begin, i32::from(on), span, &model.times);
+            track.energise(end, 0, 1, &model.times);
+        }
+    }
+}
+
+/// Powers of the open valves of a chamber: pressure times a speed of the piston, in 2^8 Pa mm/s.
+#[derive(Clone, Copy, Debug, Default)]
+struct Flows {
+    fill: i32,
+    vent: i32,
+}
+
+impl Flows {
+    /// Of those that are `open` at all, at `pressure`.
+    fn at(model: &AxisModel, flow: i32, pressure: i32, [fill, vent]: [i32; 2]) -> Self {
+        Self {
+            fill: if fill > 0 {
+                model.fill_power(flow, pressure)
+            } else {
+                0
+            },
+            vent: if vent > 0 {
+                model.vent_power(flow, pressure)
+            } else {
+                0
+            },
+        }
+    }
+
+    /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
+    /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
+    /// `stiffness` ([`AxisModel::stiffness`]).
+    fn change(&self, [fill, vent]: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
+        let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
+        // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
+        let work = product(self.fill, fill)
+            .wrapping_sub(product(self.vent, vent))
+            .wrapping_add(product(squeeze, span))
+            .wrapping_add(1 << 15)
+            .wrapping_shr(16) as i32;
+        // × n/L: see `AxisModel::stiffness`.
+        mul_shr_sat(work, stiffness, 10)
+    }
+}
+
+/// Limits of a pressure while valves are open, or are to be. None fills beyond the supply or
+/// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
+/// half of that needs a motion of its own.
+const fn limits(model: &AxisModel, [fill, vent]: [i32; 2]) -> [i32; 2] {
+    [
+        if vent > 0 {
+            model.ambient
+        } else {
+            model.ambient.wrapping_shr(1)
+        },
+        if fill > 0 { model.supply } else { PRESSURE_MAX },
+    ]
+}
+
+/// `p` within them.
+fn within_limits(p: i32, [least, most]: [i32; 2]) -> i32 {
+    p.max(least).min(most)
+}
+
+impl AxisModel {
+    /// Length of chamber A with the piston at `stroke`, raw mm.
+    #[inline]
+    #[must_use]
+    pub(crate) const fn length_a(&self, stroke: i32) -> i32 {
+        stroke.saturating_add(self.dead_length_a)
+    }
+
+    /// Length of chamber B.
+    #[inline]
+    #[must_use]
+    pub(crate) const fn length_b(&self, stroke: i32) -> i32 {
+        self.stroke
+            .saturating_sub(stroke)
+            .saturating_add(self.dead_length_b)
+    }
+
+    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
+    /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
+    #[inline]
+    #[must_use]
+    pub(crate) fn stiffness(&self, length: i32) -> i32 {
+        let short = length.wrapping_shr(8).max(CHAMBER_LENGTH_MIN);
+        self.exponent.checked_div(short).unwrap_or(0)
+    }
+
+    /// Power of an open fill valve of this `flow` (raw mm/s) into a chamber at `pressure`.
+    #[inline]
+    pub(crate) fn fill_power(&self, flow: i32, pressure: i32) -> i32 {
+        self.curve.power(self.supply, pressure, flow)
+    }
+
+    /// Power of an open vent valve; positive lowers the pressure.
+    #[inline]
+    pub(crate) fn vent_power(&self, flow: i32, pressure: i32) -> i32 {
+        self.curve.power(pressure, self.ambient, flow)
+    }
+
+    /// Force of the two pressures, mN, positive extending.
+    #[inline]
+    #[must_use]
+    pub fn pressure_force(&self, p: Pressures) -> i32 {
+        mul_shr(p.a, self.force_a, 32)
+            .saturating_sub(mul_shr(p.b, self.force_b, 32))
+            .saturating_sub(self.force_rod)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::{Micros, PositionMm};
+
+    fn model() -> AxisModel {
+        AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
+    }
+
+    /// A chamber of `length_mm` whose valves are open for these shares of each period, and a piston that stands.
+    fn followed(model: &AxisModel, mut chamber: Chamber, open: [u16; 2], periods: u32) -> Chamber {
+        let length = model.length_a(90 << 16);
+        for number in 0..periods {
+            let begin = number * 4000;
+            let period = Period {
+                begin,
+                next: begin + 4000,
+                moment: begin + 2500,
+            };
+            let motion = ChamberMotion {
+                flow: model.flow_a,
+                lengths: [length; 2],
+                speeds: [0; 2],
+            };
+            let sent = Sent {
+                plan: [0; 2],
+                external: open,
+            };
+            chamber.update(model, &period, &motion, sent);
+        }
+        chamber
+    }
+
+    /// Wherever the pressure was, filling ends at the supply and venting at the atmosphere; the bounds hold it
+    /// between them all the way, and close.
+    #[test]
+    fn errors_of_the_pressure_die_out_and_the_bounds_close() {
+        let model = model();
+        let unknown = [model.ambient, model.supply];
+        for (open, end) in [([4000, 0], model.supply), ([0, 4000], model.ambient)] {
+            for start in [model.ambient, model.mean, model.supply] {
+                let mut chamber = Chamber::new(start, unknown);
+                let mut width = model.supply - model.ambient;
+                for _ in 0..400 {
+                    chamber = followed(&model, chamber, open, 1);
+                    let [low, high] = chamber.bounds;
+                    assert!(low <= chamber.pressure + 256 && chamber.pressure <= high + 256);
+                    assert!(low <= high && high - low <= width);
+                    width = high - low;
+                }
+                assert!((chamber.pressure - end).abs() < 2_000 << 8, "{start}");
+                assert!(width < 5_000 << 8, "{width}");
+            }
+        }
+    }
+
+    /// With the valves shut nothing is learnt.
+    #[test]
+    fn a_chamber_that_is_shut_keeps_its_pressure_and_its_bounds() {
+        let model = model();
+        let start = Chamber::new(model.mean, [model.ambient, model.supply]);
+        let chamber = followed(&model, start, [0, 0], 50);
+        assert_eq!(
+            (chamber.pressure, chamber.bounds),
+            (start.pressure, start.bounds)
+        );
+    }
+
+    /// The stiffness of a chamber without dead volume is that of 4 mm.
+    #[test]
+    fn a_chamber_is_never_shorter_than_its_line() {
+        let model = AxisModel::new(
+            &AxisData {
+                bore: PositionMm::from_int(100),
+                dead_a: PositionMm::from_f64(0.05),
+                ..AxisData::default()
+            },
+            Micros(1000),
+        )
+        .expect("in range");
+        let stiffness = |tenths: i32| model.stiffness((tenths << 16) / 10);
+        assert_eq!(stiffness(0), stiffness(39));
+        assert!(stiffness(42) < stiffness(39));
+        let exact = 1.2 * 1.048_576 * 2_f64.powi(22) / 4.0;
+        assert!((f64::from(stiffness(0)) / exact - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,85 @@
+//! Where the piston goes until the end of the dead time, for the chambers.
+//!
+//! ```text
+//! middle = x + (v + Δv/2) T/2                  in the period to the next moment
+//! end    = middle + (v + Δv/2) T/2 + v T_d     where the pulses of the next period act
+//! ```
+//!
+//! Constant speed beyond the period: the acceleration is not counted on, because the air that is squeezed
+//! pushes back, the more the shorter a chamber is.
+
+use super::motion::Motion;
+use crate::axis::AxisModel;
+use crate::math::mul_shr;
+
+/// The piston's way through the next period and the dead time after it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct PeriodTrajectory {
+    /// Stroke in the middle of the period to the next moment, raw mm.
+    pub(crate) middle: i32,
+    /// Speed there, raw mm/s.
+    pub(crate) speed: i32,
+    /// Stroke at the end of the dead time after it, raw mm.
+    pub(crate) end: i32,
+    /// Speed in that, raw mm/s; 0 if that would end beyond an end stop.
+    pub(crate) ahead: i32,
+}
+
+impl PeriodTrajectory {
+    /// Standing at `stroke`, raw mm.
+    pub(crate) const fn at(stroke: i32) -> Self {
+        Self {
+            middle: stroke,
+            speed: 0,
+            end: stroke,
+            ahead: 0,
+        }
+    }
+
+    /// Where the present speed takes the piston: not beyond an end stop, where air would be
+    /// squeezed that is not there.
+    pub(crate) fn of(model: &AxisModel, motion: &Motion) -> Self {
+        let speed = motion.speed.saturating_add(motion.gained >> 1);
+        let half = mul_shr(speed, model.period >> 1, 32);
+        let middle = motion.stroke.saturating_add(half);
+        let way = half.saturating_add(mul_shr(motion.speed, model.horizon, 32));
+        let free = middle.saturating_add(way);
+        let end = free.max(0).min(model.stroke);
+        Self {
+            middle,
+            speed,
+            end,
+            ahead: if end == free { motion.speed } else { 0 },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis::AxisData;
+    use wheeleg_units::Micros;
+
+    #[test]
+    fn nothing_is_squeezed_beyond_an_end_stop() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        let trajectory = |stroke_mm: i32, speed_mm_s: i32| {
+            let motion = Motion {
+                stroke: stroke_mm << 16,
+                speed: speed_mm_s << 16,
+                ..Motion::default()
+            };
+            PeriodTrajectory::of(&model, &motion)
+        };
+        assert_eq!(model.stroke, 180 << 16);
+        for (stroke, speed, end) in [(1, -400, 0), (179, 400, 180)] {
+            let trajectory = trajectory(stroke, speed);
+            assert_eq!((trajectory.end, trajectory.ahead), (end << 16, 0));
+        }
+        let free = trajectory(90, 400);
+        let way = f64::from(free.end) / 65_536.0 - 90.0;
+        let time_us = model.times.period + model.horizon_us;
+        assert!((way - 400e-6 * f64::from(time_us)).abs() < 1e-2, "{way}");
+        assert_eq!(free.ahead, 400 << 16);
+    }
+}

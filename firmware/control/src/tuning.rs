@@ -1,0 +1,130 @@
+//! All gains and thresholds of the predictive law and its observer, in one table.
+//!
+//! A row has value, unit, the reason or source of the value, and the test that fails if it is changed by what
+//! matters. `tests/suite/tuning.rs` holds that each of these tests exists. What differs from axis to axis is no
+//! tuning: it is axis data ([`crate::axis::AxisData`]).
+//!
+//! "Searched": on the bench axis (bore 20 × 180 mm, VQ110U-class valves), three other and some 200 random cylinders,
+//! all with loads, masses, friction and valve times off their data: of sets that meet the bars of
+//! `tests/system/control_bars.rs` one that misses few of the others.
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Name of the constant.
+    pub name: &'static str,
+    /// Its value as it stands in the code.
+    pub value: i64,
+    /// Its unit and what it is in that.
+    pub unit: &'static str,
+    /// Where the value is from.
+    pub reason: &'static str,
+    /// The test that guards it.
+    pub test: &'static str,
+}
+
+macro_rules! tuning {
+    ($($name:ident: $type:ty = $value:expr, $unit:literal, $reason:literal, $test:literal;)*) => {
+        $(
+            #[doc = concat!($unit, ". ", $reason, ". Guarded by `", $test, "`.")]
+            pub(crate) const $name: $type = $value;
+        )*
+        /// The table.
+        pub const TABLE: &[Row] = &[$(Row {
+            name: stringify!($name),
+            value: $name as i64,
+            unit: $unit,
+            reason: $reason,
+            test: $test,
+        }),*];
+    };
+}
+
+/// Millimetres, or mm/s, as raw I16F16.
+const fn mm(hundredths: i32) -> i32 {
+    (hundredths << 16) / 100
+}
+
+tuning! {
+    // Observer: pressure.
+    AMBIENT_PA: u64 = 101_325, "Pa", "ASSUMED: sea level", "coefficients_are_those_of_the_formulas";
+    EXPONENT_PERCENT: u64 = 120, "polytropic exponent n, × 100", "ASSUMED: between isothermal and adiabatic, usual for small cylinders", "what_somebody_else_sends_is_counted_once";
+    PRESSURE_MAX: i32 = (1 << 29) - 1, "1/256 Pa (2.1 MPa)", "format: products with it fit", "extreme_inputs_never_panic_and_stay_in_range";
+    CHAMBER_LENGTH_MIN: i32 = 4 << 8, "1/256 mm (4 mm)", "a line alone is longer; keeps n/L in its format", "a_chamber_is_never_shorter_than_its_line";
+
+    // Observer: motion and load.
+    MEMORY: u64 = 28_400, "θ, × 2^16 (0.433)", "searched", "coefficients_are_those_of_the_formulas";
+    LOAD_PERCENT: u64 = 59, "share of the load's gain, × 100", "searched: the load also takes what the pressures have wrong", "coefficients_are_those_of_the_formulas";
+    INNOVATION_MAX: i32 = 8 << 16, "raw mm (8 mm)", "format; a piston at 2 m/s moves as far in a period", "a_stroke_that_cannot_be_moves_the_estimate_by_little";
+    STUCK_SPEED: i32 = 4 << 16, "raw mm/s (4 mm/s)", "three times the noise of the speed at rest", "a_light_piston_that_stands_is_seen_to_stand";
+    STUCK_DECAY: i32 = 38_400, "share of the speed kept in a period, × 2^16 (0.59)", "searched", "a_light_piston_that_stands_is_seen_to_stand";
+    REBOUND_SPEED: i32 = 20 << 16, "raw mm/s (20 mm/s)", "a rebound from an end stop is over within a period", "an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
+    STOP_ZONE: i32 = 1 << 16, "raw mm (1 mm)", "give of a stop, and error of the stroke told", "an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
+    CUSHION: i32 = 6 << 16, "raw mm (6 mm)", "length of the longest cushion of the cylinders in axes/", "an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
+    FRICTION_COUNTED: i32 = 60_293, "share of the friction told, × 2^16 (0.92)", "searched: friction that is less than told would let the observer overlook speed", "a_sliding_piston_loses_speed_to_friction";
+    MASS_MIN: i32 = 1311, "kg × 2^16 (0.02 kg)", "the least that may be told", "extreme_inputs_never_panic_and_stay_in_range";
+
+    // Observer: mass.
+    LEARN_PERIODS_MAX: u16 = 250, "periods (1 s)", "format: the impulse fits", "what_tells_nothing_is_left";
+    LEARN_PERIODS_MIN: u16 = 20, "periods (80 ms)", "with fewer the noise of the speed counts", "what_tells_nothing_is_left";
+    LEARN_SLIDES: i32 = 20 << 16, "raw mm/s (20 mm/s)", "friction has its sliding value from there on", "a_move_begins_and_ends_with_sliding";
+    LEARN_PEAK_SPEED: i32 = 200 << 16, "raw mm/s (200 mm/s)", "a slower move has little impulse of its mass", "what_tells_nothing_is_left";
+    LEARN_PEAK_ABOVE: i32 = 100 << 16, "raw mm/s (100 mm/s)", "the same, above the line from begin to end", "what_tells_nothing_is_left";
+    MASS_LEARNT_MOST: i32 = 12, "times the mass told", "a payload adds to it", "what_cannot_be_is_bounded";
+    MASS_LEARNT_LEAST: i32 = 39_322, "share of the mass told, × 2^16 (0.6)", "rod and carriage stay", "what_cannot_be_is_bounded";
+
+    // Law: switching curve and inverse dynamics.
+    SLOPE_PERCENT: u64 = 36, "slope of the curve times the dead time, × 100", "searched; 1/e = 37 is the aperiodic limit of an integrator with dead time", "coefficients_are_those_of_the_formulas";
+    DAMPING_PERCENT: u64 = 95, "gain of the speed error times the dead time, × 100", "searched", "coefficients_are_those_of_the_formulas";
+    BRAKE_PERCENT: u64 = 60, "deceleration over slope times top speed, × 100", "searched", "coefficients_are_those_of_the_formulas";
+    NIMBLE_PERCENT: u64 = 60, "nimble mass over what half of both chambers could, × 100", "searched", "coefficients_are_those_of_the_formulas";
+    TOP_SPEED_HALVES: u64 = 3, "choked speed of the slower outlet over that of the other, in halves", "searched", "coefficients_are_those_of_the_formulas";
+    PRESSURE_LOW_PERCENT: u64 = 103, "of the atmosphere", "below, venting takes for ever", "coefficients_are_those_of_the_formulas";
+    PRESSURE_HIGH_PERMILLE: u64 = 985, "of the supply", "above, filling takes for ever", "coefficients_are_those_of_the_formulas";
+    RAMP_PER_SECOND: u64 = 5, "break-away forces in a second", "searched", "coefficients_are_those_of_the_formulas";
+    RAMP_DECAY: i32 = 27_000, "share lost in a period of sliding, × 2^16 (0.41)", "searched", "the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides";
+    STILL_SPEED: i32 = 3 << 16, "raw mm/s (3 mm/s)", "twice the noise of the speed at rest", "the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides";
+    SLIDING_SPEED: i32 = 10 << 16, "raw mm/s (10 mm/s)", "the sign of friction is that of the motion", "the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides";
+    FULL_FRICTION_SPEED: i32 = 10, "mm/s", "searched: steeper, the feed-forward is a relay", "friction_is_fed_forward_in_proportion_up_to_ten_mm_s";
+    BRAKE_FORCE_USED: i32 = 45_875, "share of the force that can brake, × 2^16 (0.7)", "searched: leaves the rest for what is not known", "what_a_load_leaves_for_braking_slows_the_approach";
+    BRAKE_LEAST: i32 = 200, "mm/s²", "a piston whose load is beyond its force still approaches", "what_a_load_leaves_for_braking_slows_the_approach";
+    ACCELERATION_LIMIT_HALVES: i32 = 5, "limit over the deceleration of the curve, in halves", "searched", "what_a_load_leaves_for_braking_slows_the_approach";
+
+    // Law: allocation and pulses.
+    SWAP_LAG: i32 = 10_000 << 8, "1/256 Pa (10 kPa)", "what a valve changes in a period", "a_counter_chamber_that_lags_is_made_up_for";
+    PRESSURE_RATE_LEAST: i32 = 205, "1/256 Pa per 16 µs (50 Pa/ms)", "a valve at its pressure's end gives no pulse without end", "a_chamber_at_its_end_asks_for_a_pulse_that_ends";
+    PULSE_LENGTHENED_LEAST: i32 = 20, "µs", "less is not worth a tick", "a_pulse_under_way_is_lengthened_by_what_is_worth_it";
+
+    // Law: standstill.
+    REFERENCE_RESTS: i32 = 1 << 16, "raw mm/s (1 mm/s)", "a slower reference is a step", "a_moving_reference_is_not_rested_at";
+    CATCH_SPEED: i32 = 4 << 16, "raw mm/s (4 mm/s)", "that of a stuck piston", "a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods";
+    REST_PERIODS: u16 = 6, "periods (24 ms)", "a swing's turning point is shorter", "a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods";
+    NEAR_BANDS: i32 = 24, "bands", "searched", "patience_begins_within_24_bands";
+    NEAR_PERIODS: u16 = 4, "periods (16 ms)", "searched", "patience_begins_within_24_bands";
+    PATIENCE: u16 = 100, "periods (0.4 s)", "most moves are at rest after 0.3 s", "patience_widens_the_band_and_waits_for_a_swing";
+    WIDENS_AFTER: i32 = 120, "periods (0.48 s)", "a pause and a swing are over", "patience_widens_the_band_and_waits_for_a_swing";
+    WIDENS_SHIFT: u32 = 7, "log2 of periods (0.51 s)", "by one band in so long", "patience_widens_the_band_and_waits_for_a_swing";
+    BAND_WIDEST: i32 = mm(40), "raw mm (0.4 mm)", "the bar of the bench is 0.5 mm", "patience_widens_the_band_and_waits_for_a_swing";
+    RELEASE_SIXTEENTHS: i32 = 16, "sixteenths of the band beyond it", "searched", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
+    RELEASE_WIDEST: i32 = mm(45), "raw mm (0.45 mm)", "the bar of the bench is 0.5 mm", "a_wide_band_is_released_within_the_bar";
+    RELEASE_PERIODS: u16 = 5, "periods (20 ms)", "one swing of noise is shorter", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
+    START_PERIODS: u16 = 1, "periods", "a new target is no noise", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
+    FRICTION_STOPS: i32 = 55_705, "share of the friction told, × 2^16 (0.85)", "searched", "friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
+    STOP_ZONE_BANDS: i32 = 12, "bands", "searched", "friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
+    STOP_LEAST_SHIFT: u32 = 2, "log2 of the friction over the least that stops", "less is not to be counted on", "friction_that_a_force_takes_away_stops_nothing";
+    PAUSE_SPENT: u16 = 8, "periods of a pause that one beside the band counts for", "searched", "a_pause_beside_the_band_is_short";
+    GENTLE_SPEED: i32 = 40 << 16, "raw mm/s (40 mm/s)", "a faster piston would not stay", "patience_widens_the_band_and_waits_for_a_swing";
+    FLED: i32 = 2 << 16, "raw mm (2 mm)", "a piston so far off is not in balance", "patience_widens_the_band_and_waits_for_a_swing";
+    SWING_PERIODS_MIN: u32 = 25, "periods (0.1 s)", "that of the lightest cylinders in axes/", "a_swing_is_that_of_the_mass_on_the_air";
+    SWING_PERIODS_MAX: u32 = 250, "periods (1 s)", "a longer pause would be felt", "a_swing_is_that_of_the_mass_on_the_air";
+
+    // Law: seat and preload.
+    SEAT_TARGET: i32 = mm(50), "raw mm (0.5 mm)", "error of the stroke told", "a_seat_has_its_target_zone_speed_and_force";
+    SEAT_ZONE: i32 = 3 << 16, "raw mm (3 mm)", "half of a cushion", "a_seat_has_its_target_zone_speed_and_force";
+    SEAT_SPEED: i32 = 60 << 16, "raw mm/s (60 mm/s)", "a faster one is still braked by the servo", "a_seat_has_its_target_zone_speed_and_force";
+    SEATED_WITHIN: i32 = mm(150), "raw mm (1.5 mm)", "cushion and load of the robot's foot hold it that far off", "a_seat_has_its_target_zone_speed_and_force";
+    SEAT_FORCE_BREAKAWAYS: i32 = 3, "break-away forces", "with 4 a start without notice was 30 ms later", "a_seat_has_its_target_zone_speed_and_force";
+    SEAT_PRESSED_SHIFT: u32 = 2, "log2 of the share of the force that may be missing", "resolution of the valves", "a_seat_has_its_target_zone_speed_and_force";
+    PRELOAD_THERE_SHIFT: u32 = 3, "log2 of the friction over what may be missing", "resolution of the valves", "a_preload_that_is_there_sends_no_pulse";
+    PRELOAD_MOVED_BANDS: i32 = 2, "bands", "that far, and it has begun to move", "a_preload_ends_when_the_piston_has_moved_by_two_bands";
+}
