@@ -12,7 +12,7 @@ const STANCE: u8 = 1;
 const REACH: u8 = 3;
 const LOWER: u8 = 4;
 
-fn codes(recording: &Recording) -> [Vec<(f64, u8)>; 2] {
+pub(super) fn codes(recording: &Recording) -> [Vec<(f64, u8)>; 2] {
     let of = |code: fn(&BehaviourSample) -> u8| {
         let rows = recording.behaviours.iter();
         rows.map(|row| (row.t_s(), code(&row.v))).collect()

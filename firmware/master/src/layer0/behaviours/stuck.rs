@@ -2,7 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
-use super::ways::Ways;
+use super::ground::Ways;
 use super::{SIDES, Senses};
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};

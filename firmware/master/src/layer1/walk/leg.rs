@@ -111,13 +111,15 @@ pub(super) struct Leg {
     tries: u8,
     /// Foot from which progress counts, m.
     anchor_m: [f32; 2],
+    /// How often it had run against something when that was looked at last.
+    bumps: u8,
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
 
 impl Leg {
     /// A leg that stands, or goes down to stand.
-    pub(super) fn new(side: Side, sensed: &Sensed) -> Self {
+    pub(super) fn new(side: Side, sensed: &Sensed, bumps: u8) -> Self {
         Self {
             side,
             state: if sensed.touches {
@@ -134,6 +136,7 @@ impl Leg {
             without: 0,
             tries: 0,
             anchor_m: sensed.foot_m,
+            bumps,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
                 ..JointSetpoint::default()
@@ -198,13 +201,11 @@ impl Leg {
         way_m
     }
 
-    /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
-    /// swing is to end, `lift_mm` its height.
+    /// One cycle: `foothold` is where the swing is to end, `lift_mm` its height.
     pub(super) fn advance(
         &mut self,
         sensed: &Sensed,
         acts: &Acts,
-        moved: Twist,
         geometry: &WalkGeometry,
         foothold: [f32; 2],
         lift_mm: f32,
@@ -215,10 +216,22 @@ impl Leg {
             0
         };
         let lift_mm = lift_mm + self.higher_mm;
+        let bumps = acts.bumps.get(self.side.index()).copied();
+        let bumps = bumps.unwrap_or(self.bumps);
+        let bumped = core::mem::replace(&mut self.bumps, bumps) != bumps;
+        let held = |cylinder| acts.overload.get(self.side.joint(cylinder)) == Some(&true);
+        let [held_plane, held_height] = [
+            held(Cylinder::Yaw) || held(Cylinder::Horizontal),
+            held(Cylinder::Vertical),
+        ];
+        if held_plane && !matches!(self.state, LegState::Lower(_)) {
+            // An overloaded leg goes nowhere: the foot is where it is.
+            self.foot_m = sensed.foot_m;
+        }
         match self.state {
-            LegState::Stance => self.follow(moved, geometry),
+            LegState::Stance => {}
+            LegState::Lift(_) if held_height => self.lower(),
             LegState::Lift(from_mm) => {
-                self.follow(moved, geometry);
                 let lift_mm = lift_mm.min(from_mm);
                 let hard = CLEAR_MM.min(0.5 * lift_mm);
                 let clear = hard.max((1e3 * geometry.nail_m).min(NAILS_OUT * lift_mm));
@@ -227,6 +240,7 @@ impl Leg {
                     self.state = LegState::Reach(distance(sensed.foot_m, foothold));
                 }
             }
+            LegState::Reach(_) if held_plane => self.lower(),
             LegState::Reach(way_m) => {
                 self.foot_m = self.nearer(foothold);
                 let left_m = distance(sensed.foot_m, self.foot_m);
@@ -234,7 +248,7 @@ impl Leg {
                     self.lower();
                     return;
                 }
-                if acts.bump.get(self.side.index()) != Some(&true) {
+                if !bumped {
                     return;
                 }
                 if lift_mm < self.stand_mm {
@@ -284,8 +298,11 @@ impl Leg {
         [x - libm::copysignf(nearer, x - middle), y]
     }
 
-    /// The ground has passed below: a standing foot goes with it.
-    fn follow(&mut self, moved: Twist, geometry: &WalkGeometry) {
+    /// The ground has passed below: a foot that stands or rises goes with it.
+    pub(super) fn follow(&mut self, moved: Twist, geometry: &WalkGeometry) {
+        if !matches!(self.state, LegState::Stance | LegState::Lift(_)) {
+            return;
+        }
         let [dx, dy] = moved.ground_m_s(geometry, self.side, self.foot_m);
         let [x, y] = self.foot_m;
         self.foot_m = [x + dx, y + dy];
@@ -359,7 +376,11 @@ impl Leg {
 }
 
 /// Yaw and b5 for a foot at `foot` moving with `velocity`, both m from O4.
-fn in_plane(side: Side, [x, y]: [f32; 2], [ux, uy]: [f32; 2]) -> Option<[JointSetpoint; 2]> {
+pub(crate) fn in_plane(
+    side: Side,
+    [x, y]: [f32; 2],
+    [ux, uy]: [f32; 2],
+) -> Option<[JointSetpoint; 2]> {
     // Height does not enter: the vertical cylinder is parallel to the yaw axis.
     let z = -0.1;
     let (strokes, rates) = mirror::strokes_of_foot(side, [x, y, z], [ux, uy, 0.0])?;
