@@ -296,6 +296,12 @@ impl Walk {
         } else {
             plan_mm - 0.5 * (left.stood_mm(&self.acts) + right.stood_mm(&self.acts))
         };
+        // A leg that extends there would climb it, and lift the nose.
+        let rise = if left.may_stand_at_a_face() || right.may_stand_at_a_face() {
+            rise.min(0.0)
+        } else {
+            rise
+        };
         for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
             leg.level(rise, &self.acts);
         }
@@ -430,8 +436,9 @@ impl Walk {
     fn over(&self) -> bool {
         let still = self.twist == Twist::default();
         // One that gave up may stand with a foot in a hole.
-        let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED;
-        self.stopping && still && (self.tries >= TRIES || self.legs.iter().all(down))
+        let gave_up = self.tries >= TRIES;
+        let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED || gave_up && leg.rests();
+        self.stopping && still && self.legs.iter().all(down)
     }
 
     fn write(&mut self, now_us: u64, lift_mm: f32) -> Setpoints {

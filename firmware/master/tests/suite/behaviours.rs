@@ -221,6 +221,11 @@ fn b3_a_foot_stops_where_its_switches_close() {
     robot.joint(B6).stroke_mm = mm(121.0);
     robot.touch([true; 2]);
     assert_eq!(robot.run(1), []);
+    // It presses at once, and stands when it is felt in two cycles in a row.
+    assert_eq!(robot.reference(B6, 0.0), 125.0);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting);
+    robot.joint(B6).stroke_mm = mm(122.0);
+    assert_eq!(robot.run(1), []);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(121.0)));
     assert_eq!(robot.behaving.tally().of(Behaviour::Touchdown), 1);
     // 20 mm beside where it was expected (130 mm) is told, less is not.
@@ -232,8 +237,23 @@ fn b3_a_foot_stops_where_its_switches_close() {
     ] {
         let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
         robot.joint(B6).stroke_mm = mm(at);
-        assert_eq!(robot.run(1), told, "{at}");
+        assert_eq!(robot.run(2), told, "{at}");
     }
+    // A touch of one cycle is a graze: the foot goes on down.
+    let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
+    robot.joint(B6).stroke_mm = mm(125.0);
+    robot.run(1);
+    robot.touch([false, true]);
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting);
+    robot.joint(B6).stroke_mm = mm(129.0);
+    robot.run(1);
+    assert_eq!(robot.reference(B6, 0.0), 131.0);
+    robot.touch([true; 2]);
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting, "felt anew");
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Down(mm(129.0)));
     // Without it the foot goes down on what was expected, and 4 mm more.
     let mut robot = Robot::new(
         [LegPlan::Lower(from), LegPlan::Stance],
@@ -260,7 +280,7 @@ fn b3_nails_do_not_end_the_way_down_before_the_ground_that_is_expected() {
         let mut robot = Robot::all([LegPlan::Lower(mm(120.0)), LegPlan::Stance]);
         robot.behaving = Behaving::new(Behaviours::ALL, geometry(nailed));
         robot.joint(B6).stroke_mm = mm(at);
-        robot.run(1);
+        robot.run(2);
         let landed = robot.acts().landing[0] != Landing::Waiting;
         assert_eq!(landed, lands, "{at} {nailed}");
     }
@@ -344,11 +364,41 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
         robot.touch([true; 2]);
         assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
     }
-    // A foot that leaves the ground touches it still.
+    // A foot that leaves the ground touches it still: b5 waits there, over the ground, and the wheels
+    // slow down.
     let mut robot = Robot::all(reach);
+    robot.setpoints.joints[B5] = Some(JointSetpoint {
+        reference_mm: mm(150.0),
+        ..JointSetpoint::default()
+    });
     robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
-    assert_eq!(robot.run(25), []);
+    robot.run(1);
+    assert_eq!(robot.reference(B5, 150.0), 100.0);
+    for wheel in &mut robot.senses.wheels {
+        wheel.travel_um += 4_000;
+    }
+    assert_eq!(robot.run(9), []);
+    assert_eq!(robot.reference(B5, 150.0), 96.0);
+    assert!(robot.acts().pace < 1);
+    robot.touch([false, true]);
+    assert_eq!(robot.run(1), []);
+    assert_eq!(
+        robot.reference(B5, 150.0),
+        150.0,
+        "and goes on when it is free"
+    );
+    // One that goes on to touch has met something.
+    robot.touch([true; 2]);
+    assert_eq!(robot.run(10), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    assert_eq!(robot.reference(B5, 150.0), 85.0);
+    for wheel in &mut robot.senses.wheels {
+        wheel.travel_um += 10_000;
+    }
+    robot.run(1);
+    assert_eq!(robot.reference(B5, 150.0), 75.0, "15 mm over the ground");
+    assert_eq!(robot.run(24), []);
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)], "as soon as it may");
 }
 
 #[test]
@@ -470,13 +520,13 @@ fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
 }
 
 #[test]
-fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
+fn b9_three_swings_in_a_row_that_run_against_something_are_stuck_and_then_two() {
     let mut robot = Robot::all(STAND);
-    let mut swing = |bumps: bool| {
+    let mut swing = |bumps: bool, way_um: i64| {
         let before = robot.acts().stuck;
         for (leg, cycles) in [
             (LegPlan::Reach, 40),
-            (LegPlan::Lower(mm(99.0)), 1),
+            (LegPlan::Lower(mm(99.0)), 2),
             (LegPlan::Stance, 1),
         ] {
             robot.setpoints.walk = Some(WalkPlan {
@@ -488,7 +538,7 @@ fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
             robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(if bumps { 0 } else { 100 });
             // Wheels and legs go on as if nothing were.
             for wheel in &mut robot.senses.wheels {
-                wheel.travel_um += 20_000;
+                wheel.travel_um += way_um;
             }
             let stroke = robot.joint(4).stroke_mm.to_f64();
             robot.joint(4).stroke_mm = mm(if stroke > 100.0 { 90.0 } else { 110.0 });
@@ -498,13 +548,16 @@ fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
         }
         robot.acts().stuck != before
     };
-    let mut swings = |all: &[bool]| all.iter().map(|bumps| swing(*bumps)).collect::<Vec<_>>();
-    assert_eq!(
-        swings(&[true; 6]),
-        [false, false, false, false, false, true]
-    );
-    assert_eq!(swings(&[true; 5]), [false; 5]);
-    assert_eq!(swings(&[false, true, true]), [false; 3]);
+    let mut swings = |all: &[bool], way_um| {
+        let each = all.iter().map(|bumps| swing(*bumps, way_um));
+        each.collect::<Vec<_>>()
+    };
+    assert_eq!(swings(&[true; 3], 20_000), [false, false, true]);
+    // Again before it has come half a metre farther.
+    assert_eq!(swings(&[true; 2], 20_000), [false, true]);
+    assert_eq!(swings(&[true, false, true], 20_000), [false; 3]);
+    assert_eq!(swings(&[false; 9], 20_000), [false; 9]);
+    assert_eq!(swings(&[true; 3], 20_000), [false, false, true]);
 }
 
 #[test]

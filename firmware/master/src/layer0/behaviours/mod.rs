@@ -225,7 +225,8 @@ impl Behaving {
             tell(act);
         }
         let nailed = self.geometry.nail_m > 0.0;
-        let mut landed = 0_u8;
+        let mut landed = [false; WHEELS];
+        let mut expected = 0_u8;
         for side in SIDES {
             let leg = plan.leg(side);
             if let Some(touchdown) = self.touchdown.get_mut(side.index()) {
@@ -233,11 +234,14 @@ impl Behaving {
                 let touches = senses.touches(side).unwrap_or(false);
                 let stood = matches!(touchdown.landing(), Landing::Down(_));
                 let act = touchdown.update(side, leg, &b6, touches, nailed, enabled);
-                let stands = matches!(touchdown.landing(), Landing::Down(_));
+                let lands = !stood && matches!(touchdown.landing(), Landing::Down(_));
+                if let Some(landed) = landed.get_mut(side.index()) {
+                    *landed = lands;
+                }
                 match act {
                     Some(act) => tell(act),
                     // Where the ground was expected it is counted, and nothing told.
-                    None if stands && !stood => landed = landed.saturating_add(1),
+                    None if lands => expected = expected.saturating_add(1),
                     None => {}
                 }
             }
@@ -254,13 +258,18 @@ impl Behaving {
             }
         }
         if enabled.contains(Behaviour::Touchdown) {
-            for _ in 0..landed {
+            for _ in 0..expected {
                 self.tally.count(Behaviour::Touchdown);
             }
         }
         let bumps = self.bump.map(|one| one.met());
-        let stuck = self.stuck.update(senses, &plan, setpoints, bumps, enabled);
-        self.pace.wish(self.contact.pace().min(self.slip.pace()));
+        let stuck = self
+            .stuck
+            .update(senses, &plan, setpoints, landed, bumps, enabled);
+        let waits = self.bump.iter().any(|one| one.place_mm().is_some());
+        let bump = if waits { I16F16::ZERO } else { I16F16::ONE };
+        let pace = self.contact.pace().min(self.slip.pace()).min(bump);
+        self.pace.wish(pace);
         self.acts = Acts {
             enabled,
             landing: self.touchdown.map(|one| one.landing()),
@@ -320,11 +329,11 @@ impl Behaving {
                 out.reference_mm = add(out.reference_mm, lead);
             }
             let bump = self.bump.get(side.index());
-            if let Some(back) = bump.and_then(Bump::back_mm)
+            if let Some(place) = bump.and_then(Bump::place_mm)
                 && joint == side.joint(Cylinder::Horizontal)
                 && leg == Some(LegPlan::Reach)
             {
-                out.reference_mm = back;
+                out.reference_mm = place;
                 out.velocity_mm_s = VelocityMmS::ZERO;
             }
             if joint != side.joint(Cylinder::Vertical) {

@@ -36,6 +36,9 @@ pub(super) struct Touchdown {
     cycles: u16,
     still: u16,
     stopped: u16,
+    /// Stroke at which the foot has met the ground that it still touches. A touch of one cycle may
+    /// be a graze: ground is what is felt in two in a row.
+    met_mm: Option<PositionMm>,
     landing: Landing,
 }
 
@@ -97,12 +100,21 @@ impl Touchdown {
             enabled.contains(Behaviour::Touchdown),
             enabled.contains(Behaviour::Search),
         );
+        let met = self.met_mm.take();
         if touches && (stops || (at >= end || searches) && arrived && self.cycles > BEGUN) {
-            let stroke = if stops {
+            let here = if stops {
                 b6.stroke_mm
             } else {
                 at.saturating_sub(PRESS_MM)
             };
+            let stroke = *self.met_mm.insert(met.unwrap_or(here));
+            if met.is_none() && self.stopped < STOPPED {
+                if stops {
+                    self.at_mm = Some(in_stroke(stroke.saturating_add(PRESS_MM)));
+                }
+                self.landing = Landing::Waiting;
+                return None;
+            }
             self.landing = Landing::Down(stroke);
             let expected = from_mm.saturating_add(APPROACH_MM);
             let off = stroke.saturating_sub(expected);
