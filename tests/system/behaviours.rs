@@ -2,6 +2,7 @@
 //! against the metric that it is there for. Three seeds here; `cargo xtask deep behaviours` runs
 //! twenty, with a sign test.
 
+mod every_walk;
 mod metrics;
 mod pairs;
 

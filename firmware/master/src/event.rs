@@ -35,6 +35,8 @@ pub enum HoldReason {
     SupplyLost,
     /// Layer 1 produced nothing for 100 ms.
     LayerOneStalled,
+    /// Layer 1 has not come back: the behaviours of its walk have ended, no leg moves any more.
+    LayerOneGone,
     /// The operator in control has seen nothing new for too long.
     OperatorLost,
     /// An E-stop was commanded.

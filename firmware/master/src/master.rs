@@ -6,8 +6,8 @@ use wheeleg_protocol::MAX_ENCODED;
 use crate::command::Command;
 use crate::config::MasterConfig;
 use crate::config::WheelDrive;
-use crate::dispatcher::{Dispatcher, Refusal, Reject, Request, Ticket};
-use crate::event::{Event, Events};
+use crate::dispatcher::{Accepted, Dispatcher, Refusal, Reject, Request, Ticket};
+use crate::event::{Event, Events, HoldReason};
 use crate::fifo::{
     CommandFifo, FeedbackFifo, FifoLosses, SetpointFifo, TelemetryFifo, push_drop_oldest,
     take_newest,
@@ -153,6 +153,9 @@ impl Master {
                 None => break,
             }
         }
+        if self.layer0.has_given_layer_one_up() {
+            self.answer_for_layer_one(now_us);
+        }
         if held && !self.layer0.lease().is_held() {
             // Nobody would watch what begins now.
             drop_waiting(&mut self.commands1, now_us, &mut self.events);
@@ -171,6 +174,28 @@ impl Master {
         }
         let newest = take_newest(&mut self.setpoints);
         self.layer0.start_cycle(now_us, newest)
+    }
+
+    /// A layer 1 that was given up answers nothing. Of what it is asked only a hold can be done: at
+    /// once, by layer 0.
+    fn answer_for_layer_one(&mut self, now_us: u64) {
+        for _ in 0..self.commands1.capacity() {
+            let Some(Accepted {
+                ticket, command, ..
+            }) = self.commands1.dequeue()
+            else {
+                break;
+            };
+            let answer = if matches!(command, Command::Hold) {
+                let reason = HoldReason::LayerOneGone;
+                self.layer0.hold_all(reason, now_us, &mut self.events);
+                Event::Done(ticket)
+            } else {
+                let reason = Refusal::Latched;
+                Event::Refused { ticket, reason }
+            };
+            self.events.push(now_us, answer);
+        }
     }
 
     /// Takes bytes received from the bus; `t_end_us` is the end of the last byte.

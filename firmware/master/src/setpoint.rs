@@ -258,10 +258,12 @@ pub struct Acts {
     pub deep: [bool; WHEELS],
     /// What b6 of a standing leg stands beyond its reference, mm.
     pub beyond_mm: [PositionMm; WHEELS],
-    /// A swinging foot has just run against something.
-    pub bump: [bool; WHEELS],
-    /// The robot has made no progress for long; true for a cycle.
-    pub stuck: bool,
+    /// Axes that pull at their limit, do not move, and are held where they are.
+    pub overload: [bool; JOINTS],
+    /// How often a swinging foot has run against something (wraps): layer 1 may miss a cycle.
+    pub bumps: [u8; WHEELS],
+    /// How often the robot has made no progress for long (wraps).
+    pub stuck: u8,
     /// Share of the walk's speed at which the wheels go, 0 to 1.
     pub pace: I16F16,
 }
@@ -274,8 +276,9 @@ impl Default for Acts {
             lost: [false; WHEELS],
             deep: [false; WHEELS],
             beyond_mm: [PositionMm::ZERO; WHEELS],
-            bump: [false; WHEELS],
-            stuck: false,
+            overload: [false; JOINTS],
+            bumps: [0; WHEELS],
+            stuck: 0,
             pace: I16F16::ONE,
         }
     }
@@ -304,6 +307,9 @@ pub struct Setpoints {
     /// How often the user has frozen all axes (wraps): each time ends what was commanded directly,
     /// too.
     pub holds: u8,
+    /// Number of the permission to move ([`Feedback::permit`]) for which they were computed; those of
+    /// another count as none.
+    pub permit: u16,
 }
 
 /// Shape of a push of the wheels.
@@ -329,6 +335,7 @@ impl Setpoints {
             walk: None,
             push: None,
             holds: 0,
+            permit: 0,
         }
     }
 }
@@ -350,4 +357,7 @@ pub struct Feedback {
     pub acts: Acts,
     /// All nodes armed, alive and free of faults: motion may go on.
     pub motion_allowed: bool,
+    /// Number of the permission to move (wraps): a stop, a clear or an arming ends one, and with it
+    /// every motion, also of a layer 1 that has seen nothing of it.
+    pub permit: u16,
 }

@@ -329,6 +329,10 @@ fn hold_reason(reason: &HoldReason) -> String {
             "layer 1 gave nothing for 100 ms; a walk is brought to a stand by its behaviours"
                 .to_owned()
         }
+        HoldReason::LayerOneGone => {
+            "layer 1 does not come back: no leg answers the ground any more. Clear and arm."
+                .to_owned()
+        }
         HoldReason::OperatorLost => {
             "the operator in control is gone. Reconnect, take the control, then clear and arm."
                 .to_owned()

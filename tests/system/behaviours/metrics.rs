@@ -12,7 +12,7 @@ const STANCE: u8 = 1;
 const REACH: u8 = 3;
 const LOWER: u8 = 4;
 
-fn codes(recording: &Recording) -> [Vec<(f64, u8)>; 2] {
+pub(super) fn codes(recording: &Recording) -> [Vec<(f64, u8)>; 2] {
     let of = |code: fn(&BehaviourSample) -> u8| {
         let rows = recording.behaviours.iter();
         rows.map(|row| (row.t_s(), code(&row.v))).collect()
@@ -169,9 +169,11 @@ pub(super) fn drag_mm(recording: &Recording) -> f64 {
     drag
 }
 
-/// Whether the robot stands at the end and has said that it is stuck: 1.
-pub(super) fn stands_stuck(recording: &Recording) -> f64 {
+/// 0 if the robot stands at the end, has said that it is stuck, and no board has latched a fault.
+pub(super) fn not_ended_safely(recording: &Recording) -> f64 {
     let told = recording.events.iter().any(|e| e.v.cause.code() == "stuck");
+    let mut codes = recording.events.iter().map(|e| e.v.cause.code());
+    let latched = codes.any(|code| code == "fault_latched");
     let end = recording.body.last().map_or(0.0, Row::t_s);
     let last = sil::window(&recording.body, end - 1.0, end);
     let (slowest, fastest) = sil::range(last, |v| v.speed_mm_s);
@@ -180,7 +182,6 @@ pub(super) fn stands_stuck(recording: &Recording) -> f64 {
         last.velocity_mm_s.abs()
     });
     let turns = drive.fold(0.0, f64::max);
-    f64::from(u8::from(
-        told && slowest > -5.0 && fastest < 5.0 && turns < 5.0,
-    ))
+    let stands = slowest > -5.0 && fastest < 5.0 && turns < 5.0;
+    f64::from(u8::from(!told || !stands || latched))
 }

@@ -38,6 +38,7 @@ impl Layer0 {
             wheels_um: [Side::Left, Side::Right].map(|side| self.odometry.wheel_um(side)),
             acts: *self.behaving.acts(),
             motion_allowed: self.motion_allowed(),
+            permit: self.permit,
         };
         for (stroke, reply) in feedback.strokes_mm.iter_mut().zip(replies) {
             *stroke = reply.map(|reply| reply.joint_position());
@@ -69,7 +70,8 @@ impl Layer0 {
     /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there
     /// are any, and gives the bytes of SYNC.
     pub fn start_cycle(&mut self, now_us: u64, setpoints: Option<Setpoints>) -> TxBytes {
-        match setpoints {
+        let setpoints = setpoints.filter(|setpoints| setpoints.permit == self.permit);
+        match setpoints.filter(|_| self.orphan.given_up.is_none()) {
             Some(setpoints) => {
                 self.stale_cycles = 0;
                 self.take(setpoints);
@@ -102,10 +104,14 @@ impl Layer0 {
             self.direct = [None; JOINTS];
             self.direct_travel = None;
         }
+        if held {
+            // All axes stay where they are.
+            self.behaving.reset();
+        }
         if let Some(push) = setpoints.push {
             self.shape_pushes(push);
         }
-        if self.frozen.is_none() && !self.orphan.given_up {
+        if self.frozen.is_none() {
             self.setpoints = setpoints;
             self.orphan.note(&setpoints, self.behaving.acts());
         }
@@ -117,7 +123,8 @@ impl Layer0 {
         if self.setpoints.walk.is_some() && self.power == Power::Armed {
             let senses = self.senses();
             let acts = *self.behaving.acts();
-            self.orphan.carry(&mut self.setpoints, &senses, &acts);
+            let walk = &self.config.walk;
+            self.orphan.carry(&mut self.setpoints, &senses, &acts, walk);
         }
     }
 
@@ -127,7 +134,7 @@ impl Layer0 {
             let senses = self.senses();
             self.behaving
                 .observe(&senses, &self.setpoints, now_us, events);
-            if self.orphan.given_up {
+            if self.orphan.given_up.is_some() {
                 self.behaving.stop_wheels();
             }
         }
@@ -195,10 +202,9 @@ impl Layer0 {
             return Some(plain(direct));
         }
         let setpoint = self.setpoints.joints.get(index).copied().flatten()?;
-        let mut setpoint = self.reflexes.apply(index, setpoint, travel_um);
-        if let Some(plan) = &self.setpoints.walk {
-            setpoint = self.behaving.apply(index, setpoint, plan);
-        }
+        let setpoint = self.reflexes.apply(index, setpoint, travel_um);
+        let plan = self.setpoints.walk.as_ref();
+        let mut setpoint = self.behaving.apply(index, setpoint, plan);
         if !self.fresh() {
             // Layer 1 is late: its last reference is held, not extrapolated.
             setpoint.velocity_mm_s = VelocityMmS::ZERO;
@@ -228,7 +234,7 @@ impl Layer0 {
 
     /// Whether layer 1 has given the references of this cycle.
     fn fresh(&self) -> bool {
-        self.stale_cycles == 0 && !self.orphan.given_up
+        self.stale_cycles == 0
     }
 
     /// What the boards have said in their slots.

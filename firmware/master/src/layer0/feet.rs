@@ -64,6 +64,8 @@ pub struct FootWatch {
     /// Stroke of b6 when the foot was not swinging last.
     stood: Option<PositionMm>,
     switches: [One; SWITCHES],
+    /// Switches for which this swing has counted.
+    counted: u8,
 }
 
 /// A switch that does not follow the others.
@@ -88,6 +90,7 @@ impl FootWatch {
         let now = now.0 & ALL;
         if !swings {
             self.stood = Some(b6_mm);
+            self.counted = 0;
         }
         let clear = PositionMm::from_int(CLEAR_MM);
         let drawn_up = self
@@ -120,8 +123,10 @@ impl FootWatch {
                 _ => continue,
             };
             one.agreed = one.agreed.saturating_add(1);
-            if one.agreed == AGREE {
+            // A foot that scrapes along something leaves its place and comes back to it.
+            if one.agreed == AGREE && !(closed && self.counted & bit != 0) {
                 *count = count.saturating_add(1);
+                self.counted |= bit;
             }
             if !one.told && *count >= times {
                 one.told = true;

@@ -114,6 +114,8 @@ pub struct Layer0 {
     /// Profile of the wheels' pushes, as last told to their boards.
     push: PushProfile,
     stale_cycles: u16,
+    /// Number of the permission to move: of all references that have not ended.
+    permit: u16,
     left_behind: LeftBehind,
     sums: Sums,
     /// Strokes at which all joints are kept after a stop.
@@ -156,7 +158,7 @@ impl Layer0 {
             odometry: Odometry::new(config.wheels),
             wheels: Wheels::default(),
             reflexes: Reflexes::default(),
-            behaving: Behaving::new(config.behaviours, config.walk.nail_m > 0.0),
+            behaving: Behaving::new(config.behaviours, config.walk),
             orphan: Orphan::default(),
             jobs: Jobs::new(),
             requester: Requester::new(RequesterConfig::DEFAULT, config.first_sequence),
@@ -169,6 +171,7 @@ impl Layer0 {
             group: None,
             setpoints: Setpoints::idle(0),
             stale_cycles: 0,
+            permit: 0,
             left_behind: LeftBehind::default(),
             sums: Sums::new(config.parameters),
             frozen: None,
@@ -219,6 +222,16 @@ impl Layer0 {
     #[must_use]
     pub const fn odometry(&self) -> &Odometry {
         &self.odometry
+    }
+
+    /// Layer 1 stands still, and has been given up: it will not answer its commands.
+    #[must_use]
+    pub const fn has_given_layer_one_up(&self) -> bool {
+        self.stale_cycles >= STALL_CYCLES
+            && matches!(
+                self.hold,
+                Some(HoldReason::LayerOneStalled | HoldReason::LayerOneGone)
+            )
     }
 
     /// Whether layer 1 may move the robot.

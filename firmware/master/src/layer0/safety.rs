@@ -3,6 +3,7 @@
 use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
 
 use super::acyclic::{Job, Purpose};
+use super::behaviours::CARRIED;
 use super::line::{Found, Spoilt};
 use super::liveness::Change;
 use super::nodes::Node;
@@ -33,11 +34,11 @@ impl Layer0 {
     /// Stops every axis. References freeze where the joints are in the next
     /// SYNC, wheels are withdrawn, and every node is asked to brake (E-stop: the
     /// bit in SYNC does it). The first reason stays until cleared.
-    pub(super) fn hold_all(&mut self, reason: HoldReason, now_us: u64, events: &mut Events) {
-        if self.hold.is_some() && !self.orphan.given_up {
+    pub(crate) fn hold_all(&mut self, reason: HoldReason, now_us: u64, events: &mut Events) {
+        if self.hold.is_some() && self.orphan.given_up.is_none() {
             return;
         }
-        self.orphan.given_up = false;
+        self.orphan.given_up = None;
         self.hold = Some(reason);
         events.push(now_us, Event::Hold(reason));
         self.freeze();
@@ -49,8 +50,8 @@ impl Layer0 {
         }
     }
 
-    /// Layer 1 stands still. Where it walked, the behaviours bring the robot to a stand; otherwise
-    /// all axes hold.
+    /// Layer 1 stands still. Where it walked, the behaviours bring the robot to a stand and keep it
+    /// there for a while ([`CARRIED`]); otherwise all axes hold.
     fn give_up_layer_one(&mut self, now_us: u64, events: &mut Events) {
         let reason = HoldReason::LayerOneStalled;
         if self.hold.is_some() || self.setpoints.walk.is_none() {
@@ -59,7 +60,7 @@ impl Layer0 {
         }
         self.hold = Some(reason);
         events.push(now_us, Event::Hold(reason));
-        self.orphan.given_up = true;
+        self.orphan.given_up = Some(0);
         self.drop_requests(now_us, events);
     }
 
@@ -120,6 +121,7 @@ impl Layer0 {
         self.reflexes = Default::default();
         self.behaving.reset();
         self.orphan = Default::default();
+        self.permit = self.permit.wrapping_add(1);
         self.setpoints = Setpoints::idle(self.cycle_start_us);
     }
 
@@ -275,8 +277,15 @@ impl Layer0 {
         if self.has_no_air() {
             self.hold_all(HoldReason::SupplyLost, now_us, events);
         }
-        if self.stale_cycles >= STALL_CYCLES && !self.orphan.given_up {
-            self.give_up_layer_one(now_us, events);
+        match &mut self.orphan.given_up {
+            Some(cycles) => {
+                *cycles = cycles.saturating_add(1);
+                if *cycles >= CARRIED {
+                    self.hold_all(HoldReason::LayerOneGone, now_us, events);
+                }
+            }
+            None if self.stale_cycles >= STALL_CYCLES => self.give_up_layer_one(now_us, events),
+            None => {}
         }
     }
 }

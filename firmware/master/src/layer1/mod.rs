@@ -67,6 +67,8 @@ pub struct Layer1 {
     segment: u16,
     /// Commands `Hold` carried out (wraps).
     holds: u8,
+    /// Number of the permission to move that holds.
+    permit: u16,
     lost_setpoints: u32,
     tally: Tally,
 }
@@ -91,6 +93,7 @@ impl Layer1 {
             active: None,
             segment: 0,
             holds: 0,
+            permit: 0,
             lost_setpoints: 0,
             tally: Tally::default(),
         })
@@ -130,7 +133,8 @@ impl Layer1 {
                 None => break,
             }
         }
-        if !self.feedback.motion_allowed {
+        let permit = core::mem::replace(&mut self.permit, self.feedback.permit);
+        if !self.feedback.motion_allowed || permit != self.permit {
             self.interrupt(now_us, events);
         }
         for _ in 0..commands.capacity() {
@@ -160,6 +164,7 @@ impl Layer1 {
         }
         let mut out = self.advance(now_us, events);
         out.holds = self.holds;
+        out.permit = self.permit;
         out.push = Some(PushProfile {
             speed_mm_s: self.params.push_speed_mm_s,
             acceleration_mm_s2: self.params.push_acceleration_mm_s2,

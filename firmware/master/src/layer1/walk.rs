@@ -17,14 +17,17 @@ mod order;
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::CYCLE_US;
 use super::params::ParamError;
 use crate::behaviour::{Act, Behaviour};
 use crate::contact::Side;
 use crate::setpoint::{
     Acts, Cylinder, Feedback, Phase, Setpoints, TravelSetpoint, WHEELS, WalkPlan, WheelTravel,
 };
+pub(crate) use geometry::Twist;
 pub use geometry::WalkGeometry;
-use geometry::{Twist, stance, time_left_s};
+use geometry::{stance, time_left_s};
+pub(crate) use leg::in_plane;
 use leg::{HIGHER_MM, Leg, Sensed, full_mm};
 pub use order::{WalkOrder, WalkPattern};
 
@@ -50,6 +53,10 @@ const PROGRESS_M: f32 = 0.005;
 /// A robot that is stuck backs off for so many cycles (1 s) at this speed, m/s, …
 const BACK_OFF: u16 = 100;
 const BACK_M_S: f32 = 0.05;
+/// An order that is slower than this, m/s, does not get stuck.
+const BACK_LEAST_M_S: f32 = 1e-4;
+/// So many cycles of layer 1 can be missed before it is given up.
+const MISSED_MOST: u64 = 10;
 /// … and lifts its feet higher ([`HIGHER_MM`]) until it has come so far, m, …
 const FREE_M: f32 = 0.5;
 /// … or has tried so many times.
@@ -90,6 +97,10 @@ pub struct Walk {
     back_off: u16,
     /// What the behaviours of layer 0 do.
     acts: Acts,
+    /// How often it had been stuck when that was looked at last.
+    stuck: u8,
+    /// Time of the last references, µs.
+    time_us: u64,
     governed: bool,
     told: [Option<Act>; TOLD],
 }
@@ -106,7 +117,11 @@ impl Walk {
         segment: u16,
     ) -> Result<Option<Self>, ParamError> {
         order.validate()?;
-        let leg = |side| Sensed::of(feedback, side).map(|sensed| Leg::new(side, &sensed));
+        let leg = |side: Side| {
+            let bumps = feedback.acts.bumps.get(side.index());
+            let bumps = bumps.copied().unwrap_or_default();
+            Sensed::of(feedback, side).map(|sensed| Leg::new(side, &sensed, bumps))
+        };
         let (Some(left), Some(right)) = (leg(Side::Left), leg(Side::Right)) else {
             return Ok(None);
         };
@@ -127,6 +142,8 @@ impl Walk {
             tries: 0,
             back_off: 0,
             acts: feedback.acts,
+            stuck: feedback.acts.stuck,
+            time_us: feedback.time_us,
             governed: false,
             told: [None; TOLD],
         }))
@@ -183,22 +200,17 @@ impl Walk {
         self.since_swing = self.since_swing.saturating_add(1);
         let mut progress_m = 0.0;
         for leg in &mut self.legs {
+            leg.follow(moved, &self.geometry);
+            let Some(sensed) = Sensed::of(feedback, leg.side) else {
+                continue;
+            };
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;
-            if let Some(sensed) = Sensed::of(feedback, leg.side) {
-                let stood = leg.stands();
-                progress_m += leg.way_m(&sensed, PROGRESS_M);
-                leg.advance(
-                    &sensed,
-                    &self.acts,
-                    moved,
-                    &self.geometry,
-                    foothold,
-                    lift_mm,
-                );
-                if !stood && leg.stands() {
-                    let took = f32::from(self.since_swing) * CYCLE_S;
-                    self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
-                }
+            let stood = leg.stands();
+            progress_m += leg.way_m(&sensed, PROGRESS_M);
+            leg.advance(&sensed, &self.acts, &self.geometry, foothold, lift_mm);
+            if !stood && leg.stands() {
+                let took = f32::from(self.since_swing) * CYCLE_S;
+                self.swing_s = took.clamp(SWING_MIN_S, SWING_MAX_S);
             }
         }
         self.level(plan_mm);
@@ -215,7 +227,9 @@ impl Walk {
         for leg in &mut self.legs {
             leg.rises_in = next.and_then(|(side, cycles)| (side == leg.side).then_some(cycles));
         }
-        self.accelerate(wanted);
+        let cycles = now_us.saturating_sub(self.time_us).checked_div(CYCLE_US);
+        self.time_us = now_us;
+        self.accelerate(wanted, cycles.unwrap_or(1).clamp(1, MISSED_MOST));
         self.write(now_us, lift_mm)
     }
 
@@ -229,7 +243,7 @@ impl Walk {
             self.back_off = self.back_off.saturating_sub(1);
             return;
         }
-        if !self.acts.stuck {
+        if core::mem::replace(&mut self.stuck, self.acts.stuck) == self.acts.stuck {
             return;
         }
         self.free_m = 0.0;
@@ -261,16 +275,17 @@ impl Walk {
         if self.stopping {
             return Twist::default();
         }
-        if self.back_off > 0 {
-            return Twist {
-                forward_m_s: -libm::copysignf(BACK_M_S, self.order.speed_mm_s.get().to_num()),
-                turn_rad_s: 0.0,
-            };
-        }
-        Twist {
+        let ordered = Twist {
             forward_m_s: self.order.speed_mm_s.get().to_num::<f32>() * 1e-3,
             turn_rad_s: self.order.turn_rad_s.to_num::<f32>(),
+        };
+        if self.back_off == 0 {
+            return ordered;
         }
+        // The way that it came, a turn as a turn.
+        let rim = |side| libm::fabsf(ordered.wheel_m_s(&self.geometry, side));
+        let fastest = rim(Side::Left).max(rim(Side::Right));
+        ordered.scaled(-BACK_M_S / fastest.max(BACK_LEAST_M_S))
     }
 
     /// Keeps the mean height of the legs, and feet on the ground.
@@ -280,6 +295,12 @@ impl Walk {
             -plan_mm
         } else {
             plan_mm - 0.5 * (left.stood_mm(&self.acts) + right.stood_mm(&self.acts))
+        };
+        // A leg that extends there would climb it, and lift the nose.
+        let rise = if left.may_stand_at_a_face() || right.may_stand_at_a_face() {
+            rise.min(0.0)
+        } else {
+            rise
         };
         for leg in self.legs.iter_mut().filter(|leg| leg.stands()) {
             leg.level(rise, &self.acts);
@@ -333,7 +354,8 @@ impl Walk {
     }
 
     /// Brings the references' motion towards the one asked for, as fast as the feet allow.
-    fn accelerate(&mut self, wanted: Twist) {
+    /// `cycles`: since the last references; layer 0 has led the wheels on meanwhile.
+    fn accelerate(&mut self, wanted: Twist, cycles: u64) {
         // A new segment begins at the last reference sent.
         if self
             .travel_mm
@@ -370,7 +392,7 @@ impl Walk {
             let step = 1e3 * CYCLE_S * self.twist.wheel_m_s(&self.geometry, side);
             *travel += step;
             if let Some(lead) = self.lead_mm.get_mut(side.index()) {
-                *lead += pace * step;
+                *lead += pace * step * cycles as f32;
             }
         }
     }
@@ -414,8 +436,9 @@ impl Walk {
     fn over(&self) -> bool {
         let still = self.twist == Twist::default();
         // One that gave up may stand with a foot in a hole.
-        let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED;
-        self.stopping && still && (self.tries >= TRIES || self.legs.iter().all(down))
+        let gave_up = self.tries >= TRIES;
+        let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED || gave_up && leg.rests();
+        self.stopping && still && self.legs.iter().all(down)
     }
 
     fn write(&mut self, now_us: u64, lift_mm: f32) -> Setpoints {

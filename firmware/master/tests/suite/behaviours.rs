@@ -4,6 +4,7 @@ use wheeleg_master::behaviour::{Act, Behaviour, Behaviours};
 use wheeleg_master::contact::{FootSwitches, Side};
 use wheeleg_master::event::{Event, Events};
 use wheeleg_master::layer0::behaviours::{Behaving, JointSense, Senses, WheelSense};
+use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_master::setpoint::{
     Acts, JointSetpoint, Landing, LegPlan, Setpoints, TravelSetpoint, WalkPlan, WheelTravel,
 };
@@ -15,27 +16,35 @@ const YAW: usize = 0;
 const B5: usize = 1;
 const B6: usize = 2;
 
-fn mm(mm: f64) -> PositionMm {
+/// A robot, whose feet may have nails.
+pub(crate) fn geometry(nailed: bool) -> WalkGeometry {
+    WalkGeometry {
+        nail_m: if nailed { 0.06 } else { 0.0 },
+        ..WalkGeometry::default()
+    }
+}
+
+pub(crate) fn mm(mm: f64) -> PositionMm {
     PositionMm::from_f64(mm)
 }
 
 /// A robot of which a test says all that its boards say.
-struct Robot {
-    behaving: Behaving,
-    senses: Senses,
-    setpoints: Setpoints,
-    told: Vec<Act>,
+pub(crate) struct Robot {
+    pub(crate) behaving: Behaving,
+    pub(crate) senses: Senses,
+    pub(crate) setpoints: Setpoints,
+    pub(crate) told: Vec<Act>,
     travel_mm: f64,
 }
 
 impl Robot {
-    fn new(legs: [LegPlan; 2], enabled: Behaviours) -> Self {
+    pub(crate) fn new(legs: [LegPlan; 2], enabled: Behaviours) -> Self {
         let joint = JointSense {
             stroke_mm: mm(100.0),
             ..JointSense::default()
         };
         Self {
-            behaving: Behaving::new(enabled, false),
+            behaving: Behaving::new(enabled, geometry(false)),
             senses: Senses {
                 feet: [Some(FootSwitches(0x0F)); 2],
                 joints: [Some(joint); 6],
@@ -50,38 +59,43 @@ impl Robot {
         }
     }
 
-    fn all(legs: [LegPlan; 2]) -> Self {
+    pub(crate) fn all(legs: [LegPlan; 2]) -> Self {
         Self::new(legs, Behaviours::ALL)
     }
 
-    fn joint(&mut self, index: usize) -> &mut JointSense {
+    pub(crate) fn joint(&mut self, index: usize) -> &mut JointSense {
         self.senses.joints[index].as_mut().expect("heard")
     }
 
-    fn touch(&mut self, feet: [bool; 2]) {
+    pub(crate) fn touch(&mut self, feet: [bool; 2]) {
         self.senses.feet = feet.map(|touches| Some(FootSwitches(if touches { 0x0F } else { 0 })));
     }
 
     /// Cycles; what is told in them.
-    fn run(&mut self, cycles: u32) -> Vec<Act> {
+    pub(crate) fn run(&mut self, cycles: u32) -> Vec<Act> {
         let mut told = Vec::new();
-        let mut events = Events::new();
         for _ in 0..cycles {
-            self.behaving
-                .observe(&self.senses, &self.setpoints, 0, &mut events);
-            while let Some((_, event)) = events.pop() {
-                match event {
-                    Event::Behaviour(act) => told.push(act),
-                    other => panic!("{other:?}"),
-                }
-            }
+            told.extend(self.observe());
             self.lead(self.speed(), true);
         }
         self.told.extend(&told);
         told
     }
 
-    fn acts(&self) -> &Acts {
+    /// The behaviours' part of a cycle; what is told in it.
+    pub(crate) fn observe(&mut self) -> Vec<Act> {
+        let mut events = Events::new();
+        self.behaving
+            .observe(&self.senses, &self.setpoints, 0, &mut events);
+        std::iter::from_fn(|| events.pop())
+            .map(|(_, event)| match event {
+                Event::Behaviour(act) => act,
+                other => panic!("{other:?}"),
+            })
+            .collect()
+    }
+
+    pub(crate) fn acts(&self) -> &Acts {
         self.behaving.acts()
     }
 
@@ -91,7 +105,7 @@ impl Robot {
     }
 
     /// Leads the wheels for a cycle at a speed, mm/s; gives the speed that they are led at.
-    fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
+    pub(crate) fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
         if fresh {
             self.travel_mm += 0.01 * mm_s;
         }
@@ -105,14 +119,14 @@ impl Robot {
         self.behaving.lead(travel, true, fresh)
     }
 
-    fn reference(&self, joint: usize, mm_asked: f64) -> f64 {
+    pub(crate) fn reference(&self, joint: usize, mm_asked: f64) -> f64 {
         let asked = JointSetpoint {
             reference_mm: mm(mm_asked),
             ..JointSetpoint::default()
         };
         let plan = self.setpoints.walk.expect("walks");
         self.behaving
-            .apply(joint, asked, &plan)
+            .apply(joint, asked, Some(&plan))
             .reference_mm
             .to_f64()
     }
@@ -127,6 +141,8 @@ fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
         assert_eq!(robot.run(49), []);
         assert_eq!(robot.reference(B5, 60.0), 60.0);
         assert_eq!(robot.run(1), [Act::Overload { node: 2 }]);
+        let told = [false, true, false, false, false, false];
+        assert_eq!(robot.acts().overload, told, "layer 1 knows");
         assert_eq!(robot.reference(B5, 60.0), back);
         assert_eq!(robot.run(200), [], "told once");
         // Another phase of the leg, another try.
@@ -134,7 +150,13 @@ fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
             legs: [LegPlan::Lift, LegPlan::Stance],
             driven: true,
         });
-        robot.run(1);
+        // It gets free by 3 mm in a cycle.
+        for cycle in 1..=11 {
+            robot.run(1);
+            let free = back + if back > 60.0 { -3.0 } else { 3.0 } * f64::from(cycle);
+            assert_eq!(robot.reference(B5, 60.0), f64::max(60.0, free));
+        }
+        robot.run(4);
         assert_eq!(robot.reference(B5, 60.0), 60.0);
     }
     // 5 mm in the half second are motion, 4.9 mm are none.
@@ -220,6 +242,11 @@ fn b3_a_foot_stops_where_its_switches_close() {
     robot.joint(B6).stroke_mm = mm(121.0);
     robot.touch([true; 2]);
     assert_eq!(robot.run(1), []);
+    // It presses at once, and stands when it is felt in two cycles in a row.
+    assert_eq!(robot.reference(B6, 0.0), 125.0);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting);
+    robot.joint(B6).stroke_mm = mm(122.0);
+    assert_eq!(robot.run(1), []);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(121.0)));
     assert_eq!(robot.behaving.tally().of(Behaviour::Touchdown), 1);
     // 20 mm beside where it was expected (130 mm) is told, less is not.
@@ -231,8 +258,23 @@ fn b3_a_foot_stops_where_its_switches_close() {
     ] {
         let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
         robot.joint(B6).stroke_mm = mm(at);
-        assert_eq!(robot.run(1), told, "{at}");
+        assert_eq!(robot.run(2), told, "{at}");
     }
+    // A touch of one cycle is a graze: the foot goes on down.
+    let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
+    robot.joint(B6).stroke_mm = mm(125.0);
+    robot.run(1);
+    robot.touch([false, true]);
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting);
+    robot.joint(B6).stroke_mm = mm(129.0);
+    robot.run(1);
+    assert_eq!(robot.reference(B6, 0.0), 131.0);
+    robot.touch([true; 2]);
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Waiting, "felt anew");
+    robot.run(1);
+    assert_eq!(robot.acts().landing[0], Landing::Down(mm(129.0)));
     // Without it the foot goes down on what was expected, and 4 mm more.
     let mut robot = Robot::new(
         [LegPlan::Lower(from), LegPlan::Stance],
@@ -257,14 +299,14 @@ fn b3_nails_do_not_end_the_way_down_before_the_ground_that_is_expected() {
         (129.9, false, true),
     ] {
         let mut robot = Robot::all([LegPlan::Lower(mm(120.0)), LegPlan::Stance]);
-        robot.behaving = Behaving::new(Behaviours::ALL, nailed);
+        robot.behaving = Behaving::new(Behaviours::ALL, geometry(nailed));
         robot.joint(B6).stroke_mm = mm(at);
-        robot.run(1);
+        robot.run(2);
         let landed = robot.acts().landing[0] != Landing::Waiting;
         assert_eq!(landed, lands, "{at} {nailed}");
     }
     let mut robot = Robot::all([LegPlan::Reach, LegPlan::Stance]);
-    robot.behaving = Behaving::new(Behaviours::ALL, true);
+    robot.behaving = Behaving::new(Behaviours::ALL, geometry(true));
     robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
     assert_eq!(robot.run(60), [], "tips scratch the ground");
 }
@@ -342,7 +384,7 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
     assert_eq!(robot.run(25 + 9), []);
     assert_eq!(robot.reference(B5, 150.0), 150.0);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
-    assert!(robot.acts().bump[0]);
+    assert_eq!(robot.acts().bumps, [1, 0]);
     assert_eq!(robot.reference(B5, 150.0), 85.0, "15 mm back");
     assert_eq!(robot.run(24), []);
     assert_eq!(robot.reference(B5, 150.0), 85.0);
@@ -358,11 +400,41 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
         robot.touch([true; 2]);
         assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
     }
-    // A foot that leaves the ground touches it still.
+    // A foot that leaves the ground touches it still: b5 waits there, over the ground, and the wheels
+    // slow down.
     let mut robot = Robot::all(reach);
+    robot.setpoints.joints[B5] = Some(JointSetpoint {
+        reference_mm: mm(150.0),
+        ..JointSetpoint::default()
+    });
     robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(100);
-    assert_eq!(robot.run(25), []);
+    robot.run(1);
+    assert_eq!(robot.reference(B5, 150.0), 100.0);
+    for wheel in &mut robot.senses.wheels {
+        wheel.travel_um += 4_000;
+    }
+    assert_eq!(robot.run(9), []);
+    assert_eq!(robot.reference(B5, 150.0), 96.0);
+    assert!(robot.acts().pace < 1);
+    robot.touch([false, true]);
+    assert_eq!(robot.run(1), []);
+    assert_eq!(
+        robot.reference(B5, 150.0),
+        150.0,
+        "and goes on when it is free"
+    );
+    // One that goes on to touch has met something.
+    robot.touch([true; 2]);
+    assert_eq!(robot.run(10), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
+    assert_eq!(robot.reference(B5, 150.0), 85.0);
+    for wheel in &mut robot.senses.wheels {
+        wheel.travel_um += 10_000;
+    }
+    robot.run(1);
+    assert_eq!(robot.reference(B5, 150.0), 75.0, "15 mm over the ground");
+    assert_eq!(robot.run(24), []);
+    assert_eq!(robot.run(1), [Act::Bump(Side::Left)], "as soon as it may");
 }
 
 #[test]
@@ -397,6 +469,10 @@ fn b6_a_foot_follows_lost_ground_by_20_mm_at_half_the_speed() {
 fn slipping(slip: f64, cycles: u32, enabled: Behaviours) -> Robot {
     let mut robot = Robot::new(STAND, enabled);
     let (mut wheels, mut stroke) = (0.0, 170.0);
+    for joint in [YAW, 3] {
+        // Straight ahead.
+        robot.joint(joint).stroke_mm = mm(90.0);
+    }
     for _ in 0..cycles {
         wheels += 1.0;
         stroke -= 1.0 - slip;
@@ -438,11 +514,13 @@ fn b7_wheels_that_slip_slow_down_and_the_legs_pull() {
 fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
     let mut robot = Robot::all(STAND);
     robot.run(300);
-    assert!(!robot.acts().stuck);
+    assert_eq!(robot.acts().stuck, 0);
     robot.run(1);
-    assert!(robot.acts().stuck);
+    assert_eq!(robot.acts().stuck, 1);
+    robot.run(300);
+    assert_eq!(robot.acts().stuck, 1, "as patient as before");
     robot.run(1);
-    assert!(!robot.acts().stuck, "for a cycle");
+    assert_eq!(robot.acts().stuck, 2);
     // A leg that moves by 5 mm with wheels that turn by 10 mm gets on.
     for (leg_mm, wheels_um, stuck) in [
         (5.1, 10_000, false),
@@ -458,7 +536,7 @@ fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
         let mut found = false;
         for _ in 0..160 {
             robot.run(1);
-            found |= robot.acts().stuck;
+            found |= robot.acts().stuck > 0;
         }
         assert_eq!(found, stuck, "{leg_mm} {wheels_um}");
     }
@@ -471,20 +549,20 @@ fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
             robot.senses.wheels[0].travel_um += way_um;
             robot.senses.wheels[0].effort_percent = effort;
             robot.run(1);
-            found |= robot.acts().stuck;
+            found |= robot.acts().stuck > 0;
         }
         assert_eq!(found, stuck, "{effort} {way_um}");
     }
 }
 
 #[test]
-fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
+fn b9_three_swings_in_a_row_that_run_against_something_are_stuck_and_then_two() {
     let mut robot = Robot::all(STAND);
-    let mut swing = |bumps: bool| {
-        let mut stuck = false;
+    let mut swing = |bumps: bool, way_um: i64| {
+        let before = robot.acts().stuck;
         for (leg, cycles) in [
             (LegPlan::Reach, 40),
-            (LegPlan::Lower(mm(99.0)), 1),
+            (LegPlan::Lower(mm(99.0)), 2),
             (LegPlan::Stance, 1),
         ] {
             robot.setpoints.walk = Some(WalkPlan {
@@ -496,24 +574,26 @@ fn b9_six_swings_in_a_row_that_run_against_something_are_stuck() {
             robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(if bumps { 0 } else { 100 });
             // Wheels and legs go on as if nothing were.
             for wheel in &mut robot.senses.wheels {
-                wheel.travel_um += 20_000;
+                wheel.travel_um += way_um;
             }
             let stroke = robot.joint(4).stroke_mm.to_f64();
             robot.joint(4).stroke_mm = mm(if stroke > 100.0 { 90.0 } else { 110.0 });
             for _ in 0..cycles {
                 robot.run(1);
-                stuck |= robot.acts().stuck;
             }
         }
-        stuck
+        robot.acts().stuck != before
     };
-    let mut swings = |all: &[bool]| all.iter().map(|bumps| swing(*bumps)).collect::<Vec<_>>();
-    assert_eq!(
-        swings(&[true; 6]),
-        [false, false, false, false, false, true]
-    );
-    assert_eq!(swings(&[true; 5]), [false; 5]);
-    assert_eq!(swings(&[false, true, true]), [false; 3]);
+    let mut swings = |all: &[bool], way_um| {
+        let each = all.iter().map(|bumps| swing(*bumps, way_um));
+        each.collect::<Vec<_>>()
+    };
+    assert_eq!(swings(&[true; 3], 20_000), [false, false, true]);
+    // Again before it has come half a metre farther.
+    assert_eq!(swings(&[true; 2], 20_000), [false, true]);
+    assert_eq!(swings(&[true, false, true], 20_000), [false; 3]);
+    assert_eq!(swings(&[false; 9], 20_000), [false; 9]);
+    assert_eq!(swings(&[true; 3], 20_000), [false, false, true]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use wheeleg_master::event::{Event, Events};
 use wheeleg_master::layer0::behaviours::{Behaving, JointSense, Senses, WheelSense};
 use wheeleg_master::layer1::walk::{Walk, WalkGeometry, WalkOrder, WalkPattern};
 use wheeleg_master::mirror;
-use wheeleg_master::setpoint::{Cylinder, Feedback, Phase, Setpoints};
+use wheeleg_master::setpoint::{Cylinder, Feedback, LegPlan, Phase, Setpoints};
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Speed of a piston, mm per cycle.
@@ -29,6 +29,8 @@ struct Robot {
     segment: u16,
     now_us: u64,
     last: Setpoints,
+    /// How often it was told that it is stuck, beside what the behaviours find.
+    stuck: u8,
 }
 
 fn order(speed_mm_s: i16, turn_rad_s: &str) -> WalkOrder {
@@ -47,7 +49,7 @@ impl Robot {
         let walk = Walk::new(WalkGeometry::default(), order, &feedback, 7);
         Self {
             walk: walk.expect("in range").expect("all heard"),
-            behaving: Behaving::new(Behaviours::ALL, false),
+            behaving: Behaving::new(Behaviours::ALL, WalkGeometry::default()),
             told: Vec::new(),
             speeds: [0.0; 6],
             strokes,
@@ -57,6 +59,7 @@ impl Robot {
             segment: 7,
             now_us: 0,
             last: Setpoints::idle(0),
+            stuck: 0,
         }
     }
 
@@ -80,6 +83,7 @@ impl Robot {
         self.behaving
             .observe(&senses, &self.last, self.now_us, &mut events);
         feedback.acts = *self.behaving.acts();
+        feedback.acts.stuck += self.stuck;
         let mut out = self.walk.setpoints(self.now_us, &feedback);
         self.told = self.walk.take_acts().collect();
         while let Some((_, event)) = events.pop() {
@@ -91,9 +95,7 @@ impl Robot {
         let before = self.strokes;
         for (joint, slot) in out.joints.iter_mut().enumerate() {
             let wanted = slot.as_mut().expect("every joint is led");
-            if let Some(plan) = &out.walk {
-                *wanted = self.behaving.apply(joint, *wanted, plan);
-            }
+            *wanted = self.behaving.apply(joint, *wanted, out.walk.as_ref());
             let to = wanted.reference_mm.to_f64();
             self.strokes[joint] += (to - self.strokes[joint]).clamp(-PISTON_MM, PISTON_MM);
             self.speeds[joint] = 100.0 * (self.strokes[joint] - before[joint]);
@@ -172,7 +174,7 @@ fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
                     .unwrap()
                     .reference_mm;
                 // A rise is asked for in one step.
-                if wanted.to_f64() < before[side.index()] - 15.0 {
+                if wanted.to_f64() < before[side.index()] - 12.5 {
                     rises[side.index()] += 1;
                     // The tenth cycle is this one.
                     assert!(loaded[side.other().index()] >= 9, "{side:?} {loaded:?}");
@@ -208,7 +210,11 @@ fn standing_feet_stay_where_they_are_on_the_ground() {
                 robot.wheels_mm,
                 [Side::Left, Side::Right].map(|s| robot.foot_m(s)),
             );
-            let stood = [Side::Left, Side::Right].map(|s| robot.touches(s));
+            // A foot stands from its second cycle on the ground on.
+            let stood = [Side::Left, Side::Right].map(|side| {
+                let plan = robot.last.walk.expect("it walks").leg(side);
+                robot.touches(side) && !matches!(plan, LegPlan::Lower(_))
+            });
             robot.cycle();
             // What the wheels have moved, as the robot turns about the middle of its axle.
             let [left, right] = [0, 1].map(|i| 1e-3 * (robot.wheels_mm[i] - before.0[i]));
@@ -371,4 +377,40 @@ fn what_is_out_of_range_is_refused() {
     deaf.strokes_mm[4] = None;
     let walk = Walk::new(WalkGeometry::default(), WalkOrder::default(), &deaf, 1);
     assert!(walk.expect("in range").is_none());
+}
+
+#[test]
+fn a_robot_that_is_stuck_backs_off_the_way_that_it_came() {
+    for (speed, turn, way_mm) in [
+        (100, "0", [-12.5, -12.5]),
+        (-100, "0", [12.5, 12.5]),
+        (0, "0.08", [12.5, -12.5]),
+        (0, "-0.08", [-12.5, 12.5]),
+        // The outer wheel is the faster one: 60 ± 20 mm/s.
+        (60, "0.0714", [-6.25, -12.5]),
+    ] {
+        let mut robot = Robot::new(order(speed, turn));
+        robot.run(4.0);
+        // In the middle of a stance, so that the feet have room.
+        for _ in 0..300 {
+            robot.cycle();
+            let plan = robot.last.walk.expect("it walks");
+            if plan.legs == [LegPlan::Stance; 2] {
+                break;
+            }
+        }
+        robot.run(0.5);
+        robot.stuck = 1;
+        robot.cycle();
+        assert!(robot.told.contains(&Act::BackOff), "{speed} {turn}");
+        // It has to slow down first.
+        robot.run(0.35);
+        let before = robot.wheels_mm;
+        robot.run(0.25);
+        let way = [0, 1].map(|i| robot.wheels_mm[i] - before[i]);
+        for (way, wanted) in way.into_iter().zip(way_mm) {
+            let share = way / wanted;
+            assert!((0.3..1.05).contains(&share), "{speed} {turn}: {way:.2}");
+        }
+    }
 }

@@ -139,6 +139,7 @@ pub(super) const fn master_board(event: &MasterEvent) -> Option<u8> {
             | HoldReason::NodeDisarmed(node) => Some(node),
             HoldReason::SupplyLost
             | HoldReason::LayerOneStalled
+            | HoldReason::LayerOneGone
             | HoldReason::OperatorLost
             | HoldReason::EmergencyStop => None,
         },
@@ -172,6 +173,7 @@ pub const fn hold_name(reason: &HoldReason) -> &'static str {
         HoldReason::NodeDisarmed(_) => "board_disarmed",
         HoldReason::SupplyLost => "supply_lost",
         HoldReason::LayerOneStalled => "layer_one_stalled",
+        HoldReason::LayerOneGone => "layer_one_gone",
         HoldReason::OperatorLost => "operator_lost",
         HoldReason::EmergencyStop => "emergency_stop",
     }

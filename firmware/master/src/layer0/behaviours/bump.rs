@@ -6,19 +6,21 @@ use super::Senses;
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::contact::Side;
 use crate::layer1::params::in_stroke;
+use crate::layer1::units::um_to_mm;
 use crate::setpoint::{Cylinder, LegPlan};
 
 /// A reach whose cylinders are slower than this …
 const STALLED_MM_S: VelocityMmS = VelocityMmS::from_int(10);
 /// … for so many cycles (100 ms), …
 const STALLED: u16 = 10;
-/// … from so many after its begin on (250 ms), or with a switch closed from the begin on, has run
-/// against something; so has a foot that touches later. A joint's board takes a longer push without
-/// motion for a fault of the axis.
+/// … from so many after its begin on (250 ms), has run against something; so has a foot that touches
+/// then, or for more than [`STALLED`] cycles before. b5 waits where the foot touches: a joint's board
+/// takes a longer push without motion for a fault of the axis.
 const STARTED: u16 = 25;
-/// The foot goes back by so much …
+/// The foot goes back by so much over the ground …
 const BACK_MM: PositionMm = PositionMm::from_int(15);
-/// … for so many cycles (250 ms), in which it is lifted.
+/// … for so many cycles (250 ms), in which it is lifted and the wheels slow down: they would push it
+/// against what it has met.
 const BACK: u16 = 25;
 
 /// The reach of a foot.
@@ -26,9 +28,22 @@ const BACK: u16 = 25;
 pub(super) struct Bump {
     cycles: u16,
     stalled: u16,
+    touched: u16,
     met: bool,
-    /// Where b5 goes back to, and for how many cycles more.
-    back: Option<(PositionMm, u16)>,
+    place: Option<Place>,
+    /// Cycles for which it goes on to go back there.
+    back: u16,
+}
+
+/// Where b5 waits, or goes back to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Place {
+    /// Its stroke, if the robot stands.
+    stroke_mm: PositionMm,
+    /// What the wheel of this side has gone since, µm.
+    way_um: i64,
+    /// Travel of that wheel then, µm.
+    travel_um: i64,
 }
 
 impl Bump {
@@ -37,12 +52,16 @@ impl Bump {
         self.met
     }
 
-    /// Reference of b5 while the foot goes back.
-    pub(super) fn back_mm(&self) -> Option<PositionMm> {
-        self.back.map(|(stroke, _)| stroke)
+    /// Reference of b5 while the foot waits, or goes back.
+    pub(super) fn place_mm(&self) -> Option<PositionMm> {
+        let place = self.place?;
+        Some(in_stroke(
+            place.stroke_mm.saturating_sub(um_to_mm(place.way_um)),
+        ))
     }
 
-    /// One cycle; `wanted_mm` is the reference of b5, `nailed` a foot with nails. Whether the foot has run against something.
+    /// One cycle; `wanted_mm` is the reference of b5, `nailed` a foot with nails. Whether the foot has
+    /// run against something.
     pub(super) fn update(
         &mut self,
         plan: LegPlan,
@@ -57,10 +76,8 @@ impl Bump {
             return false;
         }
         self.met = false;
-        self.back = self.back.and_then(|(stroke, left)| {
-            let left = left.checked_sub(1)?;
-            (left > 0).then_some((stroke, left))
-        });
+        let wheel = senses.wheels.get(side.index());
+        let travel_um = wheel.map_or(0, |wheel| wheel.travel_um);
         self.cycles = self.cycles.saturating_add(1);
         let slow = [Cylinder::Yaw, Cylinder::Horizontal]
             .into_iter()
@@ -71,23 +88,41 @@ impl Bump {
         let started = self.cycles > STARTED;
         // Tips of nails may still scratch the ground.
         let touches = !nailed && senses.touches(side).unwrap_or(false);
-        let pushes = touches && self.back.is_none();
-        self.stalled = if (started || pushes) && slow {
+        let b5 = senses.joint(side, Cylinder::Horizontal).unwrap_or_default();
+        let at = |stroke_mm| Place {
+            stroke_mm,
+            way_um: 0,
+            travel_um,
+        };
+        if self.back > 0 {
+            self.back = self.back.saturating_sub(1);
+            self.place = self.place.filter(|_| self.back > 0);
+        } else if touches {
+            self.touched = self.touched.saturating_add(1);
+            self.place.get_or_insert(at(b5.stroke_mm));
+        } else {
+            self.touched = 0;
+            self.place = None;
+        }
+        if let Some(place) = &mut self.place {
+            place.way_um = travel_um.saturating_sub(place.travel_um);
+        }
+        self.stalled = if started && slow {
             self.stalled.saturating_add(1)
         } else {
             0
         };
-        self.met = self.stalled >= STALLED || started && touches;
+        self.met = self.stalled >= STALLED || self.touched > STALLED || started && touches;
         if self.met {
             self.stalled = 0;
+            self.touched = 0;
             self.cycles = 0;
-            let b5 = senses.joint(side, Cylinder::Horizontal).unwrap_or_default();
-            let back = if wanted_mm > b5.stroke_mm {
+            self.back = BACK;
+            self.place = Some(at(if wanted_mm > b5.stroke_mm {
                 b5.stroke_mm.saturating_sub(BACK_MM)
             } else {
                 b5.stroke_mm.saturating_add(BACK_MM)
-            };
-            self.back = Some((in_stroke(back), BACK));
+            }));
         }
         self.met
     }

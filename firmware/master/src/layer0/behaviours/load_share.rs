@@ -6,7 +6,7 @@
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
 
-use super::{SIDES, Senses};
+use super::{SIDES, Senses, eased};
 use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, WHEELS, WalkPlan};
 
@@ -14,7 +14,7 @@ use crate::setpoint::{Cylinder, LegPlan, WHEELS, WalkPlan};
 const ALIKE: I16F16 = I16F16::lit("0.2");
 /// Effort counts over so many cycles, as a power of two (0.32 s).
 const SMOOTH: u32 = 5;
-/// A leg gives way by so much in a cycle (30 mm/s for both), up to so much.
+/// A leg gives way, or back, by so much in a cycle (30 mm/s for both), up to so much.
 const STEP_MM: PositionMm = PositionMm::from_raw(9_830);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(10);
 
@@ -22,18 +22,24 @@ const FARTHEST_MM: PositionMm = PositionMm::from_int(10);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct LoadShare {
     effort: [I16F16; WHEELS],
-    /// What the left leg stands longer, and the right one shorter.
-    longer_mm: PositionMm,
+    /// What each leg stands longer.
+    longer_mm: [PositionMm; WHEELS],
     shares: bool,
 }
 
 impl LoadShare {
     /// What legs stand longer.
-    pub(super) fn longer_mm(&self) -> [PositionMm; WHEELS] {
-        [
-            self.longer_mm,
-            PositionMm::ZERO.saturating_sub(self.longer_mm),
-        ]
+    pub(super) const fn longer_mm(&self) -> [PositionMm; WHEELS] {
+        self.longer_mm
+    }
+
+    /// Nothing is shared any more: forgets all but what the legs stand longer, which goes as slowly
+    /// as it came.
+    pub(super) fn rest(&mut self) {
+        *self = Self {
+            longer_mm: self.longer_mm.map(|longer| eased(longer, STEP_MM)),
+            ..Self::default()
+        };
     }
 
     pub(super) fn update(
@@ -44,7 +50,13 @@ impl LoadShare {
     ) -> Option<Act> {
         let stand = plan.legs == [LegPlan::Stance; WHEELS];
         if !stand || !enabled.contains(Behaviour::LoadShare) {
-            *self = Self::default();
+            self.rest();
+            for (side, longer) in SIDES.into_iter().zip(&mut self.longer_mm) {
+                if matches!(plan.leg(side), LegPlan::Lower(_)) {
+                    // It stands anew where it touches.
+                    *longer = PositionMm::ZERO;
+                }
+            }
             return None;
         }
         for (side, effort) in SIDES.into_iter().zip(&mut self.effort) {
@@ -57,13 +69,16 @@ impl LoadShare {
         let more = left.saturating_sub(right);
         let shares = more.saturating_abs() > ALIKE;
         if shares {
-            let longer = if more > I16F16::ZERO {
-                self.longer_mm.saturating_sub(STEP_MM)
+            let shorter = PositionMm::ZERO.saturating_sub(STEP_MM);
+            let steps = if more > I16F16::ZERO {
+                [shorter, STEP_MM]
             } else {
-                self.longer_mm.saturating_add(STEP_MM)
+                [STEP_MM, shorter]
             };
             let least = PositionMm::ZERO.saturating_sub(FARTHEST_MM);
-            self.longer_mm = longer.limit(least, FARTHEST_MM);
+            for (longer, step) in self.longer_mm.iter_mut().zip(steps) {
+                *longer = longer.saturating_add(step).limit(least, FARTHEST_MM);
+            }
         }
         let begins = shares && !self.shares;
         self.shares = shares;

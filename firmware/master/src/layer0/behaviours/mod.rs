@@ -17,6 +17,7 @@
 
 mod bump;
 mod contact;
+mod ground;
 mod load_share;
 mod orphan;
 mod overload;
@@ -24,7 +25,6 @@ mod pace;
 mod slip;
 mod stuck;
 mod touchdown;
-mod ways;
 
 use fixed::types::I16F16;
 use wheeleg_protocol::{Limit, SlotReply};
@@ -34,14 +34,15 @@ use crate::behaviour::{Act, Behaviour, Behaviours, Tally};
 use crate::contact::{FootSwitches, Side};
 use crate::event::{Event, Events};
 use crate::layer1::params::in_stroke;
+use crate::layer1::walk::WalkGeometry;
 use crate::setpoint::{
-    APPROACH_MM, Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, Setpoints,
-    TravelSetpoint, WHEELS, WalkPlan,
+    Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, Phase, Setpoints, TravelSetpoint,
+    WHEELS, WalkPlan,
 };
 use bump::Bump;
 use contact::Contact;
 use load_share::LoadShare;
-pub(super) use orphan::Orphan;
+pub(super) use orphan::{CARRIED, Orphan};
 use overload::Overload;
 use pace::Pace;
 use slip::Slip;
@@ -121,8 +122,7 @@ impl Senses {
 #[derive(Clone, Copy, Debug)]
 pub struct Behaving {
     enabled: Behaviours,
-    /// Feet have nails, which touch before the sole does.
-    nailed: bool,
+    geometry: WalkGeometry,
     tally: Tally,
     overload: Overload,
     contact: Contact,
@@ -139,12 +139,12 @@ pub struct Behaving {
 const SIDES: [Side; WHEELS] = [Side::Left, Side::Right];
 
 impl Behaving {
-    /// At rest; those of the set may act. `nailed`: nails of the feet touch before the soles do.
+    /// At rest; those of the set may act.
     #[must_use]
-    pub fn new(enabled: Behaviours, nailed: bool) -> Self {
+    pub fn new(enabled: Behaviours, geometry: WalkGeometry) -> Self {
         Self {
             enabled,
-            nailed,
+            geometry,
             tally: Tally::default(),
             overload: Overload::default(),
             contact: Contact::default(),
@@ -161,20 +161,18 @@ impl Behaving {
         }
     }
 
-    /// Changes the set of those that may act; what they remember of this walk is forgotten.
+    /// Changes the set of those that may act. What one that may no longer has made of a reference
+    /// goes as slowly as it came, or with the stance.
     pub fn enable(&mut self, enabled: Behaviours) {
-        *self = Self {
-            tally: self.tally,
-            pace: self.pace,
-            ..Self::new(enabled, self.nailed)
-        };
+        self.enabled = enabled;
+        self.acts.enabled = enabled;
     }
 
     /// Forgets everything but the counts and the set.
     pub fn reset(&mut self) {
         *self = Self {
             tally: self.tally,
-            ..Self::new(self.enabled, self.nailed)
+            ..Self::new(self.enabled, self.geometry)
         };
     }
 
@@ -200,7 +198,7 @@ impl Behaving {
         events: &mut Events,
     ) {
         let Some(plan) = setpoints.walk else {
-            self.rest();
+            self.rest(setpoints.phase);
             return;
         };
         let enabled = self.enabled;
@@ -220,97 +218,137 @@ impl Behaving {
         {
             tell(act);
         }
-        if let Some(act) = self.slip.update(senses, &plan, enabled) {
+        if let Some(act) = self.slip.update(senses, &plan, &self.geometry, enabled) {
             tell(act);
         }
         if let Some(act) = self.load_share.update(senses, &plan, enabled) {
             tell(act);
         }
+        let nailed = self.geometry.nail_m > 0.0;
         let mut landed = [false; WHEELS];
+        let mut expected = 0_u8;
         for side in SIDES {
             let leg = plan.leg(side);
             if let Some(touchdown) = self.touchdown.get_mut(side.index()) {
                 let b6 = senses.joint(side, Cylinder::Vertical).unwrap_or_default();
                 let touches = senses.touches(side).unwrap_or(false);
-                let early = self.nailed && nails_first(leg, &b6);
-                let act = touchdown.update(side, leg, &b6, touches && !early, enabled);
+                let stood = matches!(touchdown.landing(), Landing::Down(_));
+                let act = touchdown.update(side, leg, &b6, touches, nailed, enabled);
+                let lands = !stood && matches!(touchdown.landing(), Landing::Down(_));
                 if let Some(landed) = landed.get_mut(side.index()) {
-                    *landed = matches!(touchdown.landing(), Landing::Down(_));
+                    *landed = lands;
                 }
-                if let Some(act) = act {
-                    tell(act);
+                match act {
+                    Some(act) => tell(act),
+                    // Where the ground was expected it is counted, and nothing told.
+                    None if lands => expected = expected.saturating_add(1),
+                    None => {}
                 }
             }
             let b5 = setpoints.joints.get(side.joint(Cylinder::Horizontal));
             let b5 = b5.copied().flatten().unwrap_or_default();
             let wanted_mm = b5.reference_mm;
             if let Some(bump) = self.bump.get_mut(side.index())
-                && bump.update(leg, senses, side, wanted_mm, self.nailed, enabled)
+                && bump.update(leg, senses, side, wanted_mm, nailed, enabled)
             {
                 tell(Act::Bump(side));
+                if let Some(bumps) = self.acts.bumps.get_mut(side.index()) {
+                    *bumps = bumps.wrapping_add(1);
+                }
             }
         }
         if enabled.contains(Behaviour::Touchdown) {
-            // Told as a touchdown of the foot already.
-            for _ in landed.into_iter().filter(|one| *one) {
+            for _ in 0..expected {
                 self.tally.count(Behaviour::Touchdown);
             }
         }
         let bumps = self.bump.map(|one| one.met());
-        let stuck = self.stuck.update(senses, &plan, setpoints, bumps, enabled);
-        self.pace.wish(self.contact.pace().min(self.slip.pace()));
+        let stuck = self
+            .stuck
+            .update(senses, &plan, setpoints, landed, bumps, enabled);
+        let waits = self.bump.iter().any(|one| one.place_mm().is_some());
+        let bump = if waits { I16F16::ZERO } else { I16F16::ONE };
+        let pace = self.contact.pace().min(self.slip.pace()).min(bump);
+        self.pace.wish(pace);
         self.acts = Acts {
             enabled,
             landing: self.touchdown.map(|one| one.landing()),
             lost: self.contact.lost(),
             deep: self.contact.deep(),
             beyond_mm: self.contact.followed_mm(),
-            bump: bumps,
-            stuck,
+            overload: self.overload.holds(),
+            bumps: self.acts.bumps,
+            stuck: self.acts.stuck.wrapping_add(u8::from(stuck)),
             pace: self.pace.share(),
         };
     }
 
-    /// No walk: nothing is remembered, and what the wheels were held back stays.
-    fn rest(&mut self) {
-        self.enable(self.enabled);
+    /// No walk. What a behaviour has made of references goes slowly where the robot stands in the
+    /// last ones; where these end, at once. What the wheels were held back stays.
+    fn rest(&mut self, phase: Phase) {
+        let (mut slip, mut load_share, mut overload) = (self.slip, self.load_share, self.overload);
+        if matches!(phase, Phase::Idle | Phase::Hold) {
+            (slip, load_share, overload) = Default::default();
+        }
+        slip.rest();
+        load_share.rest();
+        overload.rest();
+        *self = Self {
+            tally: self.tally,
+            pace: self.pace,
+            slip,
+            load_share,
+            overload,
+            acts: Acts {
+                enabled: self.enabled,
+                bumps: self.acts.bumps,
+                stuck: self.acts.stuck,
+                ..Acts::default()
+            },
+            ..Self::new(self.enabled, self.geometry)
+        };
         self.pace.wish(I16F16::ONE);
     }
 
-    /// The set-point of joint index 0..6 of a walk after what the behaviours make of it.
+    /// The set-point of joint index 0..6 after what the behaviours make of it, with what the walk is
+    /// about; where none is under way, what is left of them.
     #[must_use]
-    pub fn apply(&self, joint: usize, setpoint: JointSetpoint, plan: &WalkPlan) -> JointSetpoint {
+    pub fn apply(
+        &self,
+        joint: usize,
+        setpoint: JointSetpoint,
+        plan: Option<&WalkPlan>,
+    ) -> JointSetpoint {
         let mut out = setpoint;
         for side in SIDES {
-            let stands = plan.leg(side) == LegPlan::Stance;
+            let leg = plan.map(|plan| plan.leg(side));
+            let stands = leg == Some(LegPlan::Stance);
             let add = |mm: PositionMm, more| in_stroke(mm.saturating_add(more));
-            if joint == side.joint(Cylinder::Horizontal) && stands {
+            if joint == side.joint(Cylinder::Horizontal) {
                 let lead = PositionMm::ZERO.saturating_sub(self.slip.lead_mm(side));
                 out.reference_mm = add(out.reference_mm, lead);
             }
             let bump = self.bump.get(side.index());
-            if let Some(back) = bump.and_then(Bump::back_mm)
+            if let Some(place) = bump.and_then(Bump::place_mm)
                 && joint == side.joint(Cylinder::Horizontal)
-                && plan.leg(side) == LegPlan::Reach
+                && leg == Some(LegPlan::Reach)
             {
-                out.reference_mm = back;
+                out.reference_mm = place;
                 out.velocity_mm_s = VelocityMmS::ZERO;
             }
             if joint != side.joint(Cylinder::Vertical) {
                 continue;
             }
-            if stands {
-                let of = |all: [PositionMm; WHEELS]| all.get(side.index()).copied();
-                let beyond = of(self.contact.followed_mm()).unwrap_or_default();
-                let longer = of(self.load_share.longer_mm()).unwrap_or_default();
-                let more = beyond.saturating_add(longer);
-                out.reference_mm = add(out.reference_mm, more);
-                if let Some(ahead) = &mut out.ahead {
-                    ahead.reference_mm = add(ahead.reference_mm, more);
-                }
+            let of = |all: [PositionMm; WHEELS]| all.get(side.index()).copied();
+            let beyond = of(self.contact.followed_mm()).filter(|_| stands);
+            let longer = of(self.load_share.longer_mm()).unwrap_or_default();
+            let more = beyond.unwrap_or_default().saturating_add(longer);
+            out.reference_mm = add(out.reference_mm, more);
+            if let Some(ahead) = &mut out.ahead {
+                ahead.reference_mm = add(ahead.reference_mm, more);
             }
-            if let (LegPlan::Lower(from_mm), Some(touchdown)) =
-                (plan.leg(side), self.touchdown.get(side.index()))
+            if let (Some(LegPlan::Lower(from_mm)), Some(touchdown)) =
+                (leg, self.touchdown.get(side.index()))
             {
                 out.reference_mm = touchdown.reference(from_mm, self.enabled);
             }
@@ -330,7 +368,7 @@ impl Behaving {
     }
 }
 
-/// Whether a foot with nails is not yet where ground was: what touches are the nails.
-fn nails_first(plan: LegPlan, b6: &JointSense) -> bool {
-    matches!(plan, LegPlan::Lower(from) if b6.stroke_mm < from.saturating_add(APPROACH_MM))
+/// What is left of something that is to go by `step` in a cycle.
+fn eased(mm: PositionMm, step: PositionMm) -> PositionMm {
+    mm.saturating_sub(mm.limit(PositionMm::ZERO.saturating_sub(step), step))
 }

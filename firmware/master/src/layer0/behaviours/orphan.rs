@@ -1,18 +1,24 @@
 //! A walk whose layer 1 stands still: what layer 0 makes of the last references.
 //!
-//! Standing feet go with the ground until the wheels stand; a foot in the air is set down where it
-//! is. Then the robot stands, and its behaviours go on.
+//! Standing feet go with the ground until the wheels stand. When layer 1 is given up, a foot in the
+//! air is set down where it is; then the robot stands, and its behaviours go on for a while
+//! ([`CARRIED`]).
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use super::ways::{Ways, at_foot_um};
+use super::ground::{Ways, foot_m, moved};
 use super::{SIDES, Senses};
+use crate::contact::Side;
 use crate::layer1::params::in_stroke;
-use crate::layer1::units::um_to_mm;
+use crate::layer1::walk::{Twist, WalkGeometry, in_plane};
 use crate::setpoint::{
-    APPROACH_MM, Acts, Cylinder, JointSetpoint, Landing, LegPlan, OnLinkLoss, PRESS_MM, Setpoints,
-    WHEELS,
+    APPROACH_MM, Acts, Cylinder, JOINTS, JointSetpoint, Landing, LegPlan, OnLinkLoss, PRESS_MM,
+    Setpoints, WHEELS,
 };
+
+/// Cycles for which a walk is carried on after layer 1 has been given up (5 s): it stands after 0.6 s,
+/// and answers ground that gives way for the rest. Then no leg moves any more.
+pub(in crate::layer0) const CARRIED: u16 = 500;
 
 /// What is remembered for a layer 1 that stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,8 +26,8 @@ pub(in crate::layer0) struct Orphan {
     /// Stroke of b6 at which each leg stood last.
     stood_mm: [PositionMm; WHEELS],
     ways: Ways,
-    /// Layer 1 has been given up: what it may still say is ignored.
-    pub(in crate::layer0) given_up: bool,
+    /// Layer 1 has been given up, for so many cycles: what it may still say is ignored.
+    pub(in crate::layer0) given_up: Option<u16>,
 }
 
 impl Orphan {
@@ -51,27 +57,26 @@ impl Orphan {
         setpoints: &mut Setpoints,
         senses: &Senses,
         acts: &Acts,
+        geometry: &WalkGeometry,
     ) {
-        let ways_um = self.ways.since(senses);
+        let moved = moved(geometry, self.ways.since(senses));
+        let given_up = self.given_up.is_some();
         let Some(mut plan) = setpoints.walk else {
             return;
         };
         plan.driven = false;
         for side in SIDES {
             let at = side.index();
-            let way_um = at_foot_um(side, ways_um);
             let Some(leg) = plan.legs.get_mut(at) else {
                 continue;
             };
             let joints = &mut setpoints.joints;
             match *leg {
                 LegPlan::Stance => {
-                    change(joints.get_mut(side.joint(Cylinder::Horizontal)), |b5| {
-                        b5.reference_mm =
-                            in_stroke(b5.reference_mm.saturating_sub(um_to_mm(way_um)));
-                    });
+                    follow(joints, side, moved, geometry);
                     let deep = acts.deep.get(at).copied().unwrap_or(false);
-                    if deep {
+                    // Until then layer 1 may come back, and go on from what it knows.
+                    if deep && given_up {
                         let beyond = acts.beyond_mm.get(at).copied().unwrap_or_default();
                         change(joints.get_mut(side.joint(Cylinder::Vertical)), |b6| {
                             let from = in_stroke(b6.reference_mm.saturating_add(beyond));
@@ -80,7 +85,7 @@ impl Orphan {
                         });
                     }
                 }
-                LegPlan::Lift | LegPlan::Reach if self.given_up => {
+                LegPlan::Lift | LegPlan::Reach if given_up => {
                     for cylinder in [Cylinder::Yaw, Cylinder::Horizontal] {
                         let here = senses.joint(side, cylinder);
                         change(joints.get_mut(side.joint(cylinder)), |joint| {
@@ -97,7 +102,9 @@ impl Orphan {
                 }
                 LegPlan::Lift | LegPlan::Reach => {}
                 LegPlan::Lower(_) => {
-                    if let Some(Landing::Down(stroke)) = acts.landing.get(at) {
+                    if let Some(Landing::Down(stroke)) = acts.landing.get(at)
+                        && given_up
+                    {
                         *leg = LegPlan::Stance;
                         change(joints.get_mut(side.joint(Cylinder::Vertical)), |b6| {
                             b6.reference_mm = in_stroke(stroke.saturating_add(PRESS_MM));
@@ -114,6 +121,33 @@ impl Orphan {
             }
         }
         setpoints.walk = Some(plan);
+    }
+}
+
+/// A standing foot goes with the ground.
+fn follow(
+    joints: &mut [Option<JointSetpoint>; JOINTS],
+    side: Side,
+    moved: Twist,
+    geometry: &WalkGeometry,
+) {
+    let cylinders = [Cylinder::Yaw, Cylinder::Horizontal];
+    let strokes = cylinders.map(|cylinder| {
+        let joint = joints.get(side.joint(cylinder)).copied().flatten();
+        joint.unwrap_or_default().reference_mm
+    });
+    // A robot that stands would creep by the rounding of every cycle.
+    let led = foot_m(side, strokes).filter(|_| moved != Twist::default());
+    let led = led.and_then(|foot| {
+        let ([x, y], [dx, dy]) = (foot, moved.ground_m_s(geometry, side, foot));
+        in_plane(side, [x + dx, y + dy], [0.0; 2])
+    });
+    for (cylinder, at) in cylinders.into_iter().zip(0_usize..) {
+        change(joints.get_mut(side.joint(cylinder)), |joint| {
+            if let Some(led) = led.and_then(|both| both.get(at).copied()) {
+                joint.reference_mm = led.reference_mm;
+            }
+        });
     }
 }
 

@@ -9,6 +9,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::{SIDES, Senses};
 use crate::behaviour::{Act, Behaviour, Behaviours};
+use crate::layer1::params::STROKE_MM;
 use crate::setpoint::{JOINTS, JointSetpoint, LegPlan, WHEELS, WalkPlan};
 
 /// An axis that has been at its limit for so many cycles (0.5 s) …
@@ -17,6 +18,17 @@ const LIMITED: u16 = 50;
 const MOVED_MM: PositionMm = PositionMm::from_int(5);
 /// It goes back by so much: most of the pull is gone.
 const BACK_MM: PositionMm = PositionMm::from_int(5);
+/// Afterwards it may go so much farther from there with every cycle (300 mm/s).
+const FREE_MM: PositionMm = PositionMm::from_int(3);
+
+/// Where an axis holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Held {
+    /// Stroke.
+    at_mm: PositionMm,
+    /// How far from there its reference may be; `None`: it holds.
+    free_mm: Option<PositionMm>,
+}
 
 /// An axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,8 +37,35 @@ struct Axis {
     limited: u16,
     /// Stroke from which its motion counts.
     from_mm: PositionMm,
-    /// Stroke at which it holds.
-    held_mm: Option<PositionMm>,
+    held: Option<Held>,
+}
+
+impl Axis {
+    const fn holds(&self) -> bool {
+        matches!(self.held, Some(Held { free_mm: None, .. }))
+    }
+
+    /// Lets go: its reference gets free little by little.
+    fn release(&mut self) {
+        self.limited = 0;
+        if let Some(held) = &mut self.held {
+            held.free_mm.get_or_insert(PositionMm::ZERO);
+        }
+    }
+
+    /// One cycle on the way from where it was held.
+    fn get_free(&mut self) {
+        if let Some(Held {
+            free_mm: Some(free),
+            ..
+        }) = &mut self.held
+        {
+            *free = free.saturating_add(FREE_MM);
+            if *free >= STROKE_MM {
+                self.held = None;
+            }
+        }
+    }
 }
 
 /// All cylinders.
@@ -37,6 +76,19 @@ pub(super) struct Overload {
 }
 
 impl Overload {
+    /// Axes that hold.
+    pub(super) fn holds(&self) -> [bool; JOINTS] {
+        self.axes.map(|axis| axis.holds())
+    }
+
+    /// No axis holds any more.
+    pub(super) fn rest(&mut self) {
+        for axis in &mut self.axes {
+            axis.release();
+            axis.get_free();
+        }
+    }
+
     /// One cycle; tells of the first axis that it finds overloaded.
     pub(super) fn update(
         &mut self,
@@ -45,7 +97,7 @@ impl Overload {
         enabled: Behaviours,
     ) -> Option<Act> {
         if !enabled.contains(Behaviour::Overload) {
-            *self = Self::default();
+            self.rest();
             return None;
         }
         let mut changed = [false; WHEELS];
@@ -61,8 +113,9 @@ impl Overload {
             };
             let leg = usize::from(index >= 3);
             if changed.get(leg) == Some(&true) {
-                *axis = Axis::default();
+                axis.release();
             }
+            axis.get_free();
             let moved = sense.stroke_mm.saturating_sub(axis.from_mm);
             if axis.limited == 0 || !sense.saturated || moved.saturating_abs() >= MOVED_MM {
                 axis.limited = u16::from(sense.saturated);
@@ -70,13 +123,16 @@ impl Overload {
                 continue;
             }
             axis.limited = axis.limited.saturating_add(1);
-            if axis.limited >= LIMITED && axis.held_mm.is_none() {
+            if axis.limited >= LIMITED && !axis.holds() {
                 let back = if sense.duty.raw() > 0 {
                     sense.stroke_mm.saturating_sub(BACK_MM)
                 } else {
                     sense.stroke_mm.saturating_add(BACK_MM)
                 };
-                axis.held_mm = Some(back);
+                axis.held = Some(Held {
+                    at_mm: back,
+                    free_mm: None,
+                });
                 let node = index.saturating_add(1);
                 told = told.or(Some(Act::Overload { node }));
             }
@@ -86,14 +142,22 @@ impl Overload {
 
     /// The set-point of an axis: where it is overloaded, where it holds.
     pub(super) fn apply(&self, joint: usize, setpoint: JointSetpoint) -> JointSetpoint {
-        match self.axes.get(joint).and_then(|axis| axis.held_mm) {
-            Some(held) => JointSetpoint {
-                reference_mm: held,
-                velocity_mm_s: VelocityMmS::ZERO,
-                ahead: None,
-                ..setpoint
-            },
-            None => setpoint,
+        let Some(held) = self.axes.get(joint).and_then(|axis| axis.held) else {
+            return setpoint;
+        };
+        let free = held.free_mm.unwrap_or_default();
+        let reference_mm = setpoint.reference_mm.limit(
+            held.at_mm.saturating_sub(free),
+            held.at_mm.saturating_add(free),
+        );
+        if reference_mm == setpoint.reference_mm {
+            return setpoint;
+        }
+        JointSetpoint {
+            reference_mm,
+            velocity_mm_s: VelocityMmS::ZERO,
+            ahead: None,
+            ..setpoint
         }
     }
 }

@@ -1,14 +1,15 @@
 //! The wheels of a walk at the pace that the behaviours allow.
 //!
 //! Layer 1 tells where the wheels should be; what they are held back by is given up, not made up
-//! for. Where layer 1 is late the wheels go on as they did, and slow down when it stays away.
+//! for. Where layer 1 is late the wheels go on as they did, and slow down when it stays away; what
+//! they have gone meanwhile is not taken back.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-use crate::setpoint::{TravelSetpoint, WHEELS};
+use crate::setpoint::{TravelSetpoint, WHEELS, WheelTravel};
 
-/// Change of speed in a cycle: 0.3 m/s².
+/// Change of a wheel's speed in a cycle while the pace changes: 0.3 m/s².
 const STEP_MM_S: I16F16 = I16F16::lit("3");
 /// Bus cycle, s.
 const CYCLE_S: I16F16 = I16F16::lit("0.01");
@@ -17,10 +18,13 @@ const CYCLE_S: I16F16 = I16F16::lit("0.01");
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pace {
     segment: Option<u16>,
-    /// Travel that layer 1 has told last, or would have.
+    /// Travel that layer 1 has told last.
     told_mm: [PositionMm; WHEELS],
-    /// Travel that the wheels were led.
+    /// Travel that the wheels were led, and at which speed, mm/s.
     led_mm: [PositionMm; WHEELS],
+    led_mm_s: [I16F16; WHEELS],
+    /// Layer 1 told nothing in the last cycle.
+    late: bool,
     share: I16F16,
     wish: I16F16,
 }
@@ -31,6 +35,8 @@ impl Default for Pace {
             segment: None,
             told_mm: [PositionMm::ZERO; WHEELS],
             led_mm: [PositionMm::ZERO; WHEELS],
+            led_mm_s: [I16F16::ZERO; WHEELS],
+            late: false,
             share: I16F16::ONE,
             wish: I16F16::ONE,
         }
@@ -65,19 +71,18 @@ impl Pace {
         } else {
             self.share = I16F16::ONE;
         }
+        let late = core::mem::replace(&mut self.late, !fresh) || !fresh;
         let mut out = travel;
         let places = self.told_mm.iter_mut().zip(&mut self.led_mm);
-        for (wheel, (told, led)) in out.wheels.iter_mut().zip(places) {
+        let places = places.zip(&mut self.led_mm_s);
+        for (wheel, ((told, led), led_mm_s)) in out.wheels.iter_mut().zip(places) {
             let speed = wheel.velocity_mm_s.get();
-            let step = if fresh || !walks {
-                let step = wheel.travel_mm.saturating_sub(*told);
-                *told = wheel.travel_mm;
-                step
+            let step = if late && walks {
+                PositionMm::new(speed.saturating_mul(CYCLE_S))
             } else {
-                let step = PositionMm::new(speed.saturating_mul(CYCLE_S));
-                *told = told.saturating_add(step);
-                step
+                wheel.travel_mm.saturating_sub(*told)
             };
+            *told = wheel.travel_mm;
             let step = if self.share == I16F16::ONE {
                 step
             } else {
@@ -90,18 +95,50 @@ impl Pace {
             if self.share != I16F16::ONE {
                 wheel.velocity_mm_s = VelocityMmS::new(speed.saturating_mul(self.share));
             }
+            *led_mm_s = wheel.velocity_mm_s.get();
         }
         out
     }
 
-    /// Brings the share nearer to the wish, by what the acceleration allows at this speed.
+    /// Brings the share as near to the wish as the acceleration of the wheels allows, whatever
+    /// layer 1 makes of their speed meanwhile.
     fn slew(&mut self, travel: &TravelSetpoint) {
-        let speed =
-            |wheel: &crate::setpoint::WheelTravel| wheel.velocity_mm_s.get().saturating_abs();
-        let fastest = travel.wheels.iter().map(speed).fold(STEP_MM_S, I16F16::max);
-        let step = STEP_MM_S.checked_div(fastest).unwrap_or(I16F16::ONE);
-        let away = self.wish.saturating_sub(self.share);
-        let change = away.clamp(I16F16::ZERO.saturating_sub(step), step);
-        self.share = self.share.saturating_add(change);
+        if self.share == I16F16::ONE && self.wish == I16F16::ONE {
+            // Nothing is held back: layer 1 has its own limits.
+            return;
+        }
+        let (mut least, mut most) = (I16F16::ZERO, I16F16::ONE);
+        for (wheel, led) in travel.wheels.iter().zip(self.led_mm_s) {
+            let [slowest, fastest] = shares(wheel, led);
+            least = least.max(slowest);
+            most = most.min(fastest);
+        }
+        // Where two wheels do not agree, slowly.
+        self.share = self.wish.max(least).min(most);
     }
+}
+
+/// Shares of a wheel's speed, 0 to 1, that are within [`STEP_MM_S`] of the speed that it was led at.
+fn shares(wheel: &WheelTravel, led_mm_s: I16F16) -> [I16F16; 2] {
+    let speed = wheel.velocity_mm_s.get();
+    let (speed, led) = if speed < I16F16::ZERO {
+        (speed.saturating_neg(), led_mm_s.saturating_neg())
+    } else {
+        (speed, led_mm_s)
+    };
+    let share = |mm_s: I16F16| match mm_s.checked_div(speed) {
+        Some(share) if speed > STEP_MM_S => share.clamp(I16F16::ZERO, I16F16::ONE),
+        // Too slow to matter.
+        _ => {
+            if mm_s > led {
+                I16F16::ONE
+            } else {
+                I16F16::ZERO
+            }
+        }
+    };
+    [
+        share(led.saturating_sub(STEP_MM_S)),
+        share(led.saturating_add(STEP_MM_S)),
+    ]
 }

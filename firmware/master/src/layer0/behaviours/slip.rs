@@ -1,22 +1,23 @@
 //! B7 slip: wheels that turn faster than the standing legs go with the ground.
 //!
-//! Both are ways over the last 0.3 s. A foot that holds cannot go on faster than the robot; wheels
-//! that slip do. If feet and wheels slip alike nothing on board can tell.
+//! Both are ways of the feet over the last 0.3 s: as the wheels tell it, turns included, and as the
+//! legs do, yaw included. A foot that holds cannot go on faster than the robot; wheels that slip do.
+//! If feet and wheels slip alike nothing on board can tell.
 
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
 
-use super::ways::{Ways, at_foot_um};
-use super::{SIDES, Senses};
+use super::ground::{Ways, moved, sensed_foot_m};
+use super::{SIDES, Senses, eased};
 use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::contact::Side;
-use crate::layer1::units::mm_to_um;
-use crate::setpoint::{Cylinder, LegPlan, WHEELS, WalkPlan};
+use crate::layer1::walk::{Twist, WalkGeometry};
+use crate::setpoint::{LegPlan, WHEELS, WalkPlan};
 
 /// Cycles over which ways are compared (0.3 s).
 const WINDOW: usize = 30;
-/// Way of the wheels below which nothing is compared, µm (20 mm/s).
-const LEAST_UM: i64 = 6_000;
+/// Way of the ground below which nothing is compared, m (20 mm/s).
+const LEAST_M: f32 = 0.006;
 /// A leg counts when it has stood for so many cycles (0.3 s): before, its b5 still follows from where
 /// it landed.
 const STOOD: u16 = 30;
@@ -33,40 +34,46 @@ const BEST: I16F16 = I16F16::lit("0.75");
 const SLOWER: I16F16 = I16F16::lit("0.02");
 const FASTER: I16F16 = I16F16::lit("0.005");
 const LEAST: I16F16 = I16F16::lit("0.3");
-/// A pulling leg's b5 leads by so much more in a cycle (50 mm/s), up to so much.
+/// The lead of a pulling leg's b5 changes by so much in a cycle (50 mm/s), up to so much.
 const PULL_MM: PositionMm = PositionMm::from_raw(1 << 15);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(30);
 
+/// Ways of a cycle, m.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Way {
+    /// The robot's, as its wheels tell.
+    robot: Twist,
+    /// The ground's below the feet that count, and that of these feet; means, seen from the robot.
+    ground: [f32; 2],
+    feet: [f32; 2],
+}
+
 /// What is known of the wheels' hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slip {
-    /// Ways of the last cycles: wheels and legs, µm.
-    ways_um: [[i32; 2]; WINDOW],
+    ways_m: [Way; WINDOW],
     at: usize,
-    b5_mm: [Option<PositionMm>; WHEELS],
+    /// Where a standing foot was, m.
+    foot_m: [Option<[f32; 2]>; WHEELS],
     /// Cycles for which a leg has stood.
     stood: [u16; WHEELS],
     ways: Ways,
-    /// Slip; `None`: the wheels hardly turn.
-    slip: Option<I16F16>,
-    backward: bool,
     /// Cycles for which the slip has been above [`SLIPS`].
     above: u16,
     slips: bool,
     pace: I16F16,
+    /// What b5 leads by, positive where it pulls the robot forward.
     lead_mm: [PositionMm; WHEELS],
 }
 
 impl Default for Slip {
     fn default() -> Self {
         Self {
-            ways_um: [[0; 2]; WINDOW],
+            ways_m: [Way::default(); WINDOW],
             at: 0,
-            b5_mm: [None; WHEELS],
+            foot_m: [None; WHEELS],
             stood: [0; WHEELS],
             ways: Ways::default(),
-            slip: None,
-            backward: false,
             above: 0,
             slips: false,
             pace: I16F16::ONE,
@@ -81,29 +88,42 @@ impl Slip {
         self.pace
     }
 
+    /// What b5 of a leg leads by, positive where it pulls the robot forward.
+    pub(super) fn lead_mm(&self, side: Side) -> PositionMm {
+        self.lead_mm.get(side.index()).copied().unwrap_or_default()
+    }
+
+    /// No leg pulls any more: forgets all but the leads, which go as slowly as they came.
+    pub(super) fn rest(&mut self) {
+        *self = Self {
+            lead_mm: self.lead_mm.map(|lead| eased(lead, PULL_MM)),
+            ..Self::default()
+        };
+    }
+
     /// One cycle; tells when the wheels begin to slip.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
         plan: &WalkPlan,
+        geometry: &WalkGeometry,
         enabled: Behaviours,
     ) -> Option<Act> {
         if !enabled.contains(Behaviour::Slip) {
-            *self = Self::default();
+            self.rest();
             return None;
         }
-        let ways = self.ways_um(senses, plan);
-        if let Some(place) = self.ways_um.get_mut(self.at) {
-            *place = ways;
+        let way = self.way(senses, plan, geometry);
+        if let Some(place) = self.ways_m.get_mut(self.at) {
+            *place = way;
         }
         self.at = if self.at >= WINDOW.saturating_sub(1) {
             0
         } else {
             self.at.saturating_add(1)
         };
-        self.slip = self.measure();
         let before = self.slips;
-        let slip = self.slip.unwrap_or(I16F16::ZERO);
+        let slip = I16F16::checked_from_num(self.measure()).unwrap_or_default();
         self.above = if slip > SLIPS {
             self.above.saturating_add(1)
         } else {
@@ -120,69 +140,82 @@ impl Slip {
             self.pace.saturating_add(FASTER)
         }
         .clamp(LEAST, I16F16::ONE);
-        for (side, lead) in SIDES.into_iter().zip(&mut self.lead_mm) {
-            *lead = match (plan.leg(side), self.slips) {
-                (LegPlan::Stance, true) => lead.saturating_add(PULL_MM),
-                (LegPlan::Stance, false) => lead.saturating_sub(PULL_MM),
-                _ => PositionMm::ZERO,
-            }
-            .limit(PositionMm::ZERO, FARTHEST_MM);
-        }
+        self.pull(plan, geometry);
         (self.slips && !before).then_some(Act::Slip)
     }
 
-    /// What a standing leg's b5 leads by, positive when it pulls the robot forward.
-    pub(super) fn lead_mm(&self, side: Side) -> PositionMm {
-        let lead = self.lead_mm.get(side.index()).copied().unwrap_or_default();
-        if self.backward {
-            PositionMm::ZERO.saturating_sub(lead)
-        } else {
-            lead
+    /// Brings the leads of the legs nearer to what is wanted.
+    fn pull(&mut self, plan: &WalkPlan, geometry: &WalkGeometry) {
+        let robot = self.total().robot;
+        for (side, lead) in SIDES.into_iter().zip(&mut self.lead_mm) {
+            let [ground_m, _] = robot.ground_m_s(geometry, side, [0.0; 2]);
+            let farthest = if ground_m > 0.0 {
+                PositionMm::ZERO.saturating_sub(FARTHEST_MM)
+            } else {
+                FARTHEST_MM
+            };
+            let pulls = self.slips && plan.leg(side) == LegPlan::Stance;
+            let wanted = if pulls { farthest } else { PositionMm::ZERO };
+            *lead = wanted.saturating_add(eased(lead.saturating_sub(wanted), PULL_MM));
         }
     }
 
-    /// Ways of the wheels and of the standing legs in this cycle, mean of the standing feet.
-    fn ways_um(&mut self, senses: &Senses, plan: &WalkPlan) -> [i32; 2] {
-        let wheels_um = self.ways.since(senses);
-        let (mut sum, mut feet) = ([0_i64; 2], 0_u8);
-        let legs = self.b5_mm.iter_mut().zip(&mut self.stood);
-        for (side, (b5, stood)) in SIDES.into_iter().zip(legs) {
-            let stroke = senses
-                .joint(side, Cylinder::Horizontal)
-                .map(|j| j.stroke_mm);
-            let stroke = stroke.filter(|_| plan.leg(side) == LegPlan::Stance);
-            *stood = if stroke.is_some() {
+    /// Ways of this cycle.
+    fn way(&mut self, senses: &Senses, plan: &WalkPlan, geometry: &WalkGeometry) -> Way {
+        let mut way = Way {
+            robot: moved(geometry, self.ways.since(senses)),
+            ..Way::default()
+        };
+        let mut feet = 0.0;
+        let legs = self.foot_m.iter_mut().zip(&mut self.stood);
+        for (side, (foot, stood)) in SIDES.into_iter().zip(legs) {
+            let stands = plan.leg(side) == LegPlan::Stance;
+            let here = sensed_foot_m(senses, side).filter(|_| stands);
+            *stood = if here.is_some() {
                 stood.saturating_add(1)
             } else {
                 0
             };
-            let before = core::mem::replace(b5, stroke);
-            let (Some(now), Some(before), true) = (stroke, before, *stood > STOOD) else {
+            let before = core::mem::replace(foot, here);
+            let (Some(here), Some(before), true) = (here, before, *stood > STOOD) else {
                 continue;
             };
-            let [wheels, legs] = &mut sum;
-            *wheels = wheels.saturating_add(at_foot_um(side, wheels_um));
-            *legs = legs.saturating_add(mm_to_um(before.saturating_sub(now)));
-            feet = feet.saturating_add(1);
+            way.ground = sum(way.ground, way.robot.ground_m_s(geometry, side, before));
+            way.feet = sum(way.feet, sum(here, before.map(|m| -m)));
+            feet += 1.0;
         }
-        let halve = u32::from(feet == 2);
-        sum.map(|way| i32::try_from(way >> halve).unwrap_or(0))
+        if feet > 1.0 {
+            way.ground = way.ground.map(|m| m / feet);
+            way.feet = way.feet.map(|m| m / feet);
+        }
+        way
     }
 
-    fn measure(&mut self) -> Option<I16F16> {
-        let (mut wheels, mut legs) = (0_i64, 0_i64);
-        for [wheel, leg] in self.ways_um {
-            wheels = wheels.saturating_add(i64::from(wheel));
-            legs = legs.saturating_add(i64::from(leg));
+    /// Ways of the whole window.
+    fn total(&self) -> Way {
+        let mut all = Way::default();
+        for way in &self.ways_m {
+            all.robot.forward_m_s += way.robot.forward_m_s;
+            all.robot.turn_rad_s += way.robot.turn_rad_s;
+            all.ground = sum(all.ground, way.ground);
+            all.feet = sum(all.feet, way.feet);
         }
-        if wheels.saturating_abs() < LEAST_UM {
-            return None;
-        }
-        self.backward = wheels < 0;
-        let missing = wheels.saturating_sub(legs);
-        let raw = (missing << 16_u32).checked_div(wheels).unwrap_or(0);
-        Some(I16F16::from_bits(
-            i32::try_from(raw.clamp(0, 1 << 16)).unwrap_or(0),
-        ))
+        all
     }
+
+    /// Slip, 0 to 1: the share of the ground's way that the feet have not gone along with. 0 where the wheels
+    /// hardly turn.
+    fn measure(&self) -> f32 {
+        let all = self.total();
+        let dot = |[ax, ay]: [f32; 2], [bx, by]: [f32; 2]| ax * bx + ay * by;
+        let ground = dot(all.ground, all.ground);
+        if ground < LEAST_M * LEAST_M {
+            return 0.0;
+        }
+        (1.0 - dot(all.feet, all.ground) / ground).clamp(0.0, 1.0)
+    }
+}
+
+fn sum([ax, ay]: [f32; 2], [bx, by]: [f32; 2]) -> [f32; 2] {
+    [ax + bx, ay + by]
 }

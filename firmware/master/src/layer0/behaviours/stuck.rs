@@ -2,7 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
-use super::ways::Ways;
+use super::ground::Ways;
 use super::{SIDES, Senses};
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};
@@ -15,7 +15,10 @@ const PROGRESS_UM: i64 = 10_000;
 const PATIENCE: u16 = 300;
 /// So many swings in a row that ran against something make no progress, whatever wheels and legs
 /// do: before a wall both may slip alike.
-const BUMPED: u8 = 6;
+const BUMPED: u8 = 3;
+/// After a robot has been stuck so many are enough, until its wheels have gone so far, µm (0.5 m).
+const BUMPED_AGAIN: u8 = 2;
+const AGAIN_UM: i64 = 500_000;
 /// Motor command that is all that a wheel has, %, …
 const EFFORT_PERCENT: u16 = 90;
 /// … at less than this share of the speed asked for, 1/n, …
@@ -40,23 +43,26 @@ pub(super) struct Stuck {
     bumped: [bool; WHEELS],
     /// Swings in a row that have.
     bumps: u8,
-    went_down: [bool; WHEELS],
+    /// Travel of the wheels when the robot was stuck last, µm.
+    stuck_um: Option<[i64; WHEELS]>,
     /// Cycles for which a wheel has been blocked.
     blocked: [u16; WHEELS],
     ways: Ways,
 }
 
 impl Stuck {
-    /// One cycle; whether the robot is stuck. It is told again after as long a time.
+    /// One cycle; whether the robot is stuck. It is told again after as long a time. `landed`: feet
+    /// that have just come down; `bumps`: that have just run against something.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
         plan: &WalkPlan,
         setpoints: &Setpoints,
+        landed: [bool; WHEELS],
         bumps: [bool; WHEELS],
         enabled: Behaviours,
     ) -> bool {
-        self.count(plan, bumps);
+        self.count(landed, bumps);
         let progress = self.progress(senses, plan);
         let blocked = self.blocked(senses, setpoints);
         if !enabled.contains(Behaviour::Stuck) || !plan.driven {
@@ -70,8 +76,16 @@ impl Stuck {
         } else {
             self.idle.saturating_add(1)
         };
-        let stuck = self.idle > PATIENCE || blocked || self.bumps >= BUMPED;
+        let now_um = senses.wheels.map(|wheel| wheel.travel_um);
+        let near = |before: [i64; WHEELS]| {
+            let mut ways = now_um.into_iter().zip(before);
+            ways.all(|(now, before)| now.saturating_sub(before).saturating_abs() < AGAIN_UM)
+        };
+        self.stuck_um = self.stuck_um.filter(|before| near(*before));
+        let most = self.stuck_um.map_or(BUMPED, |_| BUMPED_AGAIN);
+        let stuck = self.idle > PATIENCE || blocked || self.bumps >= most;
         if stuck {
+            self.stuck_um = Some(now_um);
             self.idle = 0;
             self.bumps = 0;
             self.blocked = [0; WHEELS];
@@ -80,12 +94,10 @@ impl Stuck {
     }
 
     /// Counts the swings in a row that ran against something.
-    fn count(&mut self, plan: &WalkPlan, bumps: [bool; WHEELS]) {
-        let legs = self.bumped.iter_mut().zip(&mut self.went_down).zip(bumps);
-        for (side, ((bumped, went_down), bump)) in SIDES.into_iter().zip(legs) {
+    fn count(&mut self, landed: [bool; WHEELS], bumps: [bool; WHEELS]) {
+        for ((bumped, landed), bump) in self.bumped.iter_mut().zip(landed).zip(bumps) {
             *bumped |= bump;
-            let stands = plan.leg(side) == LegPlan::Stance;
-            if stands && *went_down {
+            if landed {
                 self.bumps = if *bumped {
                     self.bumps.saturating_add(1)
                 } else {
@@ -93,7 +105,6 @@ impl Stuck {
                 };
                 *bumped = false;
             }
-            *went_down = matches!(plan.leg(side), LegPlan::Lower(_));
         }
     }
 

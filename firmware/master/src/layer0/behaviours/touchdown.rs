@@ -24,6 +24,9 @@ const STILL_MM_S: VelocityMmS = VelocityMmS::from_int(10);
 /// … for so many cycles, after so many, has arrived.
 const STILL: u16 = 10;
 const BEGUN: u16 = 10;
+/// A foot with nails that touches above the ground that is expected, and whose piston is as slow as
+/// that for so many cycles (50 ms), stands on a rock: its nails do not go in.
+const STOPPED: u16 = 5;
 
 /// A foot that goes down.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,6 +35,10 @@ pub(super) struct Touchdown {
     at_mm: Option<PositionMm>,
     cycles: u16,
     still: u16,
+    stopped: u16,
+    /// Stroke at which the foot has met the ground that it still touches. A touch of one cycle may
+    /// be a graze: ground is what is felt in two in a row.
+    met_mm: Option<PositionMm>,
     landing: Landing,
 }
 
@@ -63,13 +70,15 @@ impl Touchdown {
         self.at_mm.unwrap_or(begin)
     }
 
-    /// One cycle with the plan of the leg, its b6 and whether a switch is closed.
+    /// One cycle with the plan of the leg, its b6 and whether a switch is closed. `nailed`: nails
+    /// touch before the sole does.
     pub(super) fn update(
         &mut self,
         side: Side,
         plan: LegPlan,
         b6: &JointSense,
         touches: bool,
+        nailed: bool,
         enabled: Behaviours,
     ) -> Option<Act> {
         let LegPlan::Lower(from_mm) = plan else {
@@ -80,22 +89,32 @@ impl Touchdown {
         let at = self.at_mm.unwrap_or(begin);
         self.cycles = self.cycles.saturating_add(1);
         let still = self.cycles > BEGUN && b6.velocity_mm_s.saturating_abs() < STILL_MM_S;
-        self.still = if still {
-            self.still.saturating_add(1)
-        } else {
-            0
-        };
+        let count = |cycles: u16, on| if on { cycles.saturating_add(1) } else { 0 };
+        self.still = count(self.still, still);
+        self.stopped = count(self.stopped, still && touches);
+        // Above the ground that is expected it may be the nails alone.
+        let nails = nailed && b6.stroke_mm < from_mm.saturating_add(APPROACH_MM);
+        let touches = touches && (!nails || self.stopped >= STOPPED);
         let arrived = b6.stroke_mm >= at.saturating_sub(PRESS_MM) || self.still >= STILL;
         let (stops, searches) = (
             enabled.contains(Behaviour::Touchdown),
             enabled.contains(Behaviour::Search),
         );
+        let met = self.met_mm.take();
         if touches && (stops || (at >= end || searches) && arrived && self.cycles > BEGUN) {
-            let stroke = if stops {
+            let here = if stops {
                 b6.stroke_mm
             } else {
                 at.saturating_sub(PRESS_MM)
             };
+            let stroke = *self.met_mm.insert(met.unwrap_or(here));
+            if met.is_none() && self.stopped < STOPPED {
+                if stops {
+                    self.at_mm = Some(in_stroke(stroke.saturating_add(PRESS_MM)));
+                }
+                self.landing = Landing::Waiting;
+                return None;
+            }
             self.landing = Landing::Down(stroke);
             let expected = from_mm.saturating_add(APPROACH_MM);
             let off = stroke.saturating_sub(expected);
@@ -113,7 +132,7 @@ impl Touchdown {
             self.landing = Landing::Down(at.saturating_sub(PRESS_MM));
             return None;
         }
-        self.at_mm = Some(if b6.stroke_mm >= at.saturating_sub(NEAR_MM) {
+        self.at_mm = Some(if at < end && b6.stroke_mm >= at.saturating_sub(NEAR_MM) {
             at.saturating_add(SEARCH_MM).limit(PositionMm::ZERO, end)
         } else {
             at

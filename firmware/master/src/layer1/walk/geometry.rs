@@ -58,7 +58,7 @@ const IN_M: f32 = RADIUS_MIN_M + MARGIN_M;
 
 /// Speed of the robot over the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Twist {
+pub(crate) struct Twist {
     /// Forward, m/s.
     pub forward_m_s: f32,
     /// To the left, rad/s.
@@ -67,7 +67,7 @@ pub(super) struct Twist {
 
 impl Twist {
     /// This motion, slower by a factor.
-    pub(super) fn scaled(self, factor: f32) -> Self {
+    pub(crate) fn scaled(self, factor: f32) -> Self {
         Self {
             forward_m_s: factor * self.forward_m_s,
             turn_rad_s: factor * self.turn_rad_s,
@@ -75,12 +75,12 @@ impl Twist {
     }
 
     /// Speed of one wheel's rim, m/s.
-    pub(super) fn wheel_m_s(self, geometry: &WalkGeometry, side: Side) -> f32 {
+    pub(crate) fn wheel_m_s(self, geometry: &WalkGeometry, side: Side) -> f32 {
         self.forward_m_s - sign(side) * 0.5 * geometry.track_m * self.turn_rad_s
     }
 
     /// The motion of both wheels, from the speeds (or distances) of their rims.
-    pub(super) fn of_wheels(geometry: &WalkGeometry, [left, right]: [f32; 2]) -> Self {
+    pub(crate) fn of_wheels(geometry: &WalkGeometry, [left, right]: [f32; 2]) -> Self {
         Self {
             forward_m_s: 0.5 * (left + right),
             turn_rad_s: (right - left) / geometry.track_m,
@@ -88,7 +88,7 @@ impl Twist {
     }
 
     /// Velocity of the ground under a foot, seen from the robot, m/s.
-    pub(super) fn ground_m_s(
+    pub(crate) fn ground_m_s(
         self,
         geometry: &WalkGeometry,
         side: Side,

@@ -36,6 +36,9 @@ const NEARER_M: f32 = 0.06;
 const PATIENCE: u16 = 150;
 /// … so many times.
 const TRIES: u8 = 2;
+/// A foot that runs against something although it is as high as it goes is set down so far in front
+/// of it, m.
+const BEFORE_M: f32 = 0.1;
 /// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
 /// presses less.
 const ANNOUNCED: u8 = 8;
@@ -109,15 +112,21 @@ pub(super) struct Leg {
     without: u16,
     /// Footholds of this swing that had no ground.
     tries: u8,
+    /// Where this swing is to end instead of at its foothold, m.
+    before_m: Option<[f32; 2]>,
     /// Foot from which progress counts, m.
     anchor_m: [f32; 2],
+    /// How often it had run against something when that was looked at last.
+    bumps: u8,
+    /// It has run against something in this swing, or in the one that its stance began with.
+    bumped: bool,
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
 
 impl Leg {
     /// A leg that stands, or goes down to stand.
-    pub(super) fn new(side: Side, sensed: &Sensed) -> Self {
+    pub(super) fn new(side: Side, sensed: &Sensed, bumps: u8) -> Self {
         Self {
             side,
             state: if sensed.touches {
@@ -133,7 +142,10 @@ impl Leg {
             higher_mm: 0.0,
             without: 0,
             tries: 0,
+            before_m: None,
             anchor_m: sensed.foot_m,
+            bumps,
+            bumped: false,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
                 ..JointSetpoint::default()
@@ -143,6 +155,11 @@ impl Leg {
 
     pub(super) fn stands(&self) -> bool {
         self.state == LegState::Stance
+    }
+
+    /// Whether there is nothing that it could still do: it stands, or is at full length above a hole.
+    pub(super) fn rests(&self) -> bool {
+        self.stands() || self.wants_nose_down()
     }
 
     /// What layer 0 is told of it.
@@ -174,9 +191,16 @@ impl Leg {
         self.absorb(acts);
         self.higher_mm = higher_mm;
         self.tries = 0;
+        self.before_m = None;
+        self.bumped = false;
         // Where a touch would have been, as the leg stands now.
         self.ground_mm = self.stand_mm - millimetres(PRESS_MM);
         self.state = LegState::Lift(self.stand_mm);
+    }
+
+    /// What it stands on may be the face of something that it has run against.
+    pub(super) fn may_stand_at_a_face(&self) -> bool {
+        self.stands() && self.bumped
     }
 
     /// At full length it finds no ground: the nose is to go down.
@@ -198,13 +222,11 @@ impl Leg {
         way_m
     }
 
-    /// One cycle: `moved` is what the ground has passed below, m and rad; `foothold` where the
-    /// swing is to end, `lift_mm` its height.
+    /// One cycle: `foothold` is where the swing is to end, `lift_mm` its height.
     pub(super) fn advance(
         &mut self,
         sensed: &Sensed,
         acts: &Acts,
-        moved: Twist,
         geometry: &WalkGeometry,
         foothold: [f32; 2],
         lift_mm: f32,
@@ -215,10 +237,23 @@ impl Leg {
             0
         };
         let lift_mm = lift_mm + self.higher_mm;
+        let bumps = acts.bumps.get(self.side.index()).copied();
+        let bumps = bumps.unwrap_or(self.bumps);
+        let bumped = core::mem::replace(&mut self.bumps, bumps) != bumps;
+        self.bumped |= bumped;
+        let held = |cylinder| acts.overload.get(self.side.joint(cylinder)) == Some(&true);
+        let [held_plane, held_height] = [
+            held(Cylinder::Yaw) || held(Cylinder::Horizontal),
+            held(Cylinder::Vertical),
+        ];
+        if held_plane && !matches!(self.state, LegState::Lower(_)) {
+            // An overloaded leg goes nowhere: the foot is where it is.
+            self.foot_m = sensed.foot_m;
+        }
         match self.state {
-            LegState::Stance => self.follow(moved, geometry),
+            LegState::Stance => {}
+            LegState::Lift(_) if held_height => self.lower(),
             LegState::Lift(from_mm) => {
-                self.follow(moved, geometry);
                 let lift_mm = lift_mm.min(from_mm);
                 let hard = CLEAR_MM.min(0.5 * lift_mm);
                 let clear = hard.max((1e3 * geometry.nail_m).min(NAILS_OUT * lift_mm));
@@ -227,20 +262,28 @@ impl Leg {
                     self.state = LegState::Reach(distance(sensed.foot_m, foothold));
                 }
             }
+            LegState::Reach(_) if held_plane => self.lower(),
             LegState::Reach(way_m) => {
-                self.foot_m = self.nearer(foothold);
+                let foothold = self.nearer(foothold);
+                self.foot_m = self.before_m.unwrap_or(foothold);
                 let left_m = distance(sensed.foot_m, self.foot_m);
                 if left_m <= (1.0 - LOWER_FROM) * way_m {
                     self.lower();
                     return;
                 }
-                if acts.bump.get(self.side.index()) != Some(&true) {
+                if !bumped {
                     return;
                 }
                 if lift_mm < self.stand_mm {
                     self.higher_mm += HIGHER_MM;
+                } else if self.before_m.is_none() {
+                    let [x, y] = sensed.foot_m;
+                    let [dx, dy] = [foothold[0] - x, foothold[1] - y];
+                    let share = BEFORE_M / distance(foothold, sensed.foot_m).max(BEFORE_M);
+                    self.before_m = Some([x - share * dx, y - share * dy]);
+                    self.state = LegState::Reach(BEFORE_M);
                 } else {
-                    // As high as it goes: there.
+                    // There is no room: there.
                     self.foot_m = sensed.foot_m;
                     self.lower();
                 }
@@ -284,8 +327,11 @@ impl Leg {
         [x - libm::copysignf(nearer, x - middle), y]
     }
 
-    /// The ground has passed below: a standing foot goes with it.
-    fn follow(&mut self, moved: Twist, geometry: &WalkGeometry) {
+    /// The ground has passed below: a foot that stands or rises goes with it.
+    pub(super) fn follow(&mut self, moved: Twist, geometry: &WalkGeometry) {
+        if !matches!(self.state, LegState::Stance | LegState::Lift(_)) {
+            return;
+        }
         let [dx, dy] = moved.ground_m_s(geometry, self.side, self.foot_m);
         let [x, y] = self.foot_m;
         self.foot_m = [x + dx, y + dy];
@@ -359,7 +405,11 @@ impl Leg {
 }
 
 /// Yaw and b5 for a foot at `foot` moving with `velocity`, both m from O4.
-fn in_plane(side: Side, [x, y]: [f32; 2], [ux, uy]: [f32; 2]) -> Option<[JointSetpoint; 2]> {
+pub(crate) fn in_plane(
+    side: Side,
+    [x, y]: [f32; 2],
+    [ux, uy]: [f32; 2],
+) -> Option<[JointSetpoint; 2]> {
     // Height does not enter: the vertical cylinder is parallel to the yaw axis.
     let z = -0.1;
     let (strokes, rates) = mirror::strokes_of_foot(side, [x, y, z], [ux, uy, 0.0])?;

@@ -11,7 +11,7 @@ use wheeleg_protocol::{
     Identity, InputBits, LimitBits, LinkRecord, LogRecords, MAX_ENCODED, Message, Nack, NackReason,
     NodeMode, ParamValue, Position, ResetCause, SCHEMA_HASH, SlotReply, Sync,
 };
-use wheeleg_units::{PositionMm, WheelCount};
+use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 
 pub(crate) const CYCLE_US: u64 = 10_000;
 
@@ -135,6 +135,7 @@ impl FakeNode {
                 self.position + i64::from(slot.reference.wrapping_difference(here))
             }),
         };
+        let before = self.position;
         match (self.mode, target) {
             (NodeMode::Armed | NodeMode::Tracking, Some(target)) => {
                 self.mode = NodeMode::Tracking;
@@ -150,7 +151,12 @@ impl FakeNode {
         };
         SlotReply {
             position_raw: raw,
-            velocity_raw: 0,
+            velocity_raw: if self.address.is_joint() {
+                let per_s = 100 * (self.position - before) as i32;
+                VelocityMmS::from_raw(per_s).to_wire().to_bits()
+            } else {
+                0
+            },
             effort_raw: 0,
             active_faults: self.faults,
             mode: self.mode,

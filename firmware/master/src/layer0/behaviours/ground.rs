@@ -1,0 +1,47 @@
+//! How far the wheels have gone, and where the feet are above the ground that passes below.
+
+use wheeleg_units::PositionMm;
+
+use super::Senses;
+use crate::contact::Side;
+use crate::layer1::units::metres;
+use crate::layer1::walk::{Twist, WalkGeometry};
+use crate::mirror;
+use crate::setpoint::{Cylinder, WHEELS};
+
+/// Travel of the wheels when it was last looked at, µm; `None`: not yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Ways(Option<[i64; WHEELS]>);
+
+impl Ways {
+    /// What each wheel has gone since the last look, µm; nothing at the first.
+    pub(super) fn since(&mut self, senses: &Senses) -> [i64; WHEELS] {
+        let mut ways = senses.wheels.map(|wheel| wheel.travel_um);
+        let before = self.0.replace(ways).unwrap_or(ways);
+        for (way, before) in ways.iter_mut().zip(before) {
+            *way = way.saturating_sub(before);
+        }
+        ways
+    }
+}
+
+/// What the robot has moved by, m and rad, from the ways of its wheels, µm.
+pub(super) fn moved(geometry: &WalkGeometry, ways_um: [i64; WHEELS]) -> Twist {
+    Twist::of_wheels(geometry, ways_um.map(|um| um as f32 * 1e-6))
+}
+
+/// Foot of a leg whose yaw cylinder and b5 have these strokes, forward and left of its yaw axis, m.
+pub(super) fn foot_m(side: Side, [yaw, b5]: [PositionMm; 2]) -> Option<[f32; 2]> {
+    // Height does not enter: the vertical cylinder is parallel to the yaw axis.
+    let [x, y, _] = mirror::foot_of_strokes(side, [metres(yaw), metres(b5), 0.1])?;
+    Some([x, y])
+}
+
+/// The same as the boards tell it; `None` if one was never heard.
+pub(super) fn sensed_foot_m(senses: &Senses, side: Side) -> Option<[f32; 2]> {
+    let stroke = |cylinder| Some(senses.joint(side, cylinder)?.stroke_mm);
+    foot_m(
+        side,
+        [stroke(Cylinder::Yaw)?, stroke(Cylinder::Horizontal)?],
+    )
+}
