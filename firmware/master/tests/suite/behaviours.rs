@@ -367,7 +367,8 @@ fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_giv
     let mut robot = pressed(9.9);
     assert_eq!(robot.run(9), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
-    assert_eq!(pressed(10.1).run(25), []);
+    // One that moves is told a cycle later: b5 waits where it touches.
+    assert_eq!(pressed(10.1).run(10), []);
 }
 
 #[test]

@@ -107,7 +107,8 @@ impl Bump {
         if let Some(place) = &mut self.place {
             place.way_um = travel_um.saturating_sub(place.travel_um);
         }
-        self.stalled = if started && slow {
+        let pushes = touches && self.back == 0;
+        self.stalled = if (started || pushes) && slow {
             self.stalled.saturating_add(1)
         } else {
             0
