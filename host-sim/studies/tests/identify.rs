@@ -4,11 +4,11 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::{Axis, AxisParams};
-use wheeleg_studies::identify::fit::{Problem, point, trust};
+use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
 use wheeleg_studies::identify::lab::Lab;
 use wheeleg_studies::identify::told::{covers, untold};
-use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise, start_deviation};
+use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
 use wheeleg_studies::study::{Progress, Settings};
 
 const OUT: [u16; 4] = [1000, 0, 0, 1000];
@@ -90,7 +90,6 @@ fn problem<'a>(config: &'a AxisConfig, lab: &'a Lab) -> Problem<'a> {
         lab,
         ticks: lab.on_us.len(),
         noise: noise(&config.axis),
-        start: start_deviation(lab, &noise(&config.axis)),
         limits: limits(config),
     }
 }
@@ -107,7 +106,6 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         told,
         information,
         stopped,
-        ..
     } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     assert!(stopped.is_none());
     let found = (0..COUNT).filter(|i| told[*i].told).count();
@@ -124,9 +122,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         assert!(off < 0.25, "{name}: {off}");
     }
     // The truth is about as likely as the fit: a model that has got stuck is not.
-    let residuals = problem(&config, &lab)
-        .residuals(&point(&truth))
-        .expect("a plant");
+    let residuals = problem(&config, &lab).residuals(&truth).expect("a plant");
     assert!(fit.residuals.norm() < 1.1 * residuals.norm());
     assert!(untold(&information).len() <= COUNT - found);
 }

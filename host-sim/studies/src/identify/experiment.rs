@@ -1,6 +1,7 @@
 //! The next experiment: of some valve sequences, the one that tells most of what is not known.
 
-use super::fit::{Point, Problem};
+use super::fit::Problem;
+use super::free::Logs;
 use super::lab::{Lab, Sample};
 use super::told::{ignorance, information};
 
@@ -86,7 +87,7 @@ const SEQUENCES: [(&str, &str, Valves); 6] = [
 #[must_use]
 pub fn ranked(
     problem: &Problem<'_>,
-    point: &Point,
+    logs: &Logs,
     known: &nalgebra::DMatrix<f64>,
     variance: f64,
 ) -> Vec<Experiment> {
@@ -109,7 +110,7 @@ pub fn ranked(
             ticks: TICKS,
             ..*problem
         };
-        let more = information(&next.jacobian(point)?, variance);
+        let more = information(&next.jacobian(logs)?, variance);
         Some(Experiment {
             name,
             words,

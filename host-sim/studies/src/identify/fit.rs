@@ -3,41 +3,22 @@
 //! Levenberg–Marquardt in Marquardt's form (Nocedal, Wright: Numerical Optimization, ch. 10), on
 //! logarithms of the factors. The file is a measurement, too: each logarithm has its trust as a
 //! standard deviation, so that what the data cannot tell stays where the file has it.
-//!
-//! What the piston starts from is measured with noise, and that noise is in every later sample: the
-//! start is fitted along, and its uncertainty is in every interval.
 
 use nalgebra::{DMatrix, DVector};
 use wheeleg_plant::axis::AxisParams;
 
 use super::free::{COUNT, FREE, Logs, applied};
 use super::lab::Lab;
-use super::predict::{Offset, Predicted, predict};
+use super::predict::{Predicted, predict};
 
 /// Step of the differences, in logarithms.
 const DIFFERENCE: f64 = 2e-3;
-/// That of the start, whose unit is a standard deviation, beside it.
-const START_STEP: f64 = 100.0;
 /// Most steps.
 const STEPS: usize = 60;
 /// A step that lowers the cost by less than this share is the last.
 const ENOUGH: f64 = 1e-7;
 /// Two-sided 95 % of a normal distribution, in standard deviations.
 pub(super) const Z95: f64 = 1.959_964;
-
-/// What is fitted: logarithms of the factors, then the start's stroke and pressures beside what was
-/// measured of them, in their standard deviations.
-pub const ALL: usize = COUNT + 3;
-/// A place in what is fitted.
-pub type Point = [f64; ALL];
-/// Limits of the start, in standard deviations.
-const START_LIMITS: [f64; 2] = [-5.0, 5.0];
-
-/// A place with these factors, at the start that was measured.
-#[must_use]
-pub fn point(logs: &Logs) -> Point {
-    std::array::from_fn(|i| logs.get(i).copied().unwrap_or(0.0))
-}
 
 /// Standard deviations of what was measured.
 #[derive(Debug, Clone, Copy)]
@@ -59,8 +40,6 @@ pub struct Problem<'a> {
     pub ticks: usize,
     /// Noise.
     pub noise: Noise,
-    /// Standard deviations of the start's stroke and pressures.
-    pub start: Offset,
     /// Limits of the logarithms.
     pub limits: [[f64; 2]; COUNT],
 }
@@ -70,42 +49,24 @@ pub struct Problem<'a> {
 pub struct Fit {
     /// Logarithms of the factors.
     pub logs: Logs,
-    /// How the start differs from what was measured of it.
-    pub start: Offset,
-    point: Point,
     /// Half the sum of the squares, trust included.
     pub cost: f64,
     /// Residuals of the data over their standard deviation.
     pub residuals: DVector<f64>,
 }
 
-/// Standard deviation before the data: of a logarithm what the file is trusted to.
+/// Standard deviation of what a file is trusted to, logarithm.
 #[must_use]
 pub fn trust(index: usize) -> f64 {
-    FREE.get(index).map_or(1.0, |free| free.trust.ln() / Z95)
+    FREE[index].trust.ln() / Z95
 }
 
 impl Problem<'_> {
     /// Residuals over their standard deviation; `None` where there is no such plant.
     #[must_use]
-    pub fn residuals(&self, point: &Point) -> Option<DVector<f64>> {
-        let (logs, offset) = self.parts(point);
-        let axis = applied(self.axis, &logs);
-        let predicted = predict(&axis, self.lab, self.ticks, &offset).ok()?;
+    pub fn residuals(&self, logs: &Logs) -> Option<DVector<f64>> {
+        let predicted = predict(&applied(self.axis, logs), self.lab, self.ticks).ok()?;
         Some(self.compared(&predicted))
-    }
-
-    fn parts(&self, point: &Point) -> (Logs, Offset) {
-        let [stroke, a, b] = [COUNT, COUNT + 1, COUNT + 2].map(|i| point[i]);
-        let offset = Offset {
-            stroke_m: stroke * self.start.stroke_m,
-            pressure_pa: [a * self.start.pressure_pa[0], b * self.start.pressure_pa[1]],
-        };
-        (std::array::from_fn(|i| point[i]), offset)
-    }
-
-    fn limits(&self, index: usize) -> [f64; 2] {
-        self.limits.get(index).copied().unwrap_or(START_LIMITS)
     }
 
     fn compared(&self, predicted: &[Predicted]) -> DVector<f64> {
@@ -123,63 +84,56 @@ impl Problem<'_> {
         DVector::from_vec(all)
     }
 
-    /// How the residuals change with each of what is fitted; `None` where there is no such plant.
+    /// How the residuals change with each logarithm; `None` where there is no such plant.
     #[must_use]
-    pub fn jacobian(&self, point: &Point) -> Option<DMatrix<f64>> {
-        let columns = (0..ALL).map(|i| {
+    pub fn jacobian(&self, logs: &Logs) -> Option<DMatrix<f64>> {
+        let columns = (0..COUNT).map(|i| {
             let at = |by: f64| {
-                let mut moved = *point;
+                let mut moved = *logs;
                 moved[i] += by;
                 self.residuals(&moved)
             };
-            let [low, high] = self.limits(i);
+            let [low, high] = self.limits[i];
             if low >= high {
-                return Some(self.residuals(point)? * 0.0);
+                return Some(self.residuals(logs)? * 0.0);
             }
             // Within the limits on both sides.
-            let step = DIFFERENCE * if i < COUNT { 1.0 } else { START_STEP };
-            let up = step.min(high - point[i]).max(0.0);
-            let down = step.min(point[i] - low).max(0.0);
+            let up = DIFFERENCE.min(high - logs[i]).max(0.0);
+            let down = DIFFERENCE.min(logs[i] - low).max(0.0);
             Some((at(up)? - at(-down)?) / (up + down))
         });
         let columns: Vec<DVector<f64>> = columns.collect::<Option<_>>()?;
         Some(DMatrix::from_columns(&columns))
     }
 
-    fn at(&self, point: &Point, residuals: DVector<f64>) -> Fit {
-        let (logs, start) = self.parts(point);
-        Fit {
-            logs,
-            start,
-            point: *point,
-            cost: Self::cost(&residuals, point),
-            residuals,
-        }
-    }
-
-    fn cost(residuals: &DVector<f64>, point: &Point) -> f64 {
-        let trusted: f64 = (0..ALL).map(|i| (point[i] / trust(i)).powi(2)).sum();
+    fn cost(&self, residuals: &DVector<f64>, logs: &Logs) -> f64 {
+        let trusted: f64 = (0..COUNT).map(|i| (logs[i] / trust(i)).powi(2)).sum();
         0.5 * (residuals.norm_squared() + trusted)
     }
 
     /// The least cost from a start; `None` if there is no plant there. `go_on` ends it early.
     #[must_use]
-    pub fn fit(&self, start: &Point, go_on: &dyn Fn() -> bool) -> Option<Fit> {
-        let mut now = self.at(start, self.residuals(start)?);
+    pub fn fit(&self, start: &Logs, go_on: &dyn Fn() -> bool) -> Option<Fit> {
+        let residuals = self.residuals(start)?;
+        let mut now = Fit {
+            logs: *start,
+            cost: self.cost(&residuals, start),
+            residuals,
+        };
         let mut damping = 1e-3;
         for _ in 0..STEPS {
             if !go_on() {
                 break;
             }
-            let Some(jacobian) = self.jacobian(&now.point) else {
+            let Some(jacobian) = self.jacobian(&now.logs) else {
                 break;
             };
             let mut normal = jacobian.tr_mul(&jacobian);
             let mut gradient = jacobian.tr_mul(&now.residuals);
-            for i in 0..ALL {
+            for i in 0..COUNT {
                 let weight = trust(i).powi(-2);
                 normal[(i, i)] += weight;
-                gradient[i] += weight * now.point[i];
+                gradient[i] += weight * now.logs[i];
             }
             let before = now.cost;
             let mut better = None;
@@ -208,25 +162,21 @@ impl Problem<'_> {
         damping: f64,
     ) -> Option<Fit> {
         let mut damped = normal.clone();
-        for i in 0..ALL {
+        for i in 0..COUNT {
             damped[(i, i)] *= 1.0 + damping;
         }
         let step = damped.cholesky()?.solve(gradient);
-        let mut point = now.point;
-        for (i, by) in step.iter().enumerate() {
-            let [low, high] = self.limits(i);
-            point[i] = (point[i] - by).clamp(low, high);
+        let mut logs = now.logs;
+        for ((log, by), [low, high]) in logs.iter_mut().zip(&step).zip(self.limits) {
+            *log = (*log - by).clamp(low, high);
         }
-        let fit = self.at(&point, self.residuals(&point)?);
-        (fit.cost < now.cost).then_some(fit)
-    }
-}
-
-impl Fit {
-    /// Where it is.
-    #[must_use]
-    pub fn point(&self) -> &Point {
-        &self.point
+        let residuals = self.residuals(&logs)?;
+        let cost = self.cost(&residuals, &logs);
+        (cost < now.cost).then_some(Fit {
+            logs,
+            cost,
+            residuals,
+        })
     }
 }
 

@@ -26,10 +26,10 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
 use self::experiment::Experiment;
-use self::fit::{Fit, Noise, Point, Problem, point, scatter, trust};
-use self::free::{COUNT, FREE, applied};
+use self::fit::{Fit, Noise, Problem, scatter, trust};
+use self::free::{COUNT, FREE, Logs, applied};
 use self::lab::Lab;
-use self::predict::{Offset, Predicted, predict};
+use self::predict::{Predicted, predict};
 use self::told::Told;
 use crate::StudyError;
 use crate::study::schema::json;
@@ -39,8 +39,8 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 const STARTS: usize = 4;
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;
-/// A rest of the measurement that is missed by more than this many times the error that noise and
-/// fit let expect is not explained by the model.
+/// A rest of the measurement that is missed by more than this many times the sensor's noise is
+/// not explained by the model.
 const EXPLAINED: f64 = 3.0;
 
 /// The identified axis, below the folder of the results.
@@ -95,8 +95,6 @@ pub struct Identified {
     pub after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     pub noise_mm: f64,
-    /// Error that is expected of the rest: noise, and what is uncertain in the fit \[mm\].
-    pub expected_mm: f64,
     /// What the data cannot tell.
     pub untold: Vec<String>,
     /// Next experiments, the most telling first.
@@ -128,9 +126,7 @@ pub struct Summary<'a> {
     after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     noise_mm: f64,
-    /// Error that is expected of the rest: noise, and what is uncertain in the fit \[mm\].
-    expected_mm: f64,
-    /// Whether the rest of the measurement is met within three times what is expected of it.
+    /// Whether the rest of the measurement is met within three times the noise.
     explained: bool,
     /// What the data cannot tell.
     cannot_tell: &'a [String],
@@ -189,27 +185,15 @@ pub fn noise(axis: &AxisParams) -> Noise {
     }
 }
 
-/// Standard deviations of the start: of one sample, because a converter's steps do not average out.
-/// Pressures that nobody measured are the file's: a bench that was vented has the atmosphere's.
-#[must_use]
-pub fn start_deviation(lab: &Lab, noise: &Noise) -> Offset {
-    let measured = lab.samples.iter().any(|s| s.pressure_pa.is_some());
-    let pressure_pa = if measured { noise.pressure_pa } else { 0.0 };
-    Offset {
-        stroke_m: noise.position_m,
-        pressure_pa: [pressure_pa; 2],
-    }
-}
-
 /// Starts of the fit.
-fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Point> {
+fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut all = vec![point(&[0.0; COUNT])];
+    let mut all = vec![[0.0; COUNT]];
     all.extend((1..STARTS).map(|_| {
-        point(&std::array::from_fn(|i| {
+        std::array::from_fn(|i| {
             let [low, high] = limits[i];
             (trust(i) * rng.random_range(-1.0..1.0)).clamp(low, high)
-        }))
+        })
     }));
     all
 }
@@ -220,7 +204,7 @@ fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Point> {
 /// [`StudyError::Refused`] if the plant plays the measurement from no start.
 pub fn best(
     problem: &Problem<'_>,
-    starts: &[Point],
+    starts: &[Logs],
     progress: &Progress,
 ) -> Result<(Fit, Option<Stopped>), StudyError> {
     let go_on = || !progress.is_stopped();
@@ -253,27 +237,6 @@ fn variance(fit: &Fit, channels: usize) -> f64 {
     (0..channels).map(of).fold(1.0, f64::max)
 }
 
-/// Root mean square of the position's error that is expected in what the fit has not seen \[m\]:
-/// noise, and the fit's own uncertainty as it acts there.
-fn expected_m(problem: &Problem<'_>, fit: &Fit, covariance: Option<&DMatrix<f64>>) -> f64 {
-    let samples = &problem.lab.samples;
-    let whole = Problem {
-        ticks: problem.lab.on_us.len(),
-        ..*problem
-    };
-    let (Some(jacobian), Some(covariance)) = (whole.jacobian(fit.point()), covariance) else {
-        return problem.noise.position_m;
-    };
-    let channels = jacobian.nrows() / samples.len().max(1);
-    let rest = (0..samples.len()).filter(|k| samples[*k].tick >= problem.ticks);
-    let variances = rest.map(|k| {
-        let row = jacobian.row(channels * k);
-        (row * covariance).dot(&row)
-    });
-    let (count, sum) = variances.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
-    problem.noise.position_m * f64::sqrt(1.0 + sum / f64::max(count, 1.0))
-}
-
 fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
     let root = |fitted: bool| {
         let pairs = lab.samples.iter().zip(predicted);
@@ -300,8 +263,6 @@ pub struct Fitted {
     pub told: [Told; COUNT],
     /// Information of the data about the logarithms.
     pub information: DMatrix<f64>,
-    /// Covariance of all that is fitted, the start with it.
-    pub covariance: Option<DMatrix<f64>>,
     /// What stopped it before all starts were tried.
     pub stopped: Option<Stopped>,
 }
@@ -324,20 +285,18 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
         ..*problem
     };
     let go_on = || !progress.is_stopped();
-    let fit = second.fit(first.point(), &go_on).unwrap_or(first);
-    let jacobian = second.jacobian(fit.point()).ok_or_else(|| {
+    let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
+    let jacobian = second.jacobian(&fit.logs).ok_or_else(|| {
         StudyError::refused(
             "the plant leaves its range close to the best fit",
             "check the file's stroke, mass, load and supply against the bench",
         )
     })?;
-    let variance = variance(&fit, channels).max(1.0);
-    let information = told::information(&jacobian, variance);
+    let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
     Ok(Fitted {
         fit,
         told: told::told(&information),
         information,
-        covariance: told::covariance(&jacobian, variance),
         stopped,
     })
 }
@@ -357,28 +316,23 @@ impl Identified {
             lab: &lab,
             ticks,
             noise,
-            start: start_deviation(&lab, &noise),
             limits: free::limits(&config),
         };
         let Fitted {
             fit,
             told,
             information,
-            covariance,
             stopped,
         } = fitted(&problem, options.seed, progress)?;
-        let play = |axis: &AxisParams, start: &Offset| {
-            predict(axis, &lab, lab.on_us.len(), start).map_err(|e| {
+        let play = |axis: &AxisParams| {
+            predict(axis, &lab, lab.on_us.len()).map_err(|e| {
                 StudyError::refused(
                     format!("the plant cannot play the rest of the measurement: {e}"),
                     "check the file's stroke, mass, load and supply against the bench",
                 )
             })
         };
-        let played = [
-            play(axis, &Offset::default())?,
-            play(&applied(axis, &fit.logs), &fit.start)?,
-        ];
+        let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
         let parameters = FREE.iter().zip(&fit.logs).zip(&told);
         let parameters = parameters.map(|((free, log), told)| {
             let [low, high] = told.factors(*log);
@@ -396,10 +350,9 @@ impl Identified {
             parameters: parameters.collect(),
             before: misses(&lab, &played[0], ticks),
             after: misses(&lab, &played[1], ticks),
-            expected_mm: expected_m(&problem, &fit, covariance.as_ref()) * 1e3,
             noise_mm: noise.position_m * 1e3,
             untold: told::untold(&information),
-            experiments: experiment::ranked(&problem, fit.point(), &information, 1.0),
+            experiments: experiment::ranked(&problem, &fit.logs, &information, 1.0),
             ticks,
             fit,
             played,
@@ -413,7 +366,7 @@ impl Identified {
     /// Whether the rest of the measurement is met.
     #[must_use]
     pub fn is_explained(&self) -> bool {
-        self.after.held_out_mm <= EXPLAINED * self.expected_mm
+        self.after.held_out_mm <= EXPLAINED * self.noise_mm
     }
 
     /// The axis file with what was found.
@@ -467,7 +420,6 @@ impl Identified {
             before: self.before,
             after: self.after,
             noise_mm: self.noise_mm,
-            expected_mm: self.expected_mm,
             explained: self.is_explained(),
             cannot_tell: &self.untold,
             next_experiment: self.experiments.first().map(|e| e.name),

@@ -103,7 +103,7 @@ pub(super) fn render(
 ) -> Result<String, StudyError> {
     let told = identified.parameters.iter().filter(|p| p.told).count();
     let explained = if identified.is_explained() {
-        "the rest of the measurement is met within three times what noise and fit let expect"
+        "the rest of the measurement is met within three times the sensor's noise"
     } else {
         "the rest of the measurement is not met: the model lacks something that the bench has, such as a leak"
     };

@@ -14,18 +14,9 @@ pub struct Predicted {
     pub pressure_pa: [f64; 2],
 }
 
-/// How the start differs from what was measured of it.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Offset {
-    /// Of the stroke \[m\].
-    pub stroke_m: f64,
-    /// Of the pressures of A and B \[Pa\].
-    pub pressure_pa: [f64; 2],
-}
-
 /// How the piston stands before the first valve is driven: the mean of what was measured until
-/// then, so that the noise of one sample is not taken for the start; and what it differs from it.
-fn start(lab: &Lab, axis: &AxisParams, offset: &Offset) -> AxisParams {
+/// then, so that the noise of one sample is not taken for the start.
+fn start(lab: &Lab, axis: &AxisParams) -> AxisParams {
     let driven = lab.on_us.iter().position(|on| *on != [0; 4]);
     let until = driven.unwrap_or(0).min(1000);
     let still: Vec<&Sample> = lab.samples.iter().take_while(|s| s.tick <= until).collect();
@@ -33,15 +24,12 @@ fn start(lab: &Lab, axis: &AxisParams, offset: &Offset) -> AxisParams {
         still.iter().map(|sample| value(sample)).sum::<f64>() / still.len().max(1) as f64
     };
     let mut start = axis.clone();
-    let stroke_m = mean(&|s| s.position_m) + offset.stroke_m;
-    start.initial_stroke_m = stroke_m.clamp(0.0, axis.cylinder.stroke_m);
+    start.initial_stroke_m = mean(&|s| s.position_m).clamp(0.0, axis.cylinder.stroke_m);
     if still.iter().any(|s| s.pressure_pa.is_some()) {
         let of = |chamber: usize| mean(&|s| s.pressure_pa.map_or(0.0, |both| both[chamber]));
         start.cylinder.initial_pressure_a_pa = of(0);
         start.cylinder.initial_pressure_b_pa = of(1);
     }
-    start.cylinder.initial_pressure_a_pa += offset.pressure_pa[0];
-    start.cylinder.initial_pressure_b_pa += offset.pressure_pa[1];
     start
 }
 
@@ -53,9 +41,8 @@ pub(super) fn predict(
     axis: &AxisParams,
     lab: &Lab,
     ticks: usize,
-    offset: &Offset,
 ) -> Result<Vec<Predicted>, PlantError> {
-    let start = start(lab, axis, offset);
+    let start = start(lab, axis);
     let plant = Axis::new(&start)?;
     let mut state = plant.initial_state(0);
     let mut samples = lab.samples.iter().peekable();

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::fit::{ALL, Z95, trust};
+use super::fit::{Z95, trust};
 use super::free::{COUNT, FREE, Logs};
 
 /// A parameter is told if the data leave less than this share of the file's uncertainty.
@@ -27,34 +27,10 @@ impl Told {
     }
 }
 
-/// Information of data about the logarithms: J'J over the variance of a residual that counts, less
-/// what it takes to tell the start (Schur complement of the start's part).
+/// Information of data about the logarithms: J'J over the variance of a residual that counts.
 #[must_use]
 pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
-    let whole = jacobian.tr_mul(jacobian) / variance;
-    let factors = whole.view((0, 0), (COUNT, COUNT)).into_owned();
-    let between = whole.view((0, COUNT), (COUNT, ALL - COUNT)).into_owned();
-    let mut start = whole
-        .view((COUNT, COUNT), (ALL - COUNT, ALL - COUNT))
-        .into_owned();
-    for i in 0..ALL - COUNT {
-        start[(i, i)] += trust(COUNT + i).powi(-2);
-    }
-    match start.cholesky() {
-        Some(start) => factors - &between * start.solve(&between.transpose()),
-        None => factors,
-    }
-}
-
-/// Covariance of all that is fitted, under the data and what stood before them; `None` if a number
-/// of the Jacobian is none.
-#[must_use]
-pub fn covariance(jacobian: &DMatrix<f64>, variance: f64) -> Option<DMatrix<f64>> {
-    let mut whole = jacobian.tr_mul(jacobian) / variance;
-    for i in 0..ALL {
-        whole[(i, i)] += trust(i).powi(-2);
-    }
-    whole.cholesky().map(|c| c.inverse())
+    jacobian.tr_mul(jacobian) / variance
 }
 
 /// Deviations under the information of data and file.
