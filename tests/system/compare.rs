@@ -127,11 +127,11 @@ fn any_number_of_threads_writes_the_same_bytes() {
             "variation",
             "delays",
             "faults",
+            "seed",
         ] {
             assert!(row[text].is_string(), "{text}: {row:?}");
         }
         for number in [
-            "seed",
             "load_n",
             "mass_kg",
             "supply_bar_g",

@@ -6,9 +6,11 @@ use std::io;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
-use crate::model::{IDENTIFIER, Kind, Model};
+use crate::kind::Kind;
+use crate::model::{IDENTIFIER, Model};
 use crate::units::exponents;
-use crate::variable::{Role, ValueType, Variable};
+use crate::value::ValueType;
+use crate::variable::{Role, Variable};
 
 /// Version of the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

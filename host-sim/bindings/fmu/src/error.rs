@@ -7,7 +7,7 @@ use wheeleg_config::ConfigError;
 use wheeleg_plant::PlantError;
 use wheeleg_studies::axis_sim::suite::AxisSimError;
 
-use crate::variable::{Value, ValueType};
+use crate::value::{Value, ValueType};
 
 /// Why a unit cannot be made, or cannot go on.
 #[derive(Debug, thiserror::Error, Diagnostic)]

@@ -21,11 +21,14 @@ mod abi;
 pub mod archive;
 pub mod description;
 pub mod error;
+mod kind;
 pub mod model;
 mod simulation;
 mod unit;
 mod units;
+pub mod value;
 pub mod variable;
 
 pub use error::FmuError;
-pub use model::{Kind, Model};
+pub use kind::Kind;
+pub use model::Model;

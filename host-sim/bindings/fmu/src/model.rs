@@ -7,6 +7,7 @@ use wheeleg_config::AxisConfig;
 use wheeleg_studies::axis_sim;
 
 use crate::error::FmuError;
+use crate::kind::Kind;
 use crate::simulation::Simulation;
 use crate::variable::{self, Variable};
 
@@ -16,16 +17,6 @@ pub const IDENTIFIER: &str = "wheeleg";
 pub const AXIS_FILE: &str = "axis.toml";
 /// Name of the file beside it that says the rest.
 pub const UNIT_FILE: &str = "unit.json";
-
-/// What a unit holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The plant: the importer gives the on-times of the valves.
-    Plant,
-    /// The plant and the firmware of its joint board: the importer gives references.
-    Controlled,
-}
 
 /// What the resources say beside the axis file.
 #[derive(Debug, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
 use wheeleg_studies::axis_sim::{Action, AxisSim, Kind as Law, Node, design};
 
 use crate::error::FmuError;
-use crate::model::Kind;
+use crate::kind::Kind;
 
 /// What is seen after a tick.
 #[derive(Debug, Clone, Copy, Default)]

@@ -6,9 +6,11 @@ use wheeleg_config::axis::Change;
 use wheeleg_plant::axis::AxisState;
 
 use crate::error::FmuError;
-use crate::model::{Kind, Model};
+use crate::kind::Kind;
+use crate::model::Model;
 use crate::simulation::Simulation;
-use crate::variable::{Role, Value, ValueType, Variable};
+use crate::value::{Value, ValueType};
+use crate::variable::{Role, Variable};
 
 /// A tick \[s\].
 const TICK_S: f64 = 1e-3;

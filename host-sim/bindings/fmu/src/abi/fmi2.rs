@@ -7,7 +7,7 @@ use super::{Handle, Log, OK, Status, call, copy, places, text, values};
 use crate::error::FmuError;
 use crate::model::Model;
 use crate::unit::{Unit, count};
-use crate::variable::{Value, ValueType};
+use crate::value::{Value, ValueType};
 
 /// `fmi2CallbackLogger`.
 pub(super) type Logger =

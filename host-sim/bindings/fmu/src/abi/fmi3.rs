@@ -7,7 +7,7 @@ use super::{Handle, Log, OK, Status, call, copy, places, text, values};
 use crate::error::FmuError;
 use crate::model::Model;
 use crate::unit::{Unit, count};
-use crate::variable::{Value, ValueType};
+use crate::value::{Value, ValueType};
 
 /// `fmi3LogMessageCallback`.
 pub(super) type Logger = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
