@@ -159,6 +159,12 @@ impl Predictive {
         self.standstill.is_at_rest()
     }
 
+    /// Whether the next tick ends a period: it is the one with all the work.
+    #[must_use]
+    pub const fn plans(&self) -> bool {
+        self.turn + 1 >= PERIOD_TICKS
+    }
+
     /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the
     /// end of a period, once all is counted that somebody else has sent.
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {

@@ -2,7 +2,7 @@
 
 use wheeleg_config::Scenario;
 use wheeleg_fmu::FmuError;
-use wheeleg_fmu::variable::{Value, ValueType};
+use wheeleg_fmu::value::{Value, ValueType};
 use wheeleg_plant::PlantError;
 use wheeleg_studies::axis_sim::suite::AxisSimError;
 

@@ -92,6 +92,12 @@ impl JointController {
         }
     }
 
+    /// Whether the next tick has more work than others: the predictive law plans its period in it.
+    #[must_use]
+    pub fn plans(&self) -> bool {
+        self.predictive.as_ref().is_some_and(Predictive::plans)
+    }
+
     /// The predictive law's estimates, when it is chosen.
     #[must_use]
     pub const fn predictive(&self) -> Option<&Predictive> {

@@ -62,8 +62,11 @@ pub struct JointNode<V, S, W> {
     pub(super) state: TickState,
     /// Checksum of what only a request changes.
     fixed_seal: Checksum,
+    /// Whether the last tick left it to the next.
+    fixed_waits: bool,
     /// Checksum of what a tick changes.
     seal: Checksum,
+    target_seal: Checksum,
     pub(super) snapshot: JointSnapshot,
     pub(super) switches: Debounce<SWITCH_TICKS>,
     pub(super) valves: V,
@@ -127,7 +130,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
                 boot_ticks: Ticks::ZERO,
             },
             fixed_seal: Checksum::default(),
+            fixed_waits: false,
             seal: Checksum::default(),
+            target_seal: Checksum::default(),
             snapshot: JointSnapshot::at_boot(),
             switches: Debounce::new(),
             parameters,
@@ -205,7 +210,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         let overruns = self.core.supervisor.overrun().overruns();
 
         self.core.supervisor.begin_tick(now, &self.core.times);
-        if !self.is_intact() {
+        if !self.is_intact_now() {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.reset();
             self.controller.set_correction(self.settings.correction);
@@ -358,13 +363,17 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         })
     }
 
+    /// Checksum of the target, which a bus cycle changes without the rest.
+    fn aimed(&self) -> Checksum {
+        Checksum::made(|sum| self.target.hash(sum))
+    }
+
     /// Checksum of what shapes the outputs of the next tick and is changed by every tick.
     #[inline(never)]
     fn moving(&self) -> Checksum {
         Checksum::made(|sum| {
             self.state.hash(sum);
             self.monitor.hash(sum);
-            self.target.hash(sum);
             self.controller.state().hash(sum);
             self.pwm.state().hash(sum);
         })
@@ -373,11 +382,23 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Whether everything is as the last tick or request left it.
     #[inline(never)]
     fn is_intact(&self) -> bool {
-        self.seal == self.moving() && self.fixed_seal == self.fixed()
+        self.is_moving_intact() && self.fixed_seal == self.fixed()
+    }
+
+    /// The same at the begin of a tick. What only requests change waits for the next tick where the
+    /// law has its work in this one, and never for more than one.
+    fn is_intact_now(&mut self) -> bool {
+        self.fixed_waits = self.controller.plans() && !self.fixed_waits;
+        self.is_moving_intact() && (self.fixed_waits || self.fixed_seal == self.fixed())
+    }
+
+    fn is_moving_intact(&self) -> bool {
+        self.target_seal == self.aimed() && self.seal == self.moving()
     }
 
     #[inline]
     pub(super) fn reseal(&mut self) {
+        self.target_seal = self.aimed();
         self.seal = self.moving();
     }
 
@@ -396,6 +417,16 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.reseal_all();
         }
         result
+    }
+
+    /// Another target between two ticks. It has a seal of its own: a set-point comes in every bus cycle,
+    /// shortly before the reply of the first board is due. A damaged one keeps its broken seal.
+    pub(super) fn aim(&mut self, target: Target) {
+        let intact = self.target_seal == self.aimed();
+        self.target = target;
+        if intact {
+            self.target_seal = self.aimed();
+        }
     }
 
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {

@@ -44,13 +44,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             Some(setpoint) => {
                 // Refused unless armed: a set-point moves nothing by itself.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
-                    self.change(|node| node.target = Target::from_setpoint(&setpoint));
+                    self.aim(Target::from_setpoint(&setpoint));
                 }
             }
             None => {
                 let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
                 if withdrawn.is_ok() && was_tracking {
-                    self.change(|node| node.target = Target::at(node.state.reference.position));
+                    self.aim(Target::at(self.state.reference.position));
                 }
             }
         }
@@ -152,7 +152,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if reference < gains.stroke_min || reference > gains.stroke_max {
             return Err(NackReason::OutOfRange);
         }
-        self.change(|node| node.target = Target::at(reference));
+        self.aim(Target::at(reference));
         Ok(())
     }
 

@@ -360,6 +360,16 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         result
     }
 
+    /// Another target between two samples. Only what every sample changes is checked and sealed
+    /// anew, as on a joint board.
+    pub(super) fn aim(&mut self, target: Target) {
+        let intact = self.seal.holds(&self.moving());
+        self.target = target;
+        if intact {
+            self.reseal();
+        }
+    }
+
     pub(super) fn axis_fault(&mut self, fault: Fault, now: Micros) {
         self.core.axis_fault(fault, now);
     }

@@ -36,13 +36,13 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
             Some(setpoint) => {
                 // Refused unless armed: a set-point moves nothing by itself.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
-                    self.change(|node| node.target = Target::from_setpoint(&setpoint));
+                    self.aim(Target::from_setpoint(&setpoint));
                 }
             }
             None => {
                 let withdrawn = self.core.supervisor.apply(Event::SetpointWithdrawn, at);
                 if withdrawn.is_ok() && was_tracking {
-                    self.change(|node| node.target = Target::at(node.controller.command()));
+                    self.aim(Target::at(self.controller.command()));
                 }
             }
         }
@@ -82,7 +82,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
                     WheelControlMode::Position | WheelControlMode::Trapezoidal => {}
                     _ => return Err(NackReason::WrongMode),
                 }
-                self.change(|node| node.target = Target::at(command.position.get()));
+                self.aim(Target::at(command.position.get()));
             }
             Message::WheelVelocity(command) => {
                 self.check_motion(command.deadline_cycle)?;

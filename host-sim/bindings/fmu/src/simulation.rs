@@ -30,7 +30,7 @@ pub(crate) enum Simulation {
         /// The plant.
         axis: Box<Axis>,
         /// Its state.
-        state: AxisState,
+        state: Box<AxisState>,
         /// Reading of the converter after the last tick.
         code: u16,
     },
@@ -54,7 +54,7 @@ impl Simulation {
         Ok(match kind {
             Kind::Plant => {
                 let axis = Box::new(Axis::new(params)?);
-                let mut state = axis.initial_state(seed);
+                let mut state = Box::new(axis.initial_state(seed));
                 let code = axis.read_position(&mut state);
                 Self::Plant { axis, state, code }
             }
@@ -92,7 +92,7 @@ impl Simulation {
     /// What can be seen now.
     pub(crate) fn seen(&self) -> Seen {
         let (axis, state) = match self {
-            Self::Plant { axis, state, .. } => (&**axis, state),
+            Self::Plant { axis, state, .. } => (&**axis, &**state),
             Self::Controlled { bench, .. } => (bench.axis(), &bench.state),
         };
         let mut seen = Seen {

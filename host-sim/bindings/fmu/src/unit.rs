@@ -332,7 +332,7 @@ impl Unit {
             return Err(FmuError::Absent("a controlled unit's state as bytes"));
         }
         let plant = match &state.simulation {
-            Some(Simulation::Plant { state, code, .. }) => Some((state.clone(), *code)),
+            Some(Simulation::Plant { state, code, .. }) => Some((AxisState::clone(state), *code)),
             _ => None,
         };
         let written = Written {
@@ -381,7 +381,7 @@ impl Unit {
                 if plant.core.cylinders.len() != state.core.cylinders.len() {
                     return Err(wrong(&"they are not of one cylinder"));
                 }
-                (*state, *code) = (plant, reading);
+                (**state, *code) = (plant, reading);
             }
         }
         built.state.clock = written.clock;
