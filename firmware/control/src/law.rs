@@ -162,7 +162,7 @@ impl Predictive {
     /// Whether the next tick ends a period: it is the one with all the work.
     #[must_use]
     pub const fn plans(&self) -> bool {
-        self.turn + 1 >= PERIOD_TICKS
+        self.turn.saturating_add(1) >= PERIOD_TICKS
     }
 
     /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the

@@ -172,9 +172,10 @@ impl Server {
         };
         let name = live.robot.name.clone();
         let drawing = Drawing::of(&live.robot);
-        // The level floor needs no grid.
+        // The level floor needs no grid, and what real boards stand on nobody knows.
         let ground = &live.scenario.ground;
-        let relief = (!ground.parts.is_empty()).then(|| Relief::of(&ground.terrain));
+        let uneven = live.port.is_none() && !ground.parts.is_empty();
+        let relief = uneven.then(|| Relief::of(&ground.terrain));
         let robot_json = json!({
             "name": name,
             "drawing": drawing,

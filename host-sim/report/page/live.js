@@ -127,6 +127,7 @@ async function toggleSpace() {
   plan.classList.toggle("in-space", show);
   if (!show || space) return;
   const { view3d } = await import("./view3d.js");
+  if (space) return;
   space = view3d(drawing, relief);
   plan.prepend(space.root);
 }

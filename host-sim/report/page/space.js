@@ -179,10 +179,13 @@ let canvas = null;
 let paint = null;
 let waiting = false;
 
+const fail = (error) => self.postMessage({ failed: error instanceof Error ? error.message : String(error) });
 self.addEventListener("message", ({ data }) => {
   try {
     if (data.canvas) {
       canvas = data.canvas;
+      // A picture that no longer follows the robot must not look live.
+      data.canvas.addEventListener("webglcontextlost", () => fail("the graphics were lost; reload the page"));
       paint = painter(data.canvas, data.geometry, data.relief);
     }
     if (data.size && canvas) [canvas.width, canvas.height] = data.size;
@@ -191,9 +194,13 @@ self.addEventListener("message", ({ data }) => {
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      paint?.(told);
+      try {
+        paint?.(told);
+      } catch (error) {
+        fail(error);
+      }
     });
   } catch (error) {
-    self.postMessage({ failed: error instanceof Error ? error.message : String(error) });
+    fail(error);
   }
 });

@@ -16,6 +16,7 @@ export function view3d(geometry, relief) {
   const note = html("p", { class: "effect bad", role: "status", hidden: true });
   const root = html("div", { class: "space-box" }, canvas, note);
   const fail = (why) => {
+    canvas.hidden = true;
     note.hidden = false;
     say(note, `No view in space: ${why}.`);
   };
@@ -53,13 +54,15 @@ export function view3d(geometry, relief) {
     if (move.buttons & 1) look(-0.008 * move.movementX, 0.006 * move.movementY, 1);
   });
   canvas.addEventListener("wheel", (wheel) => {
+    if (wheel.ctrlKey) return;
     wheel.preventDefault();
     look(0, 0, Math.exp(0.001 * wheel.deltaY));
   }, { passive: false });
   const keys = { ArrowLeft: [0.1, 0, 1], ArrowRight: [-0.1, 0, 1], ArrowUp: [0, 0.08, 1], ArrowDown: [0, -0.08, 1], "+": [0, 0, 0.85], "-": [0, 0, 1.18] };
   canvas.addEventListener("keydown", (key) => {
     const step = keys[key.key];
-    if (!step) return;
+    // The browser's own zoom and history stay the browser's.
+    if (!step || key.ctrlKey || key.altKey || key.metaKey) return;
     key.preventDefault();
     look(step[0], step[1], step[2]);
   });

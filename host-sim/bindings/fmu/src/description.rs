@@ -21,6 +21,9 @@ pub enum Fmi {
     Three,
 }
 
+/// Categories of an instance's log.
+const LOG_CATEGORIES: [&str; 2] = ["logStatusError", "logStatusFatal"];
+
 type Xml = Writer<Vec<u8>>;
 type Attributes<'a> = Vec<(&'a str, &'a str)>;
 
@@ -54,6 +57,11 @@ pub fn write(model: &Model, fmi: Fmi) -> io::Result<Vec<u8>> {
         .write_inner_content(|xml| {
             co_simulation(xml, model, fmi)?;
             unit_definitions(xml, model)?;
+            xml.create_element("LogCategories")
+                .write_inner_content(|xml| {
+                    let mut names = LOG_CATEGORIES.iter();
+                    names.try_for_each(|name| empty(xml, "Category", &[("name", name)]))
+                })?;
             empty(
                 xml,
                 "DefaultExperiment",
@@ -99,8 +107,9 @@ fn co_simulation(xml: &mut Xml, model: &Model, fmi: Fmi) -> io::Result<()> {
         (state, "true"),
         (serialize, written),
     ];
-    if fmi == Fmi::Three {
-        attributes.push(("fixedInternalStepSize", "0.001"));
+    match fmi {
+        Fmi::Two => attributes.push(("canNotUseMemoryManagementFunctions", "true")),
+        Fmi::Three => attributes.push(("fixedInternalStepSize", "0.001")),
     }
     empty(xml, "CoSimulation", &attributes)
 }

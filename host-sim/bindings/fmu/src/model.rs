@@ -64,8 +64,13 @@ impl Model {
             config,
             token: String::new(),
         };
-        let hash = blake3::hash(format!("{}\n{text}", model.about()).as_bytes());
-        model.token = format!("{{{}}}", uuid(hash.as_bytes()));
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(format!("{}\n{text}", model.about()).as_bytes());
+        // A library with other variables is another model, whatever its version says.
+        for v in &model.variables {
+            hasher.update(format!("\n{} {} {}", v.name, v.unit, v.start).as_bytes());
+        }
+        model.token = format!("{{{}}}", uuid(hasher.finalize().as_bytes()));
         Ok(model)
     }
 

@@ -61,7 +61,7 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, StudyError> {
             let config = AxisConfig::load(&args.axis)?;
             let value = export::sequences(&config.name, &config.axis)
                 .map_err(|e| plant_error(&args.axis, &e))?;
-            write_new(&args.out, &format!("{value}\n"))?;
+            write_new(&args.out, format!("{value}\n"))?;
             Ok(ExitCode::SUCCESS)
         }
     }

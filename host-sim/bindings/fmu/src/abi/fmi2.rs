@@ -300,8 +300,7 @@ unsafe extern "C" fn fmi2DeSerializeFMUstate(
     // SAFETY: an instance of ours, bytes of the importer's, its place for a state.
     unsafe {
         call(instance, |unit| {
-            super::put(state, unit.deserialize(values(bytes, size))?);
-            Ok(())
+            super::put(state, unit.deserialize(values(bytes, size))?)
         })
     }
 }

@@ -180,7 +180,9 @@ macro_rules! accessors {
 accessors! {
     fmi3GetFloat64, fmi3SetFloat64: f64, ValueType::Real, |v| v.number(), Value::Real;
     fmi3GetInt32, fmi3SetInt32: i32, ValueType::Integer, |v| v.number() as i32, Value::Integer;
-    fmi3GetBoolean, fmi3SetBoolean: bool, ValueType::Boolean, |v| v.number() != 0.0, Value::Boolean;
+    // A byte of the importer's need not be 0 or 1.
+    fmi3GetBoolean, fmi3SetBoolean: u8, ValueType::Boolean,
+        |v| u8::from(v.number() != 0.0), |v: u8| Value::Boolean(v != 0);
 }
 
 /// Types that no variable has: to read or set none of them is allowed.
@@ -292,8 +294,7 @@ unsafe extern "C" fn fmi3DeserializeFMUState(
     // SAFETY: an instance of ours, bytes of the importer's, its place for a state.
     unsafe {
         call(instance, |unit| {
-            super::put(state, unit.deserialize(values(bytes, size))?);
-            Ok(())
+            super::put(state, unit.deserialize(values(bytes, size))?)
         })
     }
 }

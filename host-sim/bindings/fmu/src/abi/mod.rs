@@ -22,6 +22,10 @@ const OK: Status = 0;
 const ERROR: Status = 3;
 const FATAL: Status = 4;
 
+/// Categories of the log, which the description lists.
+const ERRORS: &CStr = c"logStatusError";
+const FATALS: &CStr = c"logStatusFatal";
+
 /// An instance, or a state of one, as the importer holds it.
 type Handle = *mut c_void;
 
@@ -40,9 +44,14 @@ enum Log {
 
 impl Log {
     fn say(&self, status: Status, text: &str) {
+        // FMI 2 has references to variables between number signs; a doubled one is itself.
+        let text = match self {
+            Self::Two { .. } => text.replace('#', "##"),
+            Self::Three { .. } => text.to_owned(),
+        };
         // A null in a text would end it.
         let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-        let category: &CStr = c"logStatusError";
+        let category = if status == FATAL { FATALS } else { ERRORS };
         match self {
             Self::Two {
                 callback: Some(callback),
@@ -81,10 +90,10 @@ struct Instance {
 
 /// Makes an instance; null if it cannot be, with the reason in the log.
 fn instantiate(log: Log, make: impl FnOnce() -> Result<Unit, FmuError>) -> Handle {
-    match catch_unwind(AssertUnwindSafe(make)) {
+    match catch_unwind(AssertUnwindSafe(|| make().map_err(|e| plain_text(&e)))) {
         Ok(Ok(unit)) => Box::into_raw(Box::new(Instance { unit, log })).cast(),
         Ok(Err(error)) => {
-            log.say(ERROR, &plain_text(&error));
+            log.say(ERROR, &error);
             std::ptr::null_mut()
         }
         Err(_) => {
@@ -105,10 +114,11 @@ unsafe fn call(instance: Handle, work: impl FnOnce(&mut Unit) -> Result<(), FmuE
     let Some(instance) = (unsafe { instance.cast::<Instance>().as_mut() }) else {
         return ERROR;
     };
-    match catch_unwind(AssertUnwindSafe(|| work(&mut instance.unit))) {
+    let work = || work(&mut instance.unit).map_err(|e| plain_text(&e));
+    match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => OK,
         Ok(Err(error)) => {
-            instance.log.say(ERROR, &plain_text(&error));
+            instance.log.say(ERROR, &error);
             ERROR
         }
         Err(_) => {
@@ -137,22 +147,22 @@ unsafe fn get_state(instance: Handle, state: *mut Handle) -> Status {
     // SAFETY: see above.
     unsafe {
         call(instance, |unit| {
-            put(state, unit.state());
-            Ok(())
+            let taken = unit.state();
+            free_state(state);
+            put(state, taken)
         })
     }
 }
 
-/// Puts a state in the place of what a handle holds.
-fn put(place: *mut Handle, state: State) {
+/// Puts a state into the importer's place for a handle; what is there is not looked at.
+fn put(place: *mut Handle, state: State) -> Result<(), FmuError> {
     if place.is_null() {
-        return;
+        return Err(FmuError::State("there is no place for it".to_owned()));
     }
-    // SAFETY: the importer's place for a handle, which is null or holds a state of ours.
-    unsafe {
-        free_state(place);
-        *place = Box::into_raw(Box::new(state)).cast();
-    }
+    let handle = Box::into_raw(Box::new(state)).cast();
+    // SAFETY: the importer's place for a handle.
+    unsafe { place.write(handle) };
+    Ok(())
 }
 
 /// # Safety
@@ -190,7 +200,7 @@ unsafe fn with_state(
 /// # Safety
 /// `values` is null or points to `count` values.
 unsafe fn values<'a, T>(values: *const T, count: usize) -> &'a [T] {
-    if values.is_null() {
+    if values.is_null() || count == 0 {
         &[]
     } else {
         // SAFETY: see above.
@@ -203,7 +213,7 @@ unsafe fn values<'a, T>(values: *const T, count: usize) -> &'a [T] {
 /// # Safety
 /// As [`values`], and nothing else refers to them.
 unsafe fn places<'a, T>(values: *mut T, count: usize) -> &'a mut [T] {
-    if values.is_null() {
+    if values.is_null() || count == 0 {
         &mut []
     } else {
         // SAFETY: see above.
