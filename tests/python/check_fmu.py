@@ -232,6 +232,16 @@ def main():
         [program, "export", "fmu", "no-such-axis", "--out", folder / "x.fmu"], capture_output=True
     )
     assert refused_axis.returncode == 2 and not (folder / "x.fmu").exists(), refused_axis
+    text = folder / "text.so"
+    text.write_text("no library: fmi2Instantiate")
+    for wrong in (text, "/dev/zero", folder, "/no/such.so"):
+        done = subprocess.run(
+            [program, "export", "fmu", AXIS, "--library", wrong, "--out", folder / "y.fmu"],
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 2 and "shared library" in done.stderr, (wrong, done)
+        assert not (folder / "y.fmu").exists(), wrong
     print("fmu: " + "; ".join(figures))
 
 

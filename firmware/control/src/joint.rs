@@ -34,7 +34,7 @@
 //! The other laws of [`Law`] share the input, the rest detection and the shaping
 //! of the duty: on/off, P and PID replace Kp e + correction; the sliding law
 //! replaces the duty by one of seven valve modes. The predictive law
-//! ([`crate::axis`]) shares the input alone and times each pulse itself.
+//! ([`crate::law`]) shares the input alone and times each pulse itself.
 
 mod config;
 mod controller;

@@ -50,7 +50,7 @@ tuning! {
     AMBIENT_PA: u64 = 101_325, "Pa", "ASSUMED: sea level", "coefficients_are_those_of_the_formulas";
     EXPONENT_PERCENT: u64 = 120, "polytropic exponent n, × 100", "ASSUMED: between isothermal and adiabatic, usual for small cylinders", "what_somebody_else_sends_is_counted_once";
     PRESSURE_MAX: i32 = (1 << 29) - 1, "1/256 Pa (2.1 MPa)", "format: products with it fit", "extreme_inputs_never_panic_and_stay_in_range";
-    CHAMBER_LENGTH_MIN: i32 = 4 << 8, "1/256 mm (4 mm)", "a line alone is longer; keeps n/L in its format", "a_chamber_is_never_shorter_than_its_line";
+    CHAMBER_LENGTH_MIN: i32 = 4 << 8, "1/256 mm (4 mm)", "keeps n/L in its format; the lines of small bores alone are longer", "a_chamber_is_never_shorter_than_its_line";
 
     // Observer: motion and load.
     MEMORY: u64 = 28_400, "θ, × 2^16 (0.433)", "searched", "coefficients_are_those_of_the_formulas";
@@ -67,7 +67,7 @@ tuning! {
     // Observer: mass.
     LEARN_PERIODS_MAX: u16 = 250, "periods (1 s)", "format: the impulse fits", "what_tells_nothing_is_left";
     LEARN_PERIODS_MIN: u16 = 20, "periods (80 ms)", "with fewer the noise of the speed counts", "what_tells_nothing_is_left";
-    LEARN_SLIDES: i32 = 20 << 16, "raw mm/s (20 mm/s)", "friction has its sliding value from there on", "a_move_begins_and_ends_with_sliding";
+    LEARN_SLIDES: i32 = 20 << 16, "raw mm/s (20 mm/s)", "usual Stribeck speed: from there on friction nears its sliding value", "a_move_begins_and_ends_with_sliding";
     LEARN_PEAK_SPEED: i32 = 200 << 16, "raw mm/s (200 mm/s)", "a slower move has little impulse of its mass", "what_tells_nothing_is_left";
     LEARN_PEAK_ABOVE: i32 = 100 << 16, "raw mm/s (100 mm/s)", "the same, above the line from begin to end", "what_tells_nothing_is_left";
     MASS_LEARNT_MOST: i32 = 12, "times the mass told", "a payload adds to it", "what_cannot_be_is_bounded";
@@ -104,7 +104,7 @@ tuning! {
     PATIENCE: u16 = 100, "periods (0.4 s)", "most moves are at rest after 0.3 s", "patience_widens_the_band_and_waits_for_a_swing";
     WIDENS_AFTER: i32 = 120, "periods (0.48 s)", "a pause and a swing are over", "patience_widens_the_band_and_waits_for_a_swing";
     WIDENS_SHIFT: u32 = 7, "log2 of periods (0.51 s)", "by one band in so long", "patience_widens_the_band_and_waits_for_a_swing";
-    BAND_WIDEST: i32 = mm(40), "raw mm (0.4 mm)", "the bar of the bench is 0.5 mm", "patience_widens_the_band_and_waits_for_a_swing";
+    BAND_WIDEST: i32 = mm(40), "raw mm (0.4 mm)", "the bar of the bench is 0.5 mm", "a_wide_band_is_released_within_the_bar";
     RELEASE_SIXTEENTHS: i32 = 16, "sixteenths of the band beyond it", "searched", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
     RELEASE_WIDEST: i32 = mm(45), "raw mm (0.45 mm)", "the bar of the bench is 0.5 mm", "a_wide_band_is_released_within_the_bar";
     RELEASE_PERIODS: u16 = 5, "periods (20 ms)", "one swing of noise is shorter", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";

@@ -117,8 +117,11 @@ pub(super) fn driven() -> Vec<Driven> {
         ),
         (
             "FmuError::Library",
-            FmuError::Library { path: path() },
-            vec!["a/file"],
+            FmuError::Library {
+                path: path(),
+                reason: "it is not a file".into(),
+            },
+            vec!["a/file", "not a file"],
         ),
     ];
     list.into_iter()

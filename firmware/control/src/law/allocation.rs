@@ -5,9 +5,9 @@
 //! pB = (pA AA − pa (AA − AB) − F) / AB          each limited to what valves can make; the other makes up for it
 //! ```
 //!
-//! About the mean pressure both chambers can change fastest either way, and the axis is stiffest. (Two
-//! actuators and one force: the split is a choice. Symmetric about a mean is the usual one, e.g. Shen and
-//! Goldfarb 2007.)
+//! Two actuators and one force: the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
+//! Goldfarb 2007); about the mean of supply and atmosphere both chambers have as far to go up as down. It is
+//! neither the stiffest level, which is the highest, nor the one at which filling and venting are equally fast.
 //!
 //! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in one from an end
 //! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls:

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! e  = r + v_r T − x'                      v* = v_r + curve(e)        primes: at the end of the dead time
-//! a* = k(e) (v_r − v') + D (v* − v')       limited to 5/2 b           k: slope of the curve, D: damping
+//! a* = k(e) (v_r − v') + D (v* − v')       limited to 5/2 b           b: brake of the mass; k: slope of the curve, D: damping
 //! F* = m a* + Fc sgn + d v* + ramp − load
 //! ```
 //!
@@ -11,7 +11,8 @@
 //! is faded out where the piston does not come to rest: more than there is makes a relay. A piston
 //! that sticks outside its band is pushed with a growing force until it slips, [`BreakawayRamp`].
 //!
-//! What it learns: the load by the observer, the break-away force by the ramp. Coulomb friction is as told.
+//! What it learns: the load by the observer. The ramp is an integral that is forgotten with each new target.
+//! Coulomb friction is as told.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and
 //! [`ForceDemand::force`].

@@ -15,7 +15,7 @@
 //! A reference that runs away from a piston that has not begun to move asks for a speed that no
 //! valve gives: the piston then overshoots (Gilbert and Kolmanovsky's governor in its simplest
 //! form: only the pace is held back, never the target). A piston that is stuck holds the
-//! reference at most 3 ℓ ahead of itself (2 ℓ and the way of braking): whoever watches the piston must compare it with the
+//! reference less than 4 ℓ ahead of itself (2 ℓ and the way of braking: 3.2 ℓ at 350 mm/s, 1500 mm/s² and 4 mm): whoever watches the piston must compare it with the
 //! command.
 
 use crate::math::square_root;

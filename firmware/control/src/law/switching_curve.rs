@@ -8,7 +8,7 @@
 //!
 //! The parabola is the time-optimal curve of a mass that brakes with `b`; the straight line at its foot
 //! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
-//! serves 1 and 400 mm. Gains scale with the dead time and fall with the cube root of what the mass exceeds
+//! serves 1 and 400 mm. Gains scale with the inverse of the dead time and fall with the cube root of what the mass exceeds
 //! the axis's nimble mass by: slope and damping once, the deceleration twice.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].

@@ -43,26 +43,41 @@ pub fn library_beside_program() -> PathBuf {
     program.with_file_name(LIBRARY)
 }
 
+/// The shared library: a file for this computer with both interfaces in it.
+fn read(library: &Path) -> Result<Vec<u8>, FmuError> {
+    let no = |reason: String| FmuError::Library {
+        path: library.to_owned(),
+        reason,
+    };
+    // A device may have no end, a pipe no writer.
+    let about = std::fs::metadata(library).map_err(|e| no(e.to_string()))?;
+    if !about.is_file() {
+        return Err(no("it is not a file".to_owned()));
+    }
+    let code = std::fs::read(library).map_err(|e| no(e.to_string()))?;
+    let head: &[u8] = match std::env::consts::OS {
+        "windows" => b"MZ",
+        "macos" => &[0xCF, 0xFA, 0xED, 0xFE],
+        _ => b"\x7fELF",
+    };
+    let has = |name: &str| code.windows(name.len()).any(|at| at == name.as_bytes());
+    if !code.starts_with(head) {
+        return Err(no("it is no program code for this computer".to_owned()));
+    }
+    if !(has("fmi2Instantiate") && has("fmi3InstantiateCoSimulation")) {
+        return Err(no("it lacks the functions of FMI".to_owned()));
+    }
+    Ok(code)
+}
+
 /// The unit of a model, with a shared library, as bytes. The same model and library give the same
 /// bytes.
 ///
 /// # Errors
-/// [`FmuError::Library`] if there is no such library, [`FmuError::Archive`] if it cannot be read.
+/// [`FmuError::Library`] if it is not there or another file, [`FmuError::Archive`] if the unit cannot
+/// be packed.
 pub fn pack(model: &Model, fmi: Fmi, library: &Path) -> Result<Vec<u8>, FmuError> {
-    let code = match std::fs::read(library) {
-        Ok(code) => code,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err(FmuError::Library {
-                path: library.to_owned(),
-            });
-        }
-        Err(e) => {
-            return Err(FmuError::Archive {
-                path: library.to_owned(),
-                reason: e.to_string(),
-            });
-        }
-    };
+    let code = read(library)?;
     let packed = || -> io::Result<Vec<u8>> {
         let files = [
             (

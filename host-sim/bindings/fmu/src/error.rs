@@ -169,8 +169,8 @@ pub enum FmuError {
         /// What the system said.
         reason: String,
     },
-    /// The shared library is not there.
-    #[error("there is no shared library {}", path.display())]
+    /// The shared library is not there, or is another file.
+    #[error("{} is not the units' shared library: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::fmu::library),
         help("build it, `cargo build --release -p wheeleg-fmu`, or name it with --library")
@@ -178,5 +178,7 @@ pub enum FmuError {
     Library {
         /// Where it was looked for.
         path: PathBuf,
+        /// Why not.
+        reason: String,
     },
 }

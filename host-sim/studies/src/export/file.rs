@@ -31,7 +31,8 @@ pub fn write_new(path: &Path, content: impl AsRef<[u8]>) -> Result<(), StudyErro
     if path.is_file() && std::fs::read(path).is_ok_and(|old| old == content) {
         return Ok(());
     }
-    // A device or a pipe is written to, not moved away.
+    refuse_pipe(path)?;
+    // A device is written to, not moved away.
     if path.exists() && !path.is_file() && !path.is_dir() {
         return std::fs::write(path, content)
             .map_err(|e| StudyError::output("write the file", path, e));
@@ -44,11 +45,29 @@ pub fn write_new(path: &Path, content: impl AsRef<[u8]>) -> Result<(), StudyErro
     })
 }
 
+/// Refuses a pipe as an output: without a reader it would be waited for, deaf to the first signal.
+/// Standard output by the name of its device is no pipe of its own.
+fn refuse_pipe(path: &Path) -> Result<(), StudyError> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        let about = std::fs::symlink_metadata(path);
+        if about.is_ok_and(|about| about.file_type().is_fifo()) {
+            let reason = std::io::Error::other("it is a pipe; name a file");
+            return Err(StudyError::output("write the file", path, reason));
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
+}
+
 /// Makes room for a file: one of the same name is set aside, a missing folder is created.
 ///
 /// # Errors
 /// [`StudyError::Report`] with the path if it is a folder or a device, or cannot be moved or made.
 pub fn make_room(path: &Path) -> Result<(), StudyError> {
+    refuse_pipe(path)?;
     let kind = match std::fs::metadata(path) {
         Err(_) => None,
         Ok(about) if about.is_dir() => Some(std::io::ErrorKind::IsADirectory.into()),
@@ -96,6 +115,11 @@ mod tests {
             write_new(Path::new("/dev/null"), "x").expect("a device takes it");
             let full = write_new(Path::new("/dev/full"), "x").expect_err("full");
             assert!(full.to_string().contains("/dev/full"), "{full}");
+            let pipe = temporary.path().join("pipe");
+            let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+            assert!(made.expect("mkfifo").success());
+            let refused = write_new(&pipe, "x").expect_err("nobody reads it");
+            assert!(refused.to_string().contains("pipe"), "{refused}");
             assert!(Path::new("/dev/full").exists() && !Path::new("/dev/null.previous").exists());
         }
         let error = write_new(temporary.path(), "x").expect_err("a folder");

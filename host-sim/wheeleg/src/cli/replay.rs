@@ -1,7 +1,7 @@
 //! `wheeleg replay`: a recorded live session, once more.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -29,11 +29,32 @@ pub(super) struct ReplayArgs {
     json: bool,
 }
 
+/// Refuses a log in the folder of the recording: what stands there is what is repeated.
+fn outside(log: &Path, recording: &Path) -> Result<(), StudyError> {
+    let folder = log.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let place = std::fs::canonicalize(folder.unwrap_or(Path::new(".")));
+    let (Ok(place), Ok(recording)) = (place, std::fs::canonicalize(recording)) else {
+        // Whichever is not there is told by who needs it.
+        return Ok(());
+    };
+    if place.starts_with(&recording) {
+        return Err(StudyError::refused(
+            format!(
+                "the log {} would stand in the recording itself",
+                log.display()
+            ),
+            "name a place outside of the recording with --log",
+        ));
+    }
+    Ok(())
+}
+
 /// Repeats and compares.
 pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let progress = Progress::new("replay", stop.clone());
     if let Some(log) = &args.log {
+        outside(log, &args.folder)?;
         make_room(log)?;
     }
     let mut begun = false;
