@@ -53,7 +53,7 @@ fn refuse_pipe(path: &Path) -> Result<(), StudyError> {
         use std::os::unix::fs::FileTypeExt as _;
         let about = std::fs::symlink_metadata(path);
         if about.is_ok_and(|about| about.file_type().is_fifo()) {
-            let reason = std::io::Error::other("it is a pipe; name a file");
+            let reason = std::io::Error::other("it is a pipe, not a file");
             return Err(StudyError::output("write the file", path, reason));
         }
     }
