@@ -115,10 +115,10 @@ def export(program, library, folder, kind, fmi, axis=AXIS):
 def valves(tick):
     """On-times of the four valves, µs: out, rest, back."""
     if tick < 300:
-        return [900, 0, 0, 1000]
+        return [1000, 0, 0, 1000]
     if tick < 600:
         return [0, 0, 0, 0]
-    return [0, 1000, 700, 0]
+    return [0, 1000, 1000, 0]
 
 
 NAMES = ["fill_a_us", "vent_a_us", "fill_b_us", "vent_b_us"]
@@ -143,7 +143,7 @@ def plant(archive, folder, messages):
             saved = slave.state()
         slave.step(k)
         # Two instances do not touch each other.
-        other.set(fill_b_us=500.0)
+        other.set(fill_b_us=500.0, load_n=20.0)
         other.step(k)
         for name in columns:
             got, want = slave.get(name), expected[name][k]
