@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::process::{cargo, command, figures, root, run, target_dir};
+use crate::process::{command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -43,7 +43,9 @@ pub(crate) fn steps(report: &mut Report) {
         Ok(())
     });
     report.step("fmu: units in FMPy, equal to the package", || {
-        run(cargo().args(["build", "--locked", "--release", "--package", "wheeleg-fmu"]))?;
+        // The program links this crate, and cargo builds all its kinds for that. To build it alone would
+        // build what it needs a second time, with other features.
+        rust::build(&["--bin", "wheeleg"])?;
         let folder = target_dir().join("xtask").join("fmu");
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
@@ -53,7 +55,7 @@ pub(crate) fn steps(report: &mut Report) {
             command(&python)
                 .arg("tests/python/check_fmu.py")
                 .arg(&wheeleg)
-                .arg(target_dir().join("release").join("libwheeleg_fmu.so"))
+                .arg(target_dir().join("release/deps/libwheeleg_fmu.so"))
                 .arg(&folder),
             |line| line.starts_with("fmu: "),
         )?;

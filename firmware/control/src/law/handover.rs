@@ -56,7 +56,7 @@ impl Predictive {
             self.observer.start_at(self.measured);
             self.standstill = Standstill::at(self.measured);
         }
-        self.turn.wrapping_add(1) >= PERIOD_TICKS
+        self.plans()
     }
 
     /// To the next tick.

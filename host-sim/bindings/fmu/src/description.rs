@@ -1,6 +1,7 @@
 //! `modelDescription.xml` of FMI 2.0.4 and 3.0.1.
 
 use std::collections::BTreeMap;
+use std::ffi::CStr;
 use std::io;
 
 use quick_xml::Writer;
@@ -22,7 +23,8 @@ pub enum Fmi {
 }
 
 /// Categories of an instance's log.
-const LOG_CATEGORIES: [&str; 2] = ["logStatusError", "logStatusFatal"];
+pub(crate) const LOG_ERROR: &CStr = c"logStatusError";
+pub(crate) const LOG_FATAL: &CStr = c"logStatusFatal";
 
 type Xml = Writer<Vec<u8>>;
 type Attributes<'a> = Vec<(&'a str, &'a str)>;
@@ -59,8 +61,10 @@ pub fn write(model: &Model, fmi: Fmi) -> io::Result<Vec<u8>> {
             unit_definitions(xml, model)?;
             xml.create_element("LogCategories")
                 .write_inner_content(|xml| {
-                    let mut names = LOG_CATEGORIES.iter();
-                    names.try_for_each(|name| empty(xml, "Category", &[("name", name)]))
+                    let mut names = [LOG_ERROR, LOG_FATAL].into_iter();
+                    names.try_for_each(|name| {
+                        empty(xml, "Category", &[("name", &*name.to_string_lossy())])
+                    })
                 })?;
             empty(
                 xml,
@@ -142,8 +146,8 @@ fn nature(
     match (variable.role, of) {
         (Role::Time, _) => ("independent", "continuous", None),
         (Role::Seed | Role::Parameter { .. }, _) => ("parameter", "fixed", Some("exact")),
-        (Role::Input(_), ValueType::Real) => ("input", "continuous", None),
-        (Role::Input(_), _) => ("input", "discrete", None),
+        (Role::Input, ValueType::Real) => ("input", "continuous", None),
+        (Role::Input, _) => ("input", "discrete", None),
         (Role::Output(_), ValueType::Real) => ("output", "continuous", Some("calculated")),
         (Role::Output(_), _) => ("output", "discrete", Some("calculated")),
     }

@@ -72,8 +72,21 @@ pub(crate) struct State {
 pub(crate) struct Unit {
     model: Model,
     state: State,
-    /// Inputs of the next tick, in the order of their list.
-    inputs: Vec<f64>,
+}
+
+impl State {
+    /// That of an instance that was just made.
+    fn first(model: &Model) -> Self {
+        Self {
+            clock: Clock {
+                phase: Phase::Instantiated,
+                start_s: 0.0,
+                ticks: 0,
+                values: model.variables.iter().map(|v| v.start).collect(),
+            },
+            simulation: None,
+        }
+    }
 }
 
 impl Unit {
@@ -85,44 +98,22 @@ impl Unit {
                 expected: model.token,
             });
         }
-        let mut unit = Self {
-            state: State {
-                clock: Clock {
-                    phase: Phase::Instantiated,
-                    start_s: 0.0,
-                    ticks: 0,
-                    values: model.variables.iter().map(|v| v.start).collect(),
-                },
-                simulation: None,
-            },
+        Ok(Self {
+            state: State::first(&model),
             model,
-            inputs: Vec::new(),
-        };
-        unit.reset();
-        Ok(unit)
+        })
     }
 
     /// As it was when it was instantiated.
     pub(crate) fn reset(&mut self) {
-        self.state = State {
-            clock: Clock {
-                phase: Phase::Instantiated,
-                start_s: 0.0,
-                ticks: 0,
-                values: self.model.variables.iter().map(|v| v.start).collect(),
-            },
-            simulation: None,
-        };
-        self.take_inputs();
+        self.state = State::first(&self.model);
     }
 
-    fn take_inputs(&mut self) {
-        let values = self.state.clock.values.iter();
-        let inputs = self.model.variables.iter().zip(values);
-        self.inputs = inputs
-            .filter(|(variable, _)| matches!(variable.role, Role::Input(_)))
-            .map(|(_, value)| value.number())
-            .collect();
+    /// Inputs, in the order of their list.
+    fn inputs(&self) -> Vec<f64> {
+        let variables = self.model.variables.iter().zip(&self.state.clock.values);
+        let inputs = variables.filter(|(v, _)| matches!(v.role, Role::Input));
+        inputs.map(|(_, value)| value.number()).collect()
     }
 
     fn expect(&self, phase: Phase, call: &'static str) -> Result<(), FmuError> {
@@ -176,13 +167,10 @@ impl Unit {
     }
 
     fn seed(&self) -> u64 {
-        let variables = self.model.variables.iter().zip(&self.state.clock.values);
-        let seeds = variables.filter(|(v, _)| matches!(v.role, Role::Seed));
+        let mut variables = self.model.variables.iter().zip(&self.state.clock.values);
+        let seed = variables.find(|(v, _)| matches!(v.role, Role::Seed));
         // Its range is checked.
-        seeds
-            .map(|(_, value)| value.number() as u64)
-            .next()
-            .unwrap_or_default()
+        seed.map_or(0, |(_, value)| value.number() as u64)
     }
 
     /// Parameters that differ from the axis file, whole lists of those that have several values.
@@ -234,7 +222,7 @@ impl Unit {
                 Role::Seed | Role::Parameter { .. } if phase == Phase::Running => {
                     return Err(fixed(" while it runs"));
                 }
-                Role::Seed | Role::Parameter { .. } | Role::Input(_) => {}
+                Role::Seed | Role::Parameter { .. } | Role::Input => {}
             }
             let number = value.number();
             if let Some([min, max]) = variable.range
@@ -254,7 +242,6 @@ impl Unit {
         for (index, value) in checked {
             self.state.clock.values[index] = value;
         }
-        self.take_inputs();
         Ok(())
     }
 
@@ -275,9 +262,7 @@ impl Unit {
             Ok(match variable.role {
                 Role::Time => Value::Real(self.time_s()),
                 Role::Output(value) => seen.as_ref().map_or(variable.start, value),
-                Role::Seed | Role::Parameter { .. } | Role::Input(_) => {
-                    self.state.clock.values[index]
-                }
+                Role::Seed | Role::Parameter { .. } | Role::Input => self.state.clock.values[index],
             })
         };
         references.iter().map(one).collect()
@@ -305,12 +290,13 @@ impl Unit {
         if !(whole && (1.0..=MAX_TICKS).contains(&ticks)) {
             return Err(FmuError::Step { step_s });
         }
+        let inputs = self.inputs();
         let Some(simulation) = &mut self.state.simulation else {
             let (call, when) = ("a step", "without a plant");
             return Err(FmuError::Order { call, when });
         };
         for _ in 0..ticks as u64 {
-            if let Err(error) = simulation.tick(&self.inputs) {
+            if let Err(error) = simulation.tick(&inputs) {
                 self.state.clock.phase = Phase::Ended;
                 return Err(error);
             }
@@ -334,7 +320,6 @@ impl Unit {
     /// Puts a state back.
     pub(crate) fn restore(&mut self, state: &State) {
         self.state = state.clone();
-        self.take_inputs();
     }
 
     /// A state as bytes; a board's has no written form.
@@ -387,7 +372,6 @@ impl Unit {
                 },
                 simulation: None,
             },
-            inputs: Vec::new(),
         };
         if let Some((plant, reading)) = written.plant {
             built.exit_initialization()?;

@@ -22,8 +22,8 @@ pub enum Role {
         /// Component, 0 of a scalar.
         component: usize,
     },
-    /// Set before each step: index in the list of inputs.
-    Input(usize),
+    /// Set before each step.
+    Input,
     /// Read.
     Output(fn(&Seen) -> Value),
 }
@@ -281,18 +281,18 @@ pub(crate) fn list(kind: Kind, axis: &AxisConfig) -> Vec<Variable> {
             range: Some([0.0, f64::from(i32::MAX)]),
         },
     ];
-    let rows = inputs(kind).iter().enumerate();
-    list.extend(rows.map(
-        |(index, (name, unit, dimension, range, meaning, start))| Variable {
+    let rows = inputs(kind).iter();
+    list.extend(
+        rows.map(|(name, unit, dimension, range, meaning, start)| Variable {
             name: (*name).into(),
             unit: (*unit).into(),
             dimension: *dimension,
             description: (*meaning).into(),
-            role: Role::Input(index),
+            role: Role::Input,
             start: Value::Real(start(axis)),
             range: Some(*range),
-        },
-    ));
+        }),
+    );
     let own: &[OutputRow] = match kind {
         Kind::Plant => &PLANT_OUTPUTS,
         Kind::Controlled => &BOARD_OUTPUTS,

@@ -94,12 +94,6 @@ unsafe extern "C" fn fmi2Instantiate(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2FreeInstance(instance: Handle) {
-    // SAFETY: an instance of ours or null.
-    unsafe { super::free(instance) }
-}
-
-#[unsafe(no_mangle)]
 extern "C" fn fmi2SetDebugLogging(
     _instance: Handle,
     _on: Boolean,
@@ -129,27 +123,8 @@ unsafe extern "C" fn fmi2EnterInitializationMode(instance: Handle) -> Status {
     unsafe { call(instance, Unit::enter_initialization) }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2ExitInitializationMode(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe { call(instance, Unit::exit_initialization) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2Terminate(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe { call(instance, Unit::terminate) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2Reset(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe {
-        call(instance, |unit| {
-            unit.reset();
-            Ok(())
-        })
-    }
+life! {
+    fmi2FreeInstance, fmi2ExitInitializationMode, fmi2Terminate, fmi2Reset
 }
 
 /// Reads and sets of one type: C names, C type, from and to a value.
@@ -162,14 +137,8 @@ macro_rules! accessors {
             number: usize,
             to: *mut $c,
         ) -> Status {
-            // SAFETY: arrays of the importer's, each of that many values.
-            unsafe {
-                call(instance, |unit| {
-                    let got = unit.get(values(references, number), $of)?;
-                    let got: Vec<$c> = got.into_iter().map($to).collect();
-                    copy(&got, places(to, number))
-                })
-            }
+            // SAFETY: arrays of the importer's with that many values.
+            unsafe { super::read(instance, (references, number), (to, number), $of, $to) }
         }
 
         #[unsafe(no_mangle)]
@@ -180,13 +149,7 @@ macro_rules! accessors {
             from: *const $c,
         ) -> Status {
             // SAFETY: as above.
-            unsafe {
-                call(instance, |unit| {
-                    let given: Vec<Value> =
-                        values(from, number).iter().map(|v| $from(*v)).collect();
-                    unit.set(values(references, number), &given)
-                })
-            }
+            unsafe { super::write(instance, (references, number), (from, number), $from) }
         }
     )*};
 }
@@ -237,83 +200,9 @@ unsafe extern "C" fn fmi2DoStep(
     unsafe { call(instance, |unit| unit.step(from_s, step_s)) }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetFMUstate(instance: Handle, state: *mut Handle) -> Status {
-    // SAFETY: an instance and a state of ours, or null.
-    unsafe { super::get_state(instance, state) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetFMUstate(instance: Handle, state: Handle) -> Status {
-    // SAFETY: an instance and a state of ours, or null.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            unit.restore(state);
-            Ok(())
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2FreeFMUstate(_instance: Handle, state: *mut Handle) -> Status {
-    // SAFETY: a state of ours, or null.
-    unsafe { super::free_state(state) }
-    OK
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SerializedFMUstateSize(
-    instance: Handle,
-    state: Handle,
-    size: *mut usize,
-) -> Status {
-    // SAFETY: an instance and a state of ours, or null; the importer's place for a number.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            copy(&[unit.serialize(state)?.len()], places(size, 1))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SerializeFMUstate(
-    instance: Handle,
-    state: Handle,
-    to: *mut u8,
-    size: usize,
-) -> Status {
-    // SAFETY: an instance and a state of ours, or null; the importer's place for bytes.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            copy(&unit.serialize(state)?, places(to, size))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    instance: Handle,
-    bytes: *const u8,
-    size: usize,
-    state: *mut Handle,
-) -> Status {
-    // SAFETY: an instance of ours, bytes of the importer's, its place for a state.
-    unsafe {
-        call(instance, |unit| {
-            super::put(state, unit.deserialize(values(bytes, size))?)
-        })
-    }
-}
-
-/// Functions that an importer finds and the description rules out.
-macro_rules! absent {
-    ($($name:ident: $what:literal;)*) => {$(
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(instance: Handle) -> Status {
-            // SAFETY: an instance of ours or null; further arguments are not looked at.
-            unsafe { call(instance, |_| Err(FmuError::Absent($what))) }
-        }
-    )*};
+states! {
+    fmi2GetFMUstate, fmi2SetFMUstate, fmi2FreeFMUstate, fmi2SerializedFMUstateSize,
+    fmi2SerializeFMUstate, fmi2DeSerializeFMUstate
 }
 
 absent! {

@@ -45,44 +45,30 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
 
 /// Kinds of units that this one is not: the first arguments are those of co-simulation, the
 /// logger comes after them.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3InstantiateModelExchange(
-    _name: *const c_char,
-    _token: *const c_char,
-    _resources: *const c_char,
-    _visible: bool,
-    _logging: bool,
-    environment: *mut c_void,
-    logger: Option<Logger>,
-) -> Handle {
-    let log = Log::Three {
-        callback: logger,
-        environment,
-    };
-    super::instantiate(log, || Err(FmuError::Interface("model exchange")))
+macro_rules! refused {
+    ($($name:ident: $what:literal;)*) => {$(
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(
+            _name: *const c_char,
+            _token: *const c_char,
+            _resources: *const c_char,
+            _visible: bool,
+            _logging: bool,
+            environment: *mut c_void,
+            logger: Option<Logger>,
+        ) -> Handle {
+            let log = Log::Three {
+                callback: logger,
+                environment,
+            };
+            super::instantiate(log, || Err(FmuError::Interface($what)))
+        }
+    )*};
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3InstantiateScheduledExecution(
-    _name: *const c_char,
-    _token: *const c_char,
-    _resources: *const c_char,
-    _visible: bool,
-    _logging: bool,
-    environment: *mut c_void,
-    logger: Option<Logger>,
-) -> Handle {
-    let log = Log::Three {
-        callback: logger,
-        environment,
-    };
-    super::instantiate(log, || Err(FmuError::Interface("scheduled execution")))
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3FreeInstance(instance: Handle) {
-    // SAFETY: an instance of ours or null.
-    unsafe { super::free(instance) }
+refused! {
+    fmi3InstantiateModelExchange: "model exchange";
+    fmi3InstantiateScheduledExecution: "scheduled execution";
 }
 
 #[unsafe(no_mangle)]
@@ -114,27 +100,8 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
     }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3ExitInitializationMode(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe { call(instance, Unit::exit_initialization) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3Terminate(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe { call(instance, Unit::terminate) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3Reset(instance: Handle) -> Status {
-    // SAFETY: an instance of ours or null.
-    unsafe {
-        call(instance, |unit| {
-            unit.reset();
-            Ok(())
-        })
-    }
+life! {
+    fmi3FreeInstance, fmi3ExitInitializationMode, fmi3Terminate, fmi3Reset
 }
 
 /// Reads and sets of one type: C names, C type, from and to a value.
@@ -149,13 +116,7 @@ macro_rules! accessors {
             size: usize,
         ) -> Status {
             // SAFETY: arrays of the importer's with that many values.
-            unsafe {
-                call(instance, |unit| {
-                    let got = unit.get(values(references, number), $of)?;
-                    let got: Vec<$c> = got.into_iter().map($to).collect();
-                    copy(&got, places(to, size))
-                })
-            }
+            unsafe { super::read(instance, (references, number), (to, size), $of, $to) }
         }
 
         #[unsafe(no_mangle)]
@@ -167,12 +128,7 @@ macro_rules! accessors {
             size: usize,
         ) -> Status {
             // SAFETY: as above.
-            unsafe {
-                call(instance, |unit| {
-                    let given: Vec<Value> = values(from, size).iter().map(|v| $from(*v)).collect();
-                    unit.set(values(references, number), &given)
-                })
-            }
+            unsafe { super::write(instance, (references, number), (from, size), $from) }
         }
     )*};
 }
@@ -231,83 +187,9 @@ unsafe extern "C" fn fmi3DoStep(
     }
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3GetFMUState(instance: Handle, state: *mut Handle) -> Status {
-    // SAFETY: an instance and a state of ours, or null.
-    unsafe { super::get_state(instance, state) }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SetFMUState(instance: Handle, state: Handle) -> Status {
-    // SAFETY: an instance and a state of ours, or null.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            unit.restore(state);
-            Ok(())
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3FreeFMUState(_instance: Handle, state: *mut Handle) -> Status {
-    // SAFETY: a state of ours, or null.
-    unsafe { super::free_state(state) }
-    OK
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SerializedFMUStateSize(
-    instance: Handle,
-    state: Handle,
-    size: *mut usize,
-) -> Status {
-    // SAFETY: an instance and a state of ours, or null; the importer's place for a number.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            copy(&[unit.serialize(state)?.len()], places(size, 1))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SerializeFMUState(
-    instance: Handle,
-    state: Handle,
-    to: *mut u8,
-    size: usize,
-) -> Status {
-    // SAFETY: an instance and a state of ours, or null; the importer's place for bytes.
-    unsafe {
-        super::with_state(instance, state, |unit, state| {
-            copy(&unit.serialize(state)?, places(to, size))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3DeserializeFMUState(
-    instance: Handle,
-    bytes: *const u8,
-    size: usize,
-    state: *mut Handle,
-) -> Status {
-    // SAFETY: an instance of ours, bytes of the importer's, its place for a state.
-    unsafe {
-        call(instance, |unit| {
-            super::put(state, unit.deserialize(values(bytes, size))?)
-        })
-    }
-}
-
-/// Functions that an importer finds and the description rules out.
-macro_rules! absent {
-    ($($name:ident: $what:literal;)*) => {$(
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(instance: Handle) -> Status {
-            // SAFETY: an instance of ours or null; further arguments are not looked at.
-            unsafe { call(instance, |_| Err(FmuError::Absent($what))) }
-        }
-    )*};
+states! {
+    fmi3GetFMUState, fmi3SetFMUState, fmi3FreeFMUState, fmi3SerializedFMUStateSize,
+    fmi3SerializeFMUState, fmi3DeserializeFMUState
 }
 
 absent! {

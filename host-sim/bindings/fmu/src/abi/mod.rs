@@ -5,6 +5,120 @@
 
 #![allow(unsafe_code)]
 
+/// The end of the initialization and of an instance, alike in both versions.
+macro_rules! life {
+    ($free:ident, $exit:ident, $terminate:ident, $reset:ident) => {
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $free(instance: Handle) {
+            // SAFETY: an instance of ours or null.
+            unsafe { super::free(instance) }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $exit(instance: Handle) -> Status {
+            // SAFETY: an instance of ours or null.
+            unsafe { call(instance, Unit::exit_initialization) }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $terminate(instance: Handle) -> Status {
+            // SAFETY: an instance of ours or null.
+            unsafe { call(instance, Unit::terminate) }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $reset(instance: Handle) -> Status {
+            // SAFETY: an instance of ours or null.
+            unsafe {
+                call(instance, |unit| {
+                    unit.reset();
+                    Ok(())
+                })
+            }
+        }
+    };
+}
+
+/// States of an instance, alike in both versions.
+macro_rules! states {
+    ($get:ident, $set:ident, $free:ident, $size:ident, $serialize:ident, $deserialize:ident) => {
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $get(instance: Handle, state: *mut Handle) -> Status {
+            // SAFETY: an instance and a state of ours, or null.
+            unsafe { super::get_state(instance, state) }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $set(instance: Handle, state: Handle) -> Status {
+            // SAFETY: an instance and a state of ours, or null.
+            unsafe {
+                super::with_state(instance, state, |unit, state| {
+                    unit.restore(state);
+                    Ok(())
+                })
+            }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $free(_instance: Handle, state: *mut Handle) -> Status {
+            // SAFETY: a state of ours, or null.
+            unsafe { super::free_state(state) }
+            OK
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $size(instance: Handle, state: Handle, size: *mut usize) -> Status {
+            // SAFETY: an instance and a state of ours, or null; the importer's place for a number.
+            unsafe {
+                super::with_state(instance, state, |unit, state| {
+                    copy(&[unit.serialize(state)?.len()], places(size, 1))
+                })
+            }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $serialize(
+            instance: Handle,
+            state: Handle,
+            to: *mut u8,
+            size: usize,
+        ) -> Status {
+            // SAFETY: an instance and a state of ours, or null; the importer's place for bytes.
+            unsafe {
+                super::with_state(instance, state, |unit, state| {
+                    copy(&unit.serialize(state)?, places(to, size))
+                })
+            }
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $deserialize(
+            instance: Handle,
+            bytes: *const u8,
+            size: usize,
+            state: *mut Handle,
+        ) -> Status {
+            // SAFETY: an instance of ours, bytes of the importer's, its place for a state.
+            unsafe {
+                call(instance, |unit| {
+                    super::put(state, unit.deserialize(values(bytes, size))?)
+                })
+            }
+        }
+    };
+}
+
+/// Functions that an importer finds and the description rules out.
+macro_rules! absent {
+    ($($name:ident: $what:literal;)*) => {$(
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(instance: Handle) -> Status {
+            // SAFETY: an instance of ours or null; further arguments are not looked at.
+            unsafe { call(instance, |_| Err(FmuError::Absent($what))) }
+        }
+    )*};
+}
+
 mod fmi2;
 mod fmi3;
 
@@ -13,18 +127,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use wheeleg_config::plain_text;
 
+use crate::description::{LOG_ERROR, LOG_FATAL};
 use crate::error::FmuError;
 use crate::unit::{State, Unit};
+use crate::value::{Value, ValueType};
 
 /// `fmi2Status`, `fmi3Status`.
 type Status = i32;
 const OK: Status = 0;
 const ERROR: Status = 3;
 const FATAL: Status = 4;
-
-/// Categories of the log, which the description lists.
-const ERRORS: &CStr = c"logStatusError";
-const FATALS: &CStr = c"logStatusFatal";
 
 /// An instance, or a state of one, as the importer holds it.
 type Handle = *mut c_void;
@@ -51,7 +163,11 @@ impl Log {
         };
         // A null in a text would end it.
         let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-        let category = if status == FATAL { FATALS } else { ERRORS };
+        let category = if status == FATAL {
+            LOG_FATAL
+        } else {
+            LOG_ERROR
+        };
         match self {
             Self::Two {
                 callback: Some(callback),
@@ -233,6 +349,46 @@ unsafe fn text(text: *const c_char) -> String {
         unsafe { CStr::from_ptr(text) }
             .to_string_lossy()
             .into_owned()
+    }
+}
+
+/// Reads variables of one type into the importer's array.
+///
+/// # Safety
+/// As [`call`]; both arrays are of the importer's, each with its number of values.
+unsafe fn read<T: Copy>(
+    instance: Handle,
+    (references, number): (*const u32, usize),
+    (to, size): (*mut T, usize),
+    of: ValueType,
+    convert: fn(Value) -> T,
+) -> Status {
+    // SAFETY: see above.
+    unsafe {
+        call(instance, |unit| {
+            let got = unit.get(values(references, number), of)?;
+            let got: Vec<T> = got.into_iter().map(convert).collect();
+            copy(&got, places(to, size))
+        })
+    }
+}
+
+/// Sets variables of one type from the importer's array.
+///
+/// # Safety
+/// As [`read`].
+unsafe fn write<T: Copy>(
+    instance: Handle,
+    (references, number): (*const u32, usize),
+    (from, size): (*const T, usize),
+    convert: fn(T) -> Value,
+) -> Status {
+    // SAFETY: see above.
+    unsafe {
+        call(instance, |unit| {
+            let given: Vec<Value> = values(from, size).iter().map(|v| convert(*v)).collect();
+            unit.set(values(references, number), &given)
+        })
     }
 }
 
