@@ -124,6 +124,7 @@ fn seeds(default: u64) -> u64 {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn each_behaviour_does_what_it_is_there_for() {
     let seeds = seeds(3);
     let only = std::env::var("WHEELEG_BEHAVIOUR").ok();

@@ -174,6 +174,7 @@ fn one_factor_at_a_time() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn two_hundred_combinations() {
     let sheet = bench_axis();
     let mut tried = 0;
@@ -200,6 +201,7 @@ fn two_hundred_combinations() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn off_the_bench_axis_few_combinations_miss() {
     // Of 1,200, 600 and 1,200 on the axes 21, 3 and 48 were measured: reversals that had not died
     // out, a rest beside the bar, a false alarm near the target.
@@ -314,6 +316,7 @@ fn late_and_restless(traces: &[Trace]) -> (usize, usize) {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
     let told = axis_data(&wheeleg_2003_axis());
     // What a board takes that is told nothing: a faster valve in front of the same

@@ -72,6 +72,7 @@ fn number(variable: &str, default: u64) -> u64 {
 
 /// The bars of the combinations on the bench axis, after one learning move, and no false alarm.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn few_combinations_miss_on_cylinders_drawn_at_random() {
     let (first, cylinders) = (
         number(FIRST_VARIABLE, 9000),

@@ -74,6 +74,7 @@ fn the_papers_delay_is_reached_from_the_held_home_and_explained() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn an_announced_move_starts_at_once_and_not_before() {
     let preview = &measured().preview;
     for row in preview.of(Law::Default, Start::HomeHeld) {
@@ -239,6 +240,7 @@ fn bad_input_is_refused_with_its_range() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn the_report_stands_alone_and_two_runs_are_alike() {
     let dir = tempfile::tempdir().expect("temporary folder");
     let run = |name: &str| {

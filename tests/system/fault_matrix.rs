@@ -117,6 +117,7 @@ fn every_fault_of_the_catalogue_is_in_a_row() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
     let rows: Vec<_> = ROWS.iter().collect();
     let outcomes = matrix::run(&rows, 1, &Progress::silent()).expect("the runs without faults");
@@ -170,6 +171,7 @@ fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
 
 /// A run without faults has none: over every scenario in which nothing goes wrong.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_without_a_fault() {
     let robot = robot();
     let mut quiet = 0;
@@ -210,6 +212,7 @@ fn nothing_trips_without_a_fault() {
 /// In the row of a minute the robot holds most of the time: this one is told to walk on after
 /// every stop, so that boards that drive see the broken frames.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn a_robot_that_is_started_again_and_again_acts_on_no_wrong_frame_for_a_minute() {
     let rounds = (0..20).flat_map(|round| {
         let from_s = 1.0 + 3.0 * f64::from(round);

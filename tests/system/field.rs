@@ -33,6 +33,7 @@ fn tried<'a>(summary: &'a Summary, name: &str) -> &'a Tried {
 
 /// The smoke test of what rests on 100 seeds in `cargo xtask deep field`.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn the_claims_that_hold_hold_on_five_seeds() {
     let summary = field(&["sand-flat", "sand-slope-10", "rocks-30"], 5);
     let met = |paper: &str| {
@@ -60,6 +61,7 @@ fn the_claims_that_hold_hold_on_five_seeds() {
 /// What cannot be done must not look as if it could: a wall of 30 cm, and a slope on which soft
 /// soil carries the wheels so far ahead of the axle that the robot tips.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn a_wall_and_steep_sand_are_not_climbed() {
     let summary = field(&["sand-slope-20", "wall-30"], 1);
     assert_eq!(tried(&summary, "wall-30").passed, 1);

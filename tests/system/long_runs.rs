@@ -88,6 +88,7 @@ fn missed(summary: &serde_json::Value) -> Vec<&str> {
 
 /// `cargo xtask deep long-run` has it longer than the 2^32 us of a counter.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]
 fn memory_does_not_grow_with_simulated_time() {
     let long_s = std::env::var("WHEELEG_LONG_RUN_S")
@@ -181,6 +182,7 @@ fn the_log_of_a_killed_run_is_recovered() {
 /// The disk fills up at ten different times of a run: the verdict is told and kept all the same.
 /// Each disk is a file system in memory, of a mount name space of its own.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]
 fn a_disk_that_fills_at_any_time_keeps_the_summary() {
     let dir = tempfile::tempdir().expect("temporary folder");

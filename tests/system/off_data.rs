@@ -183,6 +183,7 @@ fn number(variable: &str, default: u64) -> u64 {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_on_a_robot_off_its_data() {
     let (first, robots) = (number(FIRST_VARIABLE, 1), number(ROBOTS_VARIABLE, 3));
     let sound = sound();

@@ -70,6 +70,7 @@ fn text(seed: u64) -> String {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn random_sane_axes_raise_no_false_alarm() {
     let (mut refused, mut open, mut worst) = (0, 0, 0.0_f64);
     for seed in 0..AXES {

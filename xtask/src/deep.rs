@@ -175,7 +175,15 @@ fn measured(
         cargo()
             .args(["test", "--locked", "--release"])
             .args(rust::HOST)
-            .args(["--test", program, "--", "--exact", "--nocapture", test])
+            .args([
+                "--test",
+                program,
+                "--",
+                "--exact",
+                "--include-ignored",
+                "--nocapture",
+                test,
+            ])
             .env(variable, amount.to_string()),
         |line| line.contains(marker),
     )?;

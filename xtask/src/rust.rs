@@ -40,15 +40,17 @@ pub(crate) fn clippy() -> StepResult {
     Ok(())
 }
 
-/// All host tests, doc tests and system tests. One failing test program does
-/// not hide the others. In the release build, which the later steps need anyway and whose
-/// arithmetic and assertions are checked: a second build of everything takes as long as the tests.
+/// All host tests, doc tests and system tests, with the long ones that `cargo test` leaves out and
+/// names as ignored. One failing test program does not hide the others. In the release build, which
+/// the later steps need anyway and whose arithmetic and assertions are checked: a second build of
+/// everything takes as long as the tests.
 pub(crate) fn test() -> StepResult {
     // One seed for the property tests, so that the same sources give the same
     // verdict; `cargo test` alone draws new cases every time.
     run(cargo()
         .args(["test", "--locked", "--release", "--no-fail-fast"])
         .args(HOST)
+        .args(["--", "--include-ignored"])
         .env("PROPTEST_RNG_SEED", PROPTEST_SEED))?;
     Ok(())
 }

@@ -18,7 +18,7 @@ use std::collections::VecDeque;
 const BITS_PER_BYTE: u64 = 10;
 
 /// Who drives the line: a bus address (0 master, 1–8 nodes), or something else
-/// that is on it ([`super::strangers`]).
+/// that is on it ([`super::rogue_nodes`]).
 pub(super) type Driver = u8;
 
 /// How long the end of a transmission is remembered, ns: longer than any

@@ -8,7 +8,7 @@
 //! [`event`] says what happened as data, [`messages`] makes text of it.
 //!
 //! A [`Recorder`] takes the samples of a run and hands them to [`Sink`]s: a log file
-//! ([`LogFile`]), tables ([`Tables`]), the last seconds ([`Ring`]), and memory ([`Keep`]).
+//! ([`LogFile`]), tables ([`Tables`]), and memory ([`Keep`]).
 //!
 //! # Glossary
 //!
@@ -38,7 +38,6 @@ mod read;
 mod recorder;
 mod recover;
 mod registry;
-mod ring;
 pub mod samples;
 mod sink;
 
@@ -58,7 +57,6 @@ pub use read::{Logged, Read, Scalar, TakeDerived, read, read_derived, read_from}
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written, json_schema};
-pub use ring::{Message, Ring};
 pub use samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
     MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
