@@ -34,7 +34,8 @@ fn wheeleg() -> Command {
     command
 }
 
-/// Two laws on robots whose seals and supply differ; short, because their start-up is not.
+/// Two laws on robots whose seals and valves differ; short, because their start-up is not. An exponent
+/// that is none of the simple ones is a power, which a C library would compute by the processor.
 fn plan(folder: &Path, samples: u64) -> PathBuf {
     let text = format!(
         "name = \"short\"\nroot = 3\nsamples = {samples}\nblock = 4\nsampler = \"sobol\"\n\
@@ -43,6 +44,9 @@ fn plan(folder: &Path, samples: u64) -> PathBuf {
          [factor.friction]\nscale = true\n\
          parameter = [\"robot.friction.coulomb\", \"robot.friction.static\"]\n\
          lognormal = {{ median = 1.0, sigma = 0.2, min = 0.5, max = 2.0 }}\n\
+         [factor.exponent]\nparameter = [\"robot.fill_valve.subsonic_exponent\", \
+         \"robot.vent_valve.subsonic_exponent\"]\n\
+         uniform = {{ min = 0.35, max = 0.65 }}\n\
          [factor.robot]\nparameter = \"robot\"\ngrid = [\"wheeleg-2003\", \"wheeleg\"]\n\
          paired = true\n"
     );
@@ -293,6 +297,26 @@ fn finished(out: &Path) -> usize {
         .flatten();
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     names.filter(|name| name.ends_with(".run.parquet")).count()
+}
+
+/// None of these short runs meets its targets.
+#[test]
+fn strict_runs_end_with_1_where_a_case_failed() {
+    let home = folder();
+    let plan = plan(home.path(), 1);
+    let out = home.path().join("out");
+    for (options, code) in [(&[][..], 0), (&["--strict"], 1)] {
+        let run = output(
+            wheeleg()
+                .arg("run")
+                .arg(&plan)
+                .arg("--out")
+                .arg(&out)
+                .args(options),
+        );
+        assert_eq!(run.status.code(), Some(code), "{}", text(&run.stderr));
+        assert_eq!(parts(&out).len(), 1, "the rows are kept");
+    }
 }
 
 #[test]
