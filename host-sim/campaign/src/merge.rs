@@ -1,7 +1,7 @@
 //! One table of all parts.
 
 use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
 use wheeleg_studies::export::make_room;
@@ -66,7 +66,6 @@ pub fn merge(
             ));
         }
     }
-    let parts = complete(&stores, folders)?;
     let plan = first.plan().plan()?;
     let columns = Cases::new(&plan)?.columns().clone();
     let plan_text = serde_json::to_string(first.plan()).expect("texts are JSON");
@@ -74,7 +73,7 @@ pub fn merge(
     // From here on there is something to take away.
     stop.begin();
     let facts = [plan_text.as_str(), &first.plan().program];
-    let written = write([&temporary, out], &parts, &columns, facts, stop);
+    let written = write([&temporary, out], &stores, &columns, facts, stop);
     let result = written.and_then(|merged| {
         if merged.is_some() && !is_same(&temporary, out) {
             make_room(out)?;
@@ -96,61 +95,82 @@ fn is_same(one: &Path, other: &Path) -> bool {
             .filter(std::fs::Metadata::is_file)?;
         Some((about.len(), BufReader::new(File::open(path).ok()?)))
     };
-    let (Some((a_len, a)), Some((b_len, b))) = (open(one), open(other)) else {
+    let (Some((a_len, mut a)), Some((b_len, mut b))) = (open(one), open(other)) else {
         return false;
     };
-    a_len == b_len
-        && a.bytes()
-            .zip(b.bytes())
-            .all(|(a, b)| a.is_ok_and(|a| b.is_ok_and(|b| a == b)))
+    if a_len != b_len {
+        return false;
+    }
+    // Both are filled alike, so that their buffers have the same length.
+    while let (Ok(left), Ok(right)) = (a.fill_buf(), b.fill_buf()) {
+        let alike = left.len().min(right.len());
+        if left[..alike] != right[..alike] {
+            return false;
+        }
+        if alike == 0 {
+            return left.is_empty() && right.is_empty();
+        }
+        a.consume(alike);
+        b.consume(alike);
+    }
+    false
 }
 
-/// Which of the folders has the part of each block.
-fn complete<'s>(stores: &'s [Store], folders: &[PathBuf]) -> Result<Vec<&'s Store>, CampaignError> {
-    let (mut parts, mut holes, mut bad) = (Vec::new(), Vec::new(), Vec::new());
-    for block in 0..stores[0].blocks() {
-        let whole = stores.iter().find(|store| match store.table(block) {
-            Ok(table) => table.is_some(),
-            Err(why) => {
-                bad.push(format!("`{}`: {why}", store.part(block).display()));
-                false
+/// Blocks without a part, and parts that do not count.
+#[derive(Default)]
+struct Holes {
+    blocks: Vec<u64>,
+    bad: Vec<String>,
+}
+
+impl Holes {
+    /// The table of a block, from the first folder that has its part; None where none has.
+    fn find(&mut self, block: u64, stores: &[Store]) -> Option<(PathBuf, Table)> {
+        for store in stores {
+            match store.table(block) {
+                Ok(Some(table)) => return Some((store.part(block), table)),
+                Ok(None) => {}
+                Err(why) => {
+                    let path = store.part(block);
+                    self.bad.push(format!("`{}`: {why}", path.display()));
+                }
             }
-        });
-        match whole {
-            Some(store) => parts.push(store),
-            None => holes.push(block),
+        }
+        self.blocks.push(block);
+        None
+    }
+
+    /// What to do about them.
+    fn told(&self, of: &Store) -> CampaignError {
+        let named = self
+            .blocks
+            .iter()
+            .take(NAMED)
+            .map(|block| format!("{block:06}"));
+        let mut what = format!(
+            "{} of {} blocks have no part: {}",
+            self.blocks.len(),
+            of.blocks(),
+            named.collect::<Vec<_>>().join(", ")
+        );
+        if self.blocks.len() > NAMED {
+            what.push_str(", …");
+        }
+        for bad in self.bad.iter().take(NAMED) {
+            what.push_str(&format!("; {bad}"));
+        }
+        let folder = of.folder().display();
+        CampaignError::Incomplete {
+            what,
+            help: format!("`wheeleg campaign run {folder}/plan.json --out {folder}` computes them"),
         }
     }
-    if holes.is_empty() {
-        return Ok(parts);
-    }
-    let named = holes.iter().take(NAMED).map(|block| format!("{block:06}"));
-    let mut what = format!(
-        "{} of {} blocks have no part: {}",
-        holes.len(),
-        stores[0].blocks(),
-        named.collect::<Vec<_>>().join(", ")
-    );
-    if holes.len() > NAMED {
-        what.push_str(", …");
-    }
-    for bad in bad.iter().take(NAMED) {
-        what.push_str(&format!("; {bad}"));
-    }
-    let folder = folders[0].display();
-    Err(CampaignError::Incomplete {
-        what,
-        help: format!(
-            "`wheeleg campaign run {}/plan.json --out {folder}` computes them",
-            folder
-        ),
-    })
 }
 
-/// Writes the table to `to`; messages name `out`, which it becomes.
+/// Writes the table of all blocks to `to`, each part read once; messages name `out`, which it becomes.
 fn write(
     [to, out]: [&Path; 2],
-    parts: &[&Store],
+    stores: &[Store],
     columns: &Columns,
     [plan_text, program]: [&str; 2],
     stop: &Stop,
@@ -165,15 +185,21 @@ fn write(
     let mut hasher = blake3::Hasher::new();
     let mut group = Table::empty(columns.all.clone());
     let mut rows = 0_u64;
-    for (block, store) in (0_u64..).zip(parts) {
+    let mut holes = Holes::default();
+    for block in 0..stores[0].blocks() {
         if stop.is_asked() {
             return Ok(None);
         }
-        let path = store.part(block);
-        let table = store.table(block);
-        let table = table.map_err(|why| CampaignError::unreadable(&path, why))?;
-        let table = table.filter(|table| table.columns == columns.all);
-        let table = table.ok_or_else(|| CampaignError::unreadable(&path, "other columns"))?;
+        let Some((path, table)) = holes.find(block, stores) else {
+            continue;
+        };
+        if !holes.blocks.is_empty() {
+            // Nothing comes of the table: what else is missing is looked for alone.
+            continue;
+        }
+        if table.columns != columns.all {
+            return Err(CampaignError::unreadable(&path, "other columns"));
+        }
         hash(&mut hasher, &table, columns);
         rows += table.rows() as u64;
         group.append(table);
@@ -181,6 +207,9 @@ fn write(
             writer.write(&group).map_err(full)?;
             group = Table::empty(columns.all.clone());
         }
+    }
+    if !holes.blocks.is_empty() {
+        return Err(holes.told(&stores[0]));
     }
     if group.rows() > 0 {
         writer.write(&group).map_err(full)?;
@@ -202,16 +231,15 @@ fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
         .iter()
         .filter_map(|id| table.column(id))
         .collect();
+    let mut all = Vec::new();
     for row in 0..table.rows() {
         for column in texts {
             match column.get(row).and_then(Option::as_deref) {
                 Some(text) => {
-                    hasher.update(&(text.len() as u64).to_le_bytes());
-                    hasher.update(text.as_bytes());
+                    all.extend((text.len() as u64).to_le_bytes());
+                    all.extend(text.as_bytes());
                 }
-                None => {
-                    hasher.update(&u64::MAX.to_le_bytes());
-                }
+                None => all.extend(u64::MAX.to_le_bytes()),
             }
         }
         for figure in &figures {
@@ -221,7 +249,8 @@ fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
             };
             // No figure has these bits: they are those of a number that is none.
             let bits = value.map_or(u64::MAX, f64::to_bits);
-            hasher.update(&bits.to_le_bytes());
+            all.extend(bits.to_le_bytes());
         }
     }
+    hasher.update(&all);
 }

@@ -4,6 +4,7 @@ mod cells;
 mod findings;
 mod page;
 mod pairs;
+mod shares;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

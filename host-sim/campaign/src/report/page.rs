@@ -8,6 +8,7 @@ use super::Merged;
 use super::cells;
 use super::findings::Findings;
 use super::pairs::Pairs;
+use super::shares;
 use crate::CampaignError;
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -34,9 +35,11 @@ pub(super) fn render(
     pairs: Option<&Pairs>,
 ) -> Result<String, CampaignError> {
     let plan = merged.plan.plan()?;
-    let figures = distributions(merged, &cells::cells(&merged.table, &plan));
-    let figures: Vec<(Figure, String)> = figures
+    let cells = cells::cells(&merged.table, &plan);
+    let shares = shares::figure(merged, &plan, &cells);
+    let figures: Vec<(Figure, String)> = shares
         .into_iter()
+        .chain(distributions(merged, &cells))
         .map(|figure| {
             let svg = figure.svg();
             (figure, svg)

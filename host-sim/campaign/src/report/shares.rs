@@ -1,0 +1,96 @@
+//! The share of cases that meet all required targets, over a factor with a list of numbers.
+
+use wheeleg_config::plan::{Factor, Plan, Value, Values};
+use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
+
+use super::Merged;
+use super::cells::Cell;
+
+/// Values of a factor from which on a curve says more than a table.
+const CURVE: usize = 3;
+/// Height of a panel, pixels.
+const HEIGHT: u32 = 110;
+
+/// A curve for each combination of the other listed factors, a panel for each value of the one of
+/// them that has most values. None of a plan without such a list, or with more curves than there are colours.
+pub(super) fn figure(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Option<Figure> {
+    let listed: Vec<(&Factor, &[Value])> = plan.factors.iter().filter_map(list).collect();
+    let most = |fits: &dyn Fn(usize) -> bool| {
+        let places = (0..listed.len()).filter(|place| fits(*place));
+        // The first of those that have as many.
+        places.rev().max_by_key(|place| listed[*place].1.len())
+    };
+    let is_curve = |place: usize| {
+        let values = listed[place].1;
+        values.len() >= CURVE && values.iter().all(|v| matches!(v, Value::Number(_)))
+    };
+    let x = most(&is_curve)?;
+    let panel = most(&|place| place != x && listed[place].1.len() > 1);
+    let passed = merged.table.flags("passed");
+    let (mut panels, mut curves) = (Vec::<Value>::new(), Vec::<String>::new());
+    let mut points = Vec::new();
+    for cell in cells {
+        let Some(Value::Number(at)) = cell.values.get(x) else {
+            continue;
+        };
+        let met = cell.rows.iter().filter(|row| passed[**row] == Some(true));
+        let share = met.count() as f64 / cell.rows.len() as f64;
+        let others = (0..listed.len()).filter(|place| *place != x && Some(*place) != panel);
+        let named = others.filter(|place| listed[*place].1.len() > 1);
+        let named = named.map(|place| format!("{} {}", listed[place].0.name, cell.values[place]));
+        let curve = place_of(&mut curves, named.collect::<Vec<_>>().join(", "));
+        let panel = panel.map(|place| place_of(&mut panels, cell.values[place].clone()));
+        points.push((panel.unwrap_or(0), curve, (*at, share)));
+    }
+    if curves.len() > colour::AXES.len() {
+        return None;
+    }
+    let xs = points.iter().map(|(_, _, (at, _))| *at);
+    let range = xs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+        (low.min(at), high.max(at))
+    });
+    let unit = match listed[x].0.unit.as_str() {
+        "" => String::new(),
+        unit => format!(" [{unit}]"),
+    };
+    let label = format!("{}{unit}", listed[x].0.name);
+    let draw = |at: usize| {
+        let series = curves.iter().enumerate().map(|(place, name)| {
+            let own = points.iter().filter(|(p, c, _)| (*p, *c) == (at, place));
+            let mut own: Vec<(f64, f64)> = own.map(|(_, _, point)| *point).collect();
+            own.sort_by(|a, b| a.0.total_cmp(&b.0));
+            line(name, colour::AXES[place], 2, own)
+        });
+        let content = Content::curves(&label, ("[share]", (-0.05, 1.05)), series.collect());
+        let title = panel.map_or(String::new(), |place| {
+            format!("{} {}", listed[place].0.name, panels[at])
+        });
+        Panel::new(title, range, HEIGHT, content)
+    };
+    let mut drawn: Vec<Panel> = (0..panels.len().max(1)).map(draw).collect();
+    for panel in drawn.iter_mut().skip(1) {
+        panel.name_only(0..0);
+    }
+    Some(Figure {
+        id: "shares".to_owned(),
+        title: format!("All required targets met, by {}", listed[x].0.name),
+        caption: "Share of all cases of a cell; the table above has its interval.".to_owned(),
+        panels: drawn,
+    })
+}
+
+fn list(factor: &Factor) -> Option<(&Factor, &[Value])> {
+    match &factor.values {
+        Values::Grid(values) => Some((factor, values)),
+        Values::Drawn(_) => None,
+    }
+}
+
+/// The place of a value in a list, which gets it if it has not got it.
+fn place_of<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    if let Some(place) = list.iter().position(|own| *own == value) {
+        return place;
+    }
+    list.push(value);
+    list.len() - 1
+}
