@@ -65,6 +65,10 @@ measures! {
     ChassisForce = "chassis-force", Force, "N";
     /// Swings of the legs.
     Steps = "steps", Count, "1";
+    /// Time at which the robot gives up and stands (event `stuck`).
+    StuckAfter = "stuck-after", Time, "s";
+    /// Faults that boards have latched.
+    Faults = "faults", Count, "1";
 }
 
 impl Measure {

@@ -218,6 +218,9 @@ impl<'a> Recorder<'a> {
     pub fn event(&mut self, t_ns: u64, event: impl Into<Event>) {
         let event = event.into();
         self.put(index::EVENTS, 0, t_ns, &event.sample());
+        for sink in &mut self.sinks {
+            sink.event(t_ns, &event);
+        }
         self.memory.event(t_ns, event);
     }
 

@@ -6,7 +6,7 @@ use super::samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
     MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample,
 };
-use crate::LogError;
+use crate::{Event, LogError};
 
 /// Declares [`SampleRef`] and [`OwnedSample`] over the types of samples.
 macro_rules! sample_ref {
@@ -130,6 +130,9 @@ pub trait Sink {
     /// `lost`: kept from the log by a fault of the run.
     fn contacts(&mut self, _t_ns: u64, _contacts: &[Contact], _lost: bool) {}
 
+    /// Takes an event as data; its sample comes by [`take`](Self::take), too.
+    fn event(&mut self, _t_ns: u64, _event: &Event) {}
+
     /// The run is over.
     ///
     /// # Errors
@@ -146,6 +149,10 @@ impl<S: Sink + ?Sized> Sink for &mut S {
 
     fn wants_contacts(&self) -> bool {
         (**self).wants_contacts()
+    }
+
+    fn event(&mut self, t_ns: u64, event: &Event) {
+        (**self).event(t_ns, event);
     }
 
     fn contacts(&mut self, t_ns: u64, contacts: &[Contact], lost: bool) {

@@ -18,8 +18,8 @@ use std::collections::VecDeque;
 
 pub use contact::Contact;
 use contact::ContactMeter;
-pub use delay::StartDelay;
 use delay::{DelayMeter, ShiftMeter};
+pub use delay::StartDelay;
 pub use reference::{ReferenceModel, ReferencePoint};
 use rest::StandMeter;
 use safe_state::SafeStateMeter;
@@ -32,8 +32,8 @@ use travel::TravelMeter;
 
 use wheeleg_config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};
 use wheeleg_telemetry::{
-    BodySample, FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink, Taken,
-    WheelSample,
+    BodySample, Event, FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink,
+    Taken, WheelSample,
 };
 
 /// What the analysis found.
@@ -237,6 +237,12 @@ impl<'a> Analyser<'a> {
         }
     }
 
+    fn event(&mut self, t_s: f64, event: &Event) {
+        if let Some(travel) = &mut self.travel {
+            travel.event(t_s, event);
+        }
+    }
+
     fn foot(&mut self, foot: usize, t_ns: u64, sample: &FootSample) {
         if let Some(travel) = &mut self.travel {
             travel.foot(foot, sample);
@@ -305,6 +311,10 @@ impl Sink for Analyser<'_> {
             _ => {}
         }
     }
+
+    fn event(&mut self, t_ns: u64, event: &Event) {
+        Analyser::event(self, t_ns as f64 * 1e-9, event);
+    }
 }
 
 fn row<S: Clone>(t_ns: u64, sample: &S) -> Row<S> {
@@ -332,6 +342,9 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
     }
     for (wheel, rows) in recording.wheels.iter().enumerate() {
         rows.iter().for_each(|r| analyser.wheel(wheel, r));
+    }
+    for r in &recording.events {
+        analyser.event(r.t_s(), &r.v);
     }
     // The way of the robot sees its feet as they are at the time.
     let mut feet = recording.feet.each_ref().map(|rows| rows.iter().peekable());

@@ -1,7 +1,10 @@
 //! The whole robot's way over the ground, against the bars of the scenario.
 
 use wheeleg_config::{Bar, Measure};
-use wheeleg_telemetry::{BodySample, FootSample, MasterSample, WheelSample};
+use wheeleg_master::behaviour::Act;
+use wheeleg_master::event::Event as MasterEvent;
+use wheeleg_telemetry::event::BoardChange;
+use wheeleg_telemetry::{BodySample, Cause, Event, FootSample, MasterSample, WheelSample};
 
 use super::Extremes;
 use super::target::Target;
@@ -59,6 +62,8 @@ pub(super) struct TravelMeter {
     foot_n: [f64; 2],
     supported_s: f64,
     steps: u32,
+    gives_up_s: Option<f64>,
+    faults: u32,
 }
 
 fn against_start((start, extremes): &mut (Option<f64>, Extremes), value: f64) {
@@ -101,6 +106,19 @@ impl TravelMeter {
         self.steps = self.steps.max(v.step);
     }
 
+    pub(super) fn event(&mut self, t_s: f64, event: &Event) {
+        match event.cause {
+            Cause::Master(MasterEvent::Behaviour(Act::Stuck)) => {
+                self.gives_up_s.get_or_insert(t_s);
+            }
+            Cause::Board {
+                change: BoardChange::FaultLatched(_),
+                ..
+            } => self.faults += 1,
+            _ => {}
+        }
+    }
+
     /// A measure, SI; `None` where the run was too short or the measure has no meaning.
     fn value(&self, measure: Measure) -> Option<f64> {
         let largest = |(_, Extremes(range)): &(Option<f64>, Extremes)| {
@@ -129,6 +147,8 @@ impl TravelMeter {
             }
             Measure::ChassisForce => Some(self.chassis_n),
             Measure::Steps => Some(f64::from(self.steps)),
+            Measure::StuckAfter => self.gives_up_s,
+            Measure::Faults => Some(f64::from(self.faults)),
         }
     }
 
@@ -210,6 +230,34 @@ mod tests {
         near(Measure::Radius, 0.1 / 40.0_f64.to_radians());
         near(Measure::Pitch, 10.0_f64.to_radians());
         near(Measure::Roll, 0.0);
+    }
+
+    /// A robot that does not give up has no time at which it did: the bar is missed.
+    #[test]
+    fn the_first_time_that_it_gives_up_counts_and_every_fault() {
+        let mut meter = driven(100.0, 0.0, 100.0);
+        let bar = Bar {
+            measure: Measure::StuckAfter,
+            min: None,
+            max: Some(20.0),
+            required: true,
+        };
+        assert!(!meter.targets(&[bar])[0].pass);
+        let gives_up = || Event::from(Cause::Master(MasterEvent::Behaviour(Act::Stuck)));
+        meter.event(12.5, &gives_up());
+        meter.event(30.0, &gives_up());
+        let target = &meter.targets(&[bar])[0];
+        assert_eq!(
+            (target.value, target.unit, target.pass),
+            (Some(12.5), "s", true)
+        );
+        assert_eq!(meter.value(Measure::Faults), Some(0.0));
+        for node in 1..=2 {
+            let board = wheeleg_protocol::Address::joint(node).expect("a joint");
+            let change = BoardChange::FaultLatched(wheeleg_protocol::Fault::NoMotion);
+            meter.event(1.0, &Cause::Board { board, change }.into());
+        }
+        assert_eq!(meter.value(Measure::Faults), Some(2.0));
     }
 
     #[test]
