@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 pub use contact::Contact;
 use contact::ContactMeter;
 use delay::{DelayMeter, ShiftMeter};
-pub use delay::StartDelay;
+pub use delay::{Fit, StartDelay};
 pub use reference::{ReferenceModel, ReferencePoint};
 use rest::StandMeter;
 use safe_state::SafeStateMeter;
@@ -49,9 +49,9 @@ pub struct Analysis {
     pub leg: Option<LegChoice>,
     /// Delay from commanded step to motion, per move.
     pub start_delays: Vec<StartDelay>,
-    /// Shift between reference model and simulated robot, s; only where no event
-    /// of the scenario disturbs the motion.
-    pub shift_s: Option<f64>,
+    /// Strokes beside those of the reference model; only where no event of the scenario disturbs
+    /// the motion.
+    pub fit: Option<Fit>,
     /// Lifts and touchdowns of the stepping foot.
     pub contacts: Vec<Contact>,
 }
@@ -260,8 +260,8 @@ impl<'a> Analyser<'a> {
             .contacts
             .is_some()
             .then(|| ReferenceModel::new(self.robot.reference, self.robot.gait));
-        let shift_s = match (self.shift, &reference) {
-            (Some(shift), Some(model)) => shift.shift_s(model),
+        let fit = match (self.shift, &reference) {
+            (Some(shift), Some(model)) => shift.fit(model),
             _ => None,
         };
         let mut analysis = Analysis {
@@ -269,7 +269,7 @@ impl<'a> Analyser<'a> {
             start_s: self.start_s.unwrap_or(0.0),
             leg: self.moving,
             start_delays: self.delays.map_or(Vec::new(), DelayMeter::into_delays),
-            shift_s,
+            fit,
             contacts: self
                 .contacts
                 .map_or(Vec::new(), ContactMeter::into_contacts),

@@ -395,13 +395,19 @@ fn delays(targets: &mut Vec<Target>, robot: &RobotConfig, analysis: &Analysis) {
                 "shift of the simulated velocities against the reference model, by \
                  cross-correlation (paper: {paper} s between model and experiment; read to ±0.1 s)"
             ),
-            analysis.shift_s,
+            analysis.fit.map(|fit| fit.shift_s),
             "s",
             Some(paper - 0.1),
             Some(paper + 0.1),
         )
         .info(),
     );
+    for (place, name) in ["b5", "b6"].into_iter().enumerate() {
+        let id = format!("A26-rms-{name}");
+        let description = format!("{name} beside the reference model shifted by that, RMS");
+        let residual = analysis.fit.map(|fit| fit.residual_mm[place]);
+        targets.push(Target::new(id, description, residual, "mm", None, None).info());
+    }
     let known: Vec<f64> = analysis
         .start_delays
         .iter()
@@ -451,6 +457,7 @@ mod tests {
         }
         assert!((value("A21-V5") - 378.4).abs() < 0.1);
         assert!((value("A26") - 0.25).abs() < 0.002);
+        assert!(value("A26-rms-b5") < 0.5 && value("A26-rms-b6") < 0.5);
         assert!((value("A27-raw") - 25.78).abs() < 0.01);
         assert!((value("A25") - 3.0).abs() < 1e-12);
         assert!((value("A22-max-raw") - 5.88).abs() < 0.1);

@@ -81,6 +81,8 @@ struct Page<'a> {
     required: usize,
     met: usize,
     shift_s: Option<f64>,
+    /// What is left of b5 and b6 beside the shifted model, mm.
+    residual_mm: Option<[f64; 2]>,
     messages: u64,
     /// Period of the rows of fast channels in the figures, ms.
     period_ms: u64,
@@ -213,7 +215,8 @@ pub(super) fn render(
         pil: summary.pil.as_ref().map(Boards::new),
         required: required.count(),
         met,
-        shift_s: source.analysis.shift_s,
+        shift_s: source.analysis.fit.map(|fit| fit.shift_s),
+        residual_mm: source.analysis.fit.map(|fit| fit.residual_mm),
         messages: source.recording.messages,
         period_ms: source.recording.period_ms,
         left_out: source.recording.events_left_out,

@@ -1,6 +1,7 @@
 //! The figures of a run, built from its recording.
 
 mod event;
+mod force;
 
 use crate::analysis::{Analysis, ReferencePoint};
 use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario};
@@ -214,31 +215,16 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             ),
         ]
     };
-    let force = vec![
-        line(
-            "simulated, unfiltered",
-            colour::RAW,
-            1,
-            s.joint(b6, |j| j.force_net_raw_n),
-        ),
-        line(
-            "reference model",
-            colour::MODEL,
-            2,
-            s.model(0.0, |p| p.f6_n),
-        ),
-        line(
-            "simulated robot, 20 Hz low-pass",
-            colour::ROBOT,
-            2,
-            s.joint(b6, |j| j.force_net_n),
-        ),
-    ];
     vec![
-        stroke("fig12-b5", 12, "horizontal cylinder b5", b5, |p| p.s5_m * 1e3),
+        stroke("fig12-b5", 12, "horizontal cylinder b5", b5, |p| {
+            p.s5_m * 1e3
+        }),
         stroke("fig13-b6", 13, "vertical cylinder b6", b6, |p| p.s6_m * 1e3),
         pair(
-            "fig14-velocity", 14, "velocities V5 and V6", "[mm/s]",
+            "fig14-velocity",
+            14,
+            "velocities V5 and V6",
+            "[mm/s]",
             "Velocities, unfiltered. Limit lines: the paper's axis, ±400 mm/s.",
             vec![
                 ("V5", (-400.0, 400.0), velocity(b5, |p| p.v5_m_s * 1e3)),
@@ -246,20 +232,17 @@ fn paper_figures(s: &Source<'_>, b5: usize, b6: usize) -> Vec<Figure> {
             ],
         ),
         pair(
-            "fig15-acceleration", 15, "accelerations a5 and a6", "[m/s²]",
+            "fig15-acceleration",
+            15,
+            "accelerations a5 and a6",
+            "[m/s²]",
             "Accelerations after a 20 Hz low-pass. Limit lines: the paper's axes, read in m/s² (its mm/s² cannot be: MODEL.md §11).",
             vec![
                 ("a5", (-5.0, 10.0), acceleration(b5, |p| p.a5_m_s2)),
                 ("a6", (-10.0, 5.0), acceleration(b6, |p| p.a6_m_s2)),
             ],
         ),
-        Figure {
-            id: "fig16-f6".into(),
-            title: "Fig. 16: force F6 on the vertical cylinder".into(),
-            caption: "Net generalised force on b6: pressure forces less seal friction less end-stop reaction. \
-                      Limit lines: the paper's axis, ±30 N. The unfiltered trace is cut off at the edges of the figure; its peaks are in the table.".into(),
-            panels: vec![s.panel("F6", 300, Content::lines(("[N]", (-60.0, 60.0)), force).limited(&[30.0, -30.0]))],
-        },
+        force::figure(s, b6),
     ]
 }
 
