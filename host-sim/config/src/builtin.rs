@@ -29,8 +29,10 @@ pub const ROBOTS: &[(&str, &str, &str)] =
 pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "three-step", "stand", "sinusoid", "master-lost", "master-lost-push", "estop",
     "foot-side-front", "foot-side-back", "foot-side-left", "foot-side-right",
-    "walk", "sand-flat", "sand-slope-10", "sand-slope-20", "rocks-20", "rocks-30", "rock-slope",
-    "turn", "spin", "wall-30", "pit", "frozen-layer-1", "slope-10", "rock-field", "height-map",
+    "walk", "sand-flat", "sand-slope-10", "sand-slope-20", "dry-sand-slope-20", "rocks-20", "rocks-30",
+    "rock-30-single", "rock-30-boulder", "rock-slope", "turn", "spin", "wall-30", "pit", "sand-to-rock",
+    "frozen-layer-1", "sand-slope-10-legs-idle", "sand-slope-20-legs-idle", "rock-30-single-legs-idle",
+    "slope-10", "rock-field", "height-map",
 );
 
 /// Plans of campaigns: name, file name for messages, text.

@@ -161,6 +161,7 @@ mod tests {
             scenario: "sand-flat",
             description: String::new(),
             robot: String::new(),
+            stretch: false,
             runs: 5,
             passed,
             interval: [0.0, 1.0],

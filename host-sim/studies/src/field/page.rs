@@ -28,6 +28,7 @@ struct Page<'a> {
     stopped: Option<String>,
     summary: &'a Summary,
     claims: Vec<ClaimRow<'a>>,
+    controls: Vec<ControlRow<'a>>,
     scenarios: Vec<ScenarioRow<'a>>,
     failures: Vec<Failure<'a>>,
     figures: Vec<Picture<'a>>,
@@ -42,6 +43,34 @@ struct ClaimRow<'a> {
     value: String,
     interval: String,
     share: String,
+}
+
+#[derive(Serialize)]
+struct ControlRow<'a> {
+    ground: &'a str,
+    sides: [SideRow<'a>; 2],
+}
+
+#[derive(Serialize)]
+struct SideRow<'a> {
+    scenario: &'a str,
+    way: String,
+    tail: String,
+}
+
+impl<'a> SideRow<'a> {
+    fn of(side: &'a super::controls::Side) -> Self {
+        let tail = match side.on_tail {
+            Some(0) => "off the ground".to_owned(),
+            Some(runs) => format!("on the ground in {runs} of {}", side.runs),
+            None => "not looked at".to_owned(),
+        };
+        Self {
+            scenario: side.scenario,
+            way: value(&side.way),
+            tail,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -109,8 +138,8 @@ fn interval([low, high]: [f64; 2]) -> String {
 /// The page's first sentence. Scenarios may be chosen of which the paper claims nothing.
 fn verdict(summary: &Summary) -> String {
     let met = summary.claims.iter().filter(|c| c.met == Met::Met).count();
-    let passed = summary.runs.iter().filter(|run| run.passed).count();
-    let runs = format!("{passed} of {} runs pass.", summary.runs.len());
+    let passed = summary.judged().filter(|run| run.passed).count();
+    let runs = format!("{passed} of {} runs pass.", summary.judged().count());
     match summary.claims.len() {
         0 => runs,
         claims => {
@@ -155,7 +184,11 @@ pub(super) fn render(
             })
             .collect(),
     });
-    let failures = summary.runs.iter().filter(|run| !run.passed).map(|run| {
+    let controls = summary.controls.iter().map(|control| ControlRow {
+        ground: control.ground,
+        sides: [&control.legs, &control.idle].map(SideRow::of),
+    });
+    let failures = summary.judged().filter(|run| !run.passed).map(|run| {
         let missed = run.bars.iter().filter(|b| b.required && !b.pass);
         let missed = missed.map(|b| format!("{} {}", b.id, b.value_text()));
         let why: Vec<String> = run.error.iter().cloned().chain(missed).collect();
@@ -170,6 +203,7 @@ pub(super) fn render(
         stopped: stopped.map(ToString::to_string),
         summary,
         claims: claims.collect(),
+        controls: controls.collect(),
         scenarios: scenarios.collect(),
         failures: failures.collect(),
         figures: pictures(figures),
@@ -188,6 +222,7 @@ mod tests {
         let summary = Summary {
             seeds: 1,
             claims: Vec::new(),
+            controls: Vec::new(),
             scenarios: Vec::new(),
             runs: Vec::new(),
         };
@@ -197,5 +232,37 @@ mod tests {
         assert!(page.contains("0 of 0 runs pass."), "{page}");
         assert!(!page.contains("claims of the paper") && !page.contains("id=\"claims\""));
         assert!(page.contains("What is assumed"));
+    }
+
+    /// It is shown as what it is, and a run that misses it fails nothing.
+    #[test]
+    fn a_stretch_goal_that_is_missed_is_no_failure() {
+        let name = super::super::STRETCH[0];
+        assert!(super::super::SCENARIOS.contains(&name));
+        let run = |scenario| super::super::Run {
+            scenario,
+            seed: 1,
+            error: None,
+            passed: false,
+            hash: String::new(),
+            bars: Vec::new(),
+        };
+        let summary = |scenario| {
+            let run = run(scenario);
+            let tried = super::super::Tried::of(scenario, &[&run]).expect("built in");
+            Summary {
+                seeds: 1,
+                claims: Vec::new(),
+                controls: Vec::new(),
+                scenarios: vec![tried],
+                runs: vec![run],
+            }
+        };
+        let (stretch, plain) = (summary(name), summary("rocks-30"));
+        assert!(stretch.passed() && !plain.passed());
+        let page = |summary| render(summary, None, &[]).expect("a page");
+        let (stretch, plain) = (page(&stretch), page(&plain));
+        assert!(stretch.contains("Stretch goal") && !stretch.contains("id=\"failures\""));
+        assert!(!plain.contains("Stretch goal") && plain.contains("id=\"failures\""));
     }
 }

@@ -1,0 +1,120 @@
+//! The control experiments of co-operation: the same ground with legs and wheels, and with wheels
+//! alone.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use wheeleg_config::Measure;
+
+use super::{Measured, Tried};
+
+/// Two scenarios that differ in the legs.
+#[derive(Debug, Clone, Copy)]
+pub struct Control {
+    /// The ground, in words.
+    pub ground: &'static str,
+    /// Scenario in which the legs walk and pull.
+    pub legs: &'static str,
+    /// Scenario in which they stand and are dragged along.
+    pub idle: &'static str,
+}
+
+/// All of them.
+pub const CONTROLS: &[Control] = &[
+    Control {
+        ground: "10 degrees of volcanic sand",
+        legs: "sand-slope-10",
+        idle: "sand-slope-10-legs-idle",
+    },
+    Control {
+        ground: "20 degrees of volcanic sand",
+        legs: "sand-slope-20",
+        idle: "sand-slope-20-legs-idle",
+    },
+    Control {
+        ground: "a rock of 0.30 m, 100 mm high, under the left wheel",
+        legs: "rock-30-single",
+        idle: "rock-30-single-legs-idle",
+    },
+];
+
+/// What is held against each other: the way of the robot.
+const MEASURE: Measure = Measure::Distance;
+
+/// One side of a control experiment.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Side {
+    /// Scenario.
+    pub scenario: &'static str,
+    /// Way of the robot.
+    pub way: Measured,
+    /// Runs.
+    pub runs: u64,
+    /// Runs in which the tail touched the ground; `None` where that is no bar.
+    pub on_tail: Option<u64>,
+}
+
+/// A control experiment with what was measured.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Compared {
+    /// The ground.
+    pub ground: &'static str,
+    /// Legs and wheels.
+    pub legs: Side,
+    /// Wheels alone.
+    pub idle: Side,
+}
+
+impl Side {
+    fn of(tried: &[Tried], name: &str) -> Option<Self> {
+        let tried = tried.iter().find(|t| t.scenario == name)?;
+        let bar = |measure: Measure| tried.measured.iter().find(|m| m.measure == measure.name());
+        let tail = bar(Measure::ChassisForce);
+        Some(Self {
+            scenario: tried.scenario,
+            way: bar(MEASURE)?.clone(),
+            runs: tried.runs,
+            on_tail: tail.map(|m| tried.runs - m.met),
+        })
+    }
+}
+
+impl Control {
+    /// Both sides; `None` if one was not tried.
+    pub(super) fn compare(&self, tried: &[Tried]) -> Option<Compared> {
+        Some(Compared {
+            ground: self.ground,
+            legs: Side::of(tried, self.legs)?,
+            idle: Side::of(tried, self.idle)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::{Motion, Scenario, builtin};
+    use wheeleg_units::VelocityMmS;
+
+    /// Ground and robot are the same to the last number, or it is no control.
+    #[test]
+    fn both_sides_of_a_control_stand_on_the_same_ground() {
+        for control in CONTROLS {
+            let scenario = |name| -> Scenario {
+                assert!(super::super::SCENARIOS.contains(&name), "{name}");
+                builtin::scenario(name).expect("built in")
+            };
+            let (legs, idle) = (scenario(control.legs), scenario(control.idle));
+            assert_eq!(legs.robot, idle.robot, "{}", control.ground);
+            assert_eq!(legs.ground, idle.ground, "{}", control.ground);
+            let goes = |scenario: &Scenario| match scenario.motion {
+                Motion::Walk(order) => order.speed_mm_s != VelocityMmS::ZERO,
+                _ => false,
+            };
+            assert!(goes(&legs) && !goes(&idle), "{}", control.ground);
+            for side in [legs, idle] {
+                let way = side.bars.iter().any(|b| b.measure == MEASURE);
+                assert!(way, "{} has no bar on its way", side.name);
+            }
+        }
+    }
+}
