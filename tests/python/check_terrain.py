@@ -41,14 +41,15 @@ def minus_wheels(body):
     return rest, com, inertia - rest * (com @ com * np.eye(3) - np.outer(com, com))
 
 
-def model(body, slope_deg=0.0, wheel_damping=0.0, rubbing_feet=True, edge_m=None, actuator=""):
-    """The robot in MuJoCo, the ground level and gravity tilted; uphill is ahead."""
+def model(body, slope_deg=0.0, wheel_damping=0.0, rubbing_feet=True, edge_m=None, actuator="", across=False, mu=None):
+    """The robot in MuJoCo, the ground level and gravity tilted; uphill is ahead, or to the left with a slope across."""
     mass, com, inertia = minus_wheels(body)
     full = " ".join(str(inertia[i]) for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
     radius, half = body["wheel_radius_m"], body["wheel_width_m"] / 2
     slope = math.radians(slope_deg)
-    gravity = f"{-GRAVITY * math.sin(slope)} 0 {-GRAVITY * math.cos(slope)}"
-    mu = body["mu"]
+    along = -GRAVITY * math.sin(slope)
+    gravity = f"{0 if across else along} {along if across else 0} {-GRAVITY * math.cos(slope)}"
+    mu = body["mu"] if mu is None else mu
     feet = ""
     for leg, (x, y, z) in enumerate(body["soles_m"]):
         for a, b in ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)):
@@ -122,7 +123,7 @@ class Checks:
     def near(self, what, ours, theirs, tolerance, unit):
         good = abs(ours - theirs) <= tolerance
         self.failed += not good
-        print(f"{'ok  ' if good else 'FAIL'} {what}: {ours:.4f} {unit}, MuJoCo {theirs:.4f}, within {tolerance:.4f}")
+        print(f"{'ok  ' if good else 'FAIL'} {what}: {ours:.4f} {unit}, expected {theirs:.4f}, within {tolerance:.4f}")
 
 
 def check_static(checks, results):
@@ -151,6 +152,19 @@ def check_roll(checks, results):
         mujoco.mj_step(m, d)
     ours = results["roll_speed_m_s"]
     checks.near("speed after 1 m down 10°", ours, float(np.linalg.norm(d.qvel[:3])), 0.02 * ours, "m/s")
+
+
+def check_slide(checks, results):
+    mu, slope = results["slide_mu"], math.radians(25)
+    m, d = model(results["body"], 25.0, wheel_damping=LOCKED, across=True, mu=mu)
+    while d.qpos[1] > -1.0 and d.time < 10:
+        mujoco.mj_step(m, d)
+    ours = results["slide_speed_m_s"]
+    name = f"speed after 1 m down 25° with a friction of {mu}"
+    checks.near(name, ours, float(np.linalg.norm(d.qvel[:3])), 0.02 * ours, "m/s")
+    # Both beside what a block would do, v² = 2 g (sin α - μ cos α) s.
+    block = math.sqrt(2 * GRAVITY * (math.sin(slope) - mu * math.cos(slope)))
+    checks.near(f"{name}, beside a block's", ours, block, 0.02 * block, "m/s")
 
 
 def check_drop(checks, results):
@@ -225,7 +239,7 @@ def main():
         print(f"{sys.argv[1]}: {error}", file=sys.stderr)
         return 2
     checks = Checks()
-    for check in (check_static, check_roll, check_drop, check_step, check_arc, check_tip_back):
+    for check in (check_static, check_roll, check_slide, check_drop, check_step, check_arc, check_tip_back):
         check(checks, results)
     print(f"{checks.failed} of the figures do not agree" if checks.failed else "all figures agree")
     return 1 if checks.failed else 0

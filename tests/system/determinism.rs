@@ -2,10 +2,11 @@
 
 mod sil;
 
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use sil::{gait, robot, run};
-use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario};
+use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario, builtin};
 use wheeleg_master::command::Command;
 use wheeleg_plant::robot::{Inputs, Plant, PlantParams, PlantState};
 
@@ -63,24 +64,57 @@ fn another_seed_or_robot_or_event_has_another_hash() {
     add("a request", hash(&plain, &robot, 7));
 }
 
-#[test]
-fn thread_and_working_directory_make_no_difference() {
-    let here = hash(&eventful(), &robot(), 7);
+/// One test at a time has another working directory.
+static FOLDER: Mutex<()> = Mutex::new(());
+
+/// Does something in an empty folder, which must stay empty.
+fn in_another_folder<T>(work: impl FnOnce() -> T) -> T {
+    let _alone = FOLDER.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let before = std::env::current_dir().expect("a working directory");
     // Nothing else in this program looks at the working directory.
     std::env::set_current_dir(folder.path()).expect("the folder exists");
-    let threads: Vec<_> = (0..2)
-        .map(|_| thread::spawn(|| hash(&eventful(), &robot(), 7)))
-        .collect();
-    let hashes: Vec<String> = threads
-        .into_iter()
-        .map(|t| t.join().expect("the run ends"))
-        .collect();
+    let done = work();
     std::env::set_current_dir(before).expect("the folder is still there");
-    assert_eq!(hashes, [here.clone(), here]);
     let left = std::fs::read_dir(folder.path()).expect("readable").count();
     assert_eq!(left, 0, "a run in memory writes no file");
+    done
+}
+
+#[test]
+fn thread_and_working_directory_make_no_difference() {
+    let here = hash(&eventful(), &robot(), 7);
+    let hashes = in_another_folder(|| {
+        let threads: Vec<_> = (0..2)
+            .map(|_| thread::spawn(|| hash(&eventful(), &robot(), 7)))
+            .collect();
+        let joined = threads.into_iter().map(|t| t.join().expect("the run ends"));
+        joined.collect::<Vec<String>>()
+    });
+    assert_eq!(hashes, [here.clone(), here]);
+}
+
+/// A walk on rocks, where contacts come and go by the hundred: the same in two folders, on one
+/// thread after another and on two at a time; other rocks make another run.
+#[test]
+fn a_walk_on_rocks_is_the_same_in_any_folder_on_one_thread_or_two() {
+    let walk = |seed: u64| {
+        let mut scenario = builtin::scenario_on_ground("rocks-20", seed).expect("built in");
+        // The feet are on the rocks after 6 s, the wheels after 10 s.
+        scenario.duration_s = 12.0;
+        let robot = builtin::robot_of(&scenario.robot, "rocks-20").expect("built in");
+        hash(&scenario, &robot, 1)
+    };
+    let here = walk(1);
+    let there = in_another_folder(|| {
+        let threads: Vec<_> = (0..2).map(|_| thread::spawn(move || walk(1))).collect();
+        threads
+            .into_iter()
+            .map(|t| t.join().expect("the run ends"))
+            .collect::<Vec<String>>()
+    });
+    assert_eq!(there, [here.clone(), here.clone()]);
+    assert_ne!(here, walk(2), "the seed of the rocks makes no difference");
 }
 
 /// Valve and motor commands for one tick, different in every tick.

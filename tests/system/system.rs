@@ -17,6 +17,7 @@ mod cylinders;
 mod delay;
 #[cfg(target_os = "linux")]
 mod disks;
+mod energy;
 mod errors;
 #[cfg(unix)]
 mod every_command;

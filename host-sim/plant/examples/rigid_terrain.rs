@@ -8,6 +8,7 @@
 //! for rigid ones; motors have neither friction nor loss.
 
 use std::error::Error;
+use std::f64::consts::FRAC_PI_2;
 
 use serde_json::{Value, json};
 use wheeleg_plant::dynamics::floating::FloatingState;
@@ -105,19 +106,43 @@ fn loads(three: bool, degrees: f64) -> Result<Value, Failed> {
     }))
 }
 
+/// Speed once it has gone a metre by itself.
+fn speed_after_a_metre(plant: &Plant, state: &mut PlantState) -> Result<f64, Failed> {
+    let norm = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let begun = plant.outputs(state).position_m;
+    for _ in 0..10_000 {
+        plant.tick(state, &Inputs::default())?;
+        let now = plant.outputs(state);
+        let gone: [f64; 3] = std::array::from_fn(|i| now.position_m[i] - begun[i]);
+        if norm(gone) >= 1.0 {
+            return Ok(norm(now.velocity_m_s));
+        }
+    }
+    Err("it does not go a metre".into())
+}
+
 /// Backwards down 10°, wheels free, feet slippery: speed after a metre along the slope.
 fn roll() -> Result<f64, Failed> {
     let (plant, mut state) = slippery(&on(&robot(false), 10.0))?;
-    let begun = plant.outputs(&state);
-    for _ in 0..10_000 {
-        plant.tick(&mut state, &Inputs::default())?;
-        let now = plant.outputs(&state);
-        let gone = (0..3).map(|i| (now.position_m[i] - begun.position_m[i]).powi(2));
-        if gone.sum::<f64>() >= 1.0 {
-            return Ok(now.velocity_m_s[0].hypot(now.velocity_m_s[2]));
-        }
+    speed_after_a_metre(&plant, &mut state)
+}
+
+/// Down 25° with this friction below wheels and feet, the slope across, so that no wheel rolls:
+/// speed after a metre.
+fn slide(mu: f64) -> Result<f64, Failed> {
+    let mut params = robot(false);
+    let slope = Plane::sloping(25_f64.to_radians(), FRAC_PI_2);
+    params.terrain.parts[0].shape = Shape::Plane(slope);
+    // It stands while it holds; then it is put on slippery ground.
+    let mut state = Plant::new(&params)?.initial_state(1)?;
+    for law in [
+        &mut params.contacts.wheel.law,
+        &mut params.contacts.foot.law,
+    ] {
+        law.mu_static = mu;
+        law.mu_kinetic = mu;
     }
-    Err("it does not roll".into())
+    speed_after_a_metre(&Plant::new(&params)?, &mut state)
 }
 
 /// Height of the axle at rest after a drop.
@@ -201,6 +226,8 @@ fn main() -> Result<(), Failed> {
         "body_three": body(&robot(true))?,
         "static": statics,
         "roll_speed_m_s": roll()?,
+        "slide_mu": 0.3,
+        "slide_speed_m_s": slide(0.3)?,
         "drop_height_m": drop_height()?,
         "step_height_m": 0.02,
         "step_torque_n_m": step(0.02)?,

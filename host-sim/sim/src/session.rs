@@ -18,7 +18,7 @@ use crate::faults::{ActiveFaults, Schedule};
 use crate::observe::Observer;
 use crate::operator::{Operator, listen, record_answer};
 use crate::world::{Happened, World};
-use crate::{Boards, JointProbe, RunOutcome, SimError, setup};
+use crate::{Boards, EnergyBalance, JointProbe, RunOutcome, SimError, setup};
 
 /// One robot, from power-up on: boards, bus, master and plant on one clock, the operator who
 /// gets it ready and carries the scenario out, and the observer who samples it.
@@ -166,6 +166,23 @@ impl Session {
             self.handle(happened, recorder)?;
         }
         Ok(())
+    }
+
+    /// Keeps account of the mechanical energy from now on. The run takes about twice as long, and is
+    /// the same.
+    ///
+    /// # Errors
+    /// [`SimError::Simulation`] if the pose of the robot is outside the model's range.
+    pub fn account_for_energy(&mut self) -> Result<(), SimError> {
+        self.world.account_for_energy()
+    }
+
+    /// The account so far; `None` if none is kept.
+    ///
+    /// # Errors
+    /// As [`account_for_energy`](Self::account_for_energy).
+    pub fn energy(&self) -> Result<Option<EnergyBalance>, SimError> {
+        self.world.energy()
     }
 
     /// A user command, now. A refusal is an event of the recording, as on the real console.

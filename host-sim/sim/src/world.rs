@@ -6,6 +6,7 @@
 //! plant is advanced to a tick before its inputs are latched; bus events do
 //! not touch it.
 
+mod account;
 mod edges;
 mod inject;
 mod power;
@@ -28,6 +29,7 @@ use super::bus::Bus;
 use super::client::Client;
 use super::clock::NS_PER_US;
 use super::downtime::DownTimes;
+use super::energy::EnergyMeter;
 use super::rogue_nodes::RogueNodes;
 use crate::SimError;
 use crate::faults::Injector;
@@ -57,6 +59,8 @@ pub(super) enum Happened {
 pub(super) struct World {
     pub(super) plant: Plant,
     pub(super) state: PlantState,
+    /// Where the energy is accounted for.
+    pub(super) energy: Option<EnergyMeter>,
     pub(super) inputs: Inputs,
     pub(super) outputs: Outputs,
     /// Addresses 1 to 8.
@@ -188,6 +192,7 @@ impl World {
             outputs,
             plant,
             state,
+            energy: None,
             inputs: Inputs::default(),
             boards,
             wheel_edges: [[0; 2]; 2],
@@ -261,9 +266,12 @@ impl World {
     }
 
     fn advance_plant(&mut self) -> Result<(), SimError> {
-        self.plant
-            .advance_to(&mut self.state, self.now_ns)
-            .map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))
+        let (state, to_ns) = (&mut self.state, self.now_ns);
+        let advanced = match &mut self.energy {
+            Some(meter) => meter.advance(&self.plant, state, to_ns),
+            None => self.plant.advance_to(state, to_ns),
+        };
+        advanced.map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))
     }
 
     /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
