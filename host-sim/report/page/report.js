@@ -6,6 +6,7 @@ import { Player } from "./player.js";
 import { transport } from "./transport.js";
 import { Linked, Plot } from "./plot.js";
 import { footView, sideView, topView } from "./robot.js";
+import { showFilm } from "./film.js";
 
 /** @typedef {{geometry: import("./robot.js").Geometry, t: number[], start: number, end: number,
  *   commanded_mm: number[][], sensed_mm: number[][], load_n: number[][], switches: number[][],
@@ -106,6 +107,13 @@ if (place && source) {
   showMotion(place, motion, clock);
   // The first instant at which there are samples.
   clock.seek(motion.t[0]);
+  const film = document.getElementById("film");
+  const player = clock;
+  const goTo = (t) => {
+    player.hold(t);
+    place.scrollIntoView({ block: "center" });
+  };
+  if (film) showFilm(film, motion, (t) => pose(motion, t), goTo);
 }
 showFigures(clock);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => groups.forEach((g) => g.redraw()));

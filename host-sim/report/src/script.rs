@@ -5,7 +5,7 @@
 //! is enough: an import is one line, nothing is renamed, and no name is given twice.
 
 /// Modules in the order in which they need each other.
-const MODULES: [(&str, &str); 10] = [
+const MODULES: [(&str, &str); 11] = [
     ("dom.js", include_str!("../page/dom.js")),
     ("signal.js", include_str!("../page/signal.js")),
     ("player.js", include_str!("../page/player.js")),
@@ -15,6 +15,7 @@ const MODULES: [(&str, &str); 10] = [
     ("shape.js", include_str!("../page/shape.js")),
     ("ground.js", include_str!("../page/ground.js")),
     ("robot.js", include_str!("../page/robot.js")),
+    ("film.js", include_str!("../page/film.js")),
     ("report.js", include_str!("../page/report.js")),
 ];
 

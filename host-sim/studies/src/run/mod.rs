@@ -22,7 +22,7 @@ use self::figures::Source;
 use crate::StudyError;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_config::{EventAction, LawChoice, RobotConfig, Scenario, builtin};
+use wheeleg_config::{EventAction, LawChoice, Motion, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
 use wheeleg_scene::Scene;
 use wheeleg_sim::faults;
@@ -260,8 +260,10 @@ fn keep(scenario: &Scenario) -> Keep {
     } else {
         all
     };
+    // Slip is drawn of walks, rims around an event.
     match shown {
         Some(_) => all,
+        None if matches!(scenario.motion, Motion::Walk(_)) => all,
         None => all.without(&["/wheel/7", "/wheel/8"]),
     }
 }

@@ -2,6 +2,7 @@
 
 mod event;
 mod force;
+mod walk;
 
 use crate::analysis::{Analysis, ReferencePoint};
 use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario};
@@ -126,6 +127,7 @@ pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
     if s.analysis.reference.is_some() {
         figures.extend(paper_figures(s, first + 1, first + 2));
     } else {
+        figures.extend(walk::figures(s));
         figures.push(strokes(s));
     }
     if let Some(event) = s.marks().first() {
