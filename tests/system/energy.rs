@@ -7,8 +7,8 @@ use wheeleg_config::builtin;
 use wheeleg_sim::{Boards, EnergyBalance, Session};
 use wheeleg_telemetry::Recorder;
 
-/// What a scenario runs for here, s: three steps of a walk, with what its terrain does to them.
-const SHORT_S: f64 = 8.0;
+/// What a scenario runs for here, s: some steps of a walk, and every stop of the files.
+const SHORT_S: f64 = 6.5;
 /// Longest start-up, s.
 const START_UP_S: f64 = 60.0;
 /// Allowed residual: a share of the actuators' work, and a rest, J.
