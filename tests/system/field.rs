@@ -94,6 +94,7 @@ fn a_wall_and_steep_sand_are_not_climbed() {
 /// The control experiments of co-operation: where legs and wheels get on together, wheels alone,
 /// with the legs standing, do not.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn wheels_alone_do_not_get_where_legs_and_wheels_do() {
     let names = CONTROLS.iter().flat_map(|c| [c.legs, c.idle]);
     let names: Vec<&str> = names.filter(|name| !name.contains("20")).collect();
