@@ -79,7 +79,12 @@ fn text(summary: &Summary) -> String {
         );
     }
     for s in &summary.scenarios {
-        let _ = writeln!(out, "{:16} {} of {} pass", s.scenario, s.passed, s.runs);
+        let stretch = if s.stretch { " (stretch goal)" } else { "" };
+        let _ = writeln!(
+            out,
+            "{:25} {} of {} pass{stretch}",
+            s.scenario, s.passed, s.runs
+        );
     }
     out
 }
