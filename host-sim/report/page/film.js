@@ -43,7 +43,7 @@ export function showFilm(place, motion, poseAt, goTo) {
     const now = poseAt(t);
     sideView(picture, motion.geometry, motion.ground).update(now);
     const label = `${fixed(t, 1)} s, ${fixed(now.travel_mm / 1000, 2)} m`;
-    strip.append(html("button", { type: "button", class: "frame", "aria-label": `Go to ${label}`, onclick: () => goTo(t) }, picture, html("span", { class: "num" }, label)));
+    strip.append(html("div", { class: "frame" }, picture, html("button", { type: "button", class: "num", onclick: () => goTo(t) }, label)));
   }
   place.append(html("h2", {}, "Filmstrip"), html("p", {}, `${count} of ${all.length} swings, each in its middle. A frame leads the robot above to its time.`), strip);
   place.hidden = false;

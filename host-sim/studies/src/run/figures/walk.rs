@@ -89,7 +89,7 @@ fn foot_fall(s: &Source<'_>) -> Figure {
         id: "foot-fall".into(),
         title: "Foot-fall".into(),
         caption: "When each foot stands: blue as the walk plans it, ink as the ground carries it (more than 1 N). \
-                  Red: ground that a foot met 20 mm and more before its plan (early) or after it (late)."
+                  Ticks: ground that a foot met 20 mm and more before its plan (early) or after it (late)."
             .into(),
         panels: vec![s.panel("left and right foot", height, Content::Raster(rows))],
     }
@@ -152,7 +152,7 @@ fn behaviours(s: &Source<'_>) -> Figure {
     Figure {
         id: "behaviours".into(),
         title: "Behaviours".into(),
-        caption: "Each tick is an act of a behaviour; red are those that stop the robot or hold an axis. \
+        caption: "Each tick is an act of a behaviour; in the colour of alarms those that stop the robot or hold an axis. \
                   Below, the share of the walk's speed at which the wheels go."
             .into(),
         panels: vec![
