@@ -132,6 +132,54 @@ fn a_recording_repeats_after_term_and_after_a_kill() {
     }
 }
 
+/// A computer that sleeps for a while under a walking robot: nobody has seen it meanwhile.
+#[test]
+fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
+    let served = Served::new("");
+    served.until("ready", |state| state["ready"] == true);
+    for command in ["Arm", "Stand"] {
+        let done = served.ctl(&["take", "--", command]);
+        assert!(done.status.success(), "{done:?}");
+    }
+    let walk = [
+        "speed=60",
+        "turn=0",
+        "pattern=alternate",
+        "lift=60",
+        "nose=-20",
+    ];
+    let mut driver = Command::new(program::path())
+        .args(["ctl", "--url", &served.address, "take", "--", "Walk"])
+        .args(walk)
+        .env("XDG_STATE_HOME", served.home.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("start");
+    let before = served.until("walking", |state| state["phase"] == "walk");
+    let us = |state: &Value| state["master_us"].as_u64().expect("a time");
+    let pid = served.child.id().to_string();
+    let signal = |name: &str| {
+        let sent = Command::new("kill").args([name, &pid]).status();
+        assert!(sent.expect("kill").success());
+    };
+    signal("-STOP");
+    std::thread::sleep(Duration::from_secs(10));
+    signal("-CONT");
+    let woken = Instant::now();
+    let state = served.until("held", |state| !state["hold"].is_null());
+    assert_eq!(state["hold"], "operator_lost", "{state}");
+    assert!(state["pace"]["shifts"].as_u64() > before["pace"]["shifts"].as_u64());
+    // From a look before it slept to one after it woke: what passed awake, and no second more.
+    let passed = Duration::from_micros(us(&state) - us(&before));
+    assert!(
+        passed < woken.elapsed() + Duration::from_secs(3),
+        "{passed:?}"
+    );
+    let code = driver.wait().expect("ended").code();
+    assert_ne!(code, Some(0), "the walk was cut off");
+    assert_eq!(served.end("TERM").0, Some(143));
+}
+
 /// A file that may not grow stands for a disk that is full.
 #[test]
 fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {

@@ -26,6 +26,7 @@ mod fault_matrix;
 mod field;
 mod figures;
 mod foot_sides;
+mod hostile_logs;
 mod long_runs;
 mod moving_mass;
 mod mutated_files;

@@ -689,3 +689,25 @@ fn no_test_is_switched_off_or_asserts_nothing() {
     }
     assert!(tests > 50, "only {tests} tests found");
 }
+
+/// What an operator does, and what a robot does, depends on no clock that somebody sets: the server's
+/// and the page's are those that only go on.
+#[test]
+fn no_clock_on_the_wall_reaches_the_console() {
+    let mut read = Vec::new();
+    let mut looked_at = 0;
+    for (name, text) in files() {
+        let server = name.starts_with("host-sim/console/src/") && name.ends_with(".rs");
+        let page = name.starts_with("host-sim/report/page/") && name.ends_with(".js");
+        if !server && !page {
+            continue;
+        }
+        looked_at += 1;
+        let lines = text.lines().map(code).zip(1..);
+        let clocks = ["SystemTime", "UNIX_EPOCH", "Date.now", "new Date"];
+        let found = lines.filter(|(line, _)| clocks.iter().any(|clock| line.contains(clock)));
+        read.extend(found.map(|(line, number)| format!("{name}:{number}: {}", line.trim())));
+    }
+    assert!(looked_at > 60, "{looked_at} files");
+    assert!(read.is_empty(), "{read:#?}");
+}

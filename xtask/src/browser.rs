@@ -48,20 +48,27 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             .arg(axe()?))?;
         Ok(())
     });
-    report.step("console in a browser", || {
-        if !tools::have(CHROMIUM) {
-            let install = format!("apt-get install -y {CHROMIUM}");
-            return Err(StepError::missing(CHROMIUM, install));
-        }
-        rust::build(&["--bin", "wheeleg"])?;
-        let release = target_dir().join("release");
-        run(command(tools::python()?)
-            .arg("tests/python/check_console.py")
-            .arg(release.join("wheeleg"))
-            .arg(target_dir().join("console-shots"))
-            .arg(axe()?))?;
-        Ok(())
-    });
+    for (step, check) in [
+        ("console in a browser", "tests/python/check_console.py"),
+        (
+            "console whose line, server or view is gone",
+            "tests/python/check_console_lines.py",
+        ),
+    ] {
+        report.step(step, || {
+            if !tools::have(CHROMIUM) {
+                let install = format!("apt-get install -y {CHROMIUM}");
+                return Err(StepError::missing(CHROMIUM, install));
+            }
+            rust::build(&["--bin", "wheeleg"])?;
+            run(command(tools::python()?)
+                .arg(check)
+                .arg(target_dir().join("release").join("wheeleg"))
+                .arg(target_dir().join("console-shots"))
+                .arg(axe()?))?;
+            Ok(())
+        });
+    }
 }
 
 /// A robot driven by a program of its own, with the client that we give away.
@@ -70,6 +77,17 @@ pub(crate) fn client(report: &mut Report) {
         rust::build(&["--bin", "wheeleg"])?;
         run(command(tools::python()?)
             .arg("tests/python/check_client.py")
+            .arg(target_dir().join("release").join("wheeleg")))?;
+        Ok(())
+    });
+}
+
+/// Boards that are a process of their own, led over a pseudo-terminal.
+pub(crate) fn port(report: &mut Report) {
+    report.step("console of boards at a line", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_port.py")
             .arg(target_dir().join("release").join("wheeleg")))?;
         Ok(())
     });

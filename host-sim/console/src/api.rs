@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use crate::catalogue::fault_list;
 use crate::foxglove::{self, Viewing};
-use crate::guard::Hosts;
+use crate::guard::{Hosts, Place};
 use crate::hex;
 use crate::page::Page;
 use crate::record::folder;
@@ -244,6 +244,7 @@ async fn socket(
     State(server): State<Arc<Server>>,
     Extension(Host(host)): Extension<Host>,
     Extension(Peer(peer)): Extension<Peer>,
+    Extension(place): Extension<Arc<Place>>,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response {
     let Ok(upgrade) = upgrade else {
@@ -271,7 +272,10 @@ async fn socket(
         return problem(StatusCode::BAD_REQUEST, &detail, "see PROTOCOL.md");
     }
     let context = Arc::clone(&server.context);
-    upgrade.on_upgrade(move |socket| session::serve(socket, context, host, peer.ip()))
+    upgrade.on_upgrade(move |socket| async move {
+        session::serve(socket, context, host, peer.ip()).await;
+        drop(place);
+    })
 }
 
 #[derive(Deserialize)]
@@ -284,6 +288,7 @@ struct Token {
 async fn viewer(
     State(server): State<Arc<Server>>,
     Extension(Peer(peer)): Extension<Peer>,
+    Extension(place): Extension<Arc<Place>>,
     query: Result<Query<Token>, axum::extract::rejection::QueryRejection>,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response {
@@ -337,7 +342,10 @@ async fn viewer(
         may_write: controls && server.viewers_write,
     };
     let hub = Arc::clone(&context.hub);
-    upgrade.on_upgrade(move |socket| foxglove::serve(socket, hub, viewing))
+    upgrade.on_upgrade(move |socket| async move {
+        foxglove::serve(socket, hub, viewing).await;
+        drop(place);
+    })
 }
 
 async fn page(State(server): State<Arc<Server>>, uri: Uri) -> Response {

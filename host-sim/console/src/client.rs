@@ -323,12 +323,17 @@ impl Client {
     ///
     /// # Errors
     /// [`ConsoleError::Link`] if the connection has ended.
-    pub fn send(&mut self, mut frame: Value) -> Result<u64, ConsoleError> {
+    pub fn send(&mut self, frame: Value) -> Result<u64, ConsoleError> {
+        let frame = self.sealed(frame);
+        self.send_raw(frame)?;
+        Ok(self.n)
+    }
+
+    /// The next frame of this session, which counts as sent.
+    pub fn sealed(&mut self, mut frame: Value) -> Vec<u8> {
         self.n += 1;
         frame["n"] = json!(self.n);
-        let json = frame.to_string();
-        self.send_raw(self.key.seal(json.as_bytes()))?;
-        Ok(self.n)
+        self.key.seal(frame.to_string().as_bytes())
     }
 
     /// Sends bytes as they are.

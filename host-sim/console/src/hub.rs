@@ -110,6 +110,8 @@ struct Inner {
     clients: BTreeMap<ClientId, Client>,
     viewers: Viewers,
     desk: Desk,
+    /// Name of the client that was in control last.
+    last_holder: String,
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
     events: VecDeque<Value>,
@@ -171,6 +173,7 @@ impl Hub {
                 clients: BTreeMap::new(),
                 viewers,
                 desk: Desk::default(),
+                last_holder: String::new(),
                 pending: BTreeMap::new(),
                 arrived: channels().iter().map(|_| Arrived::default()).collect(),
                 events: VecDeque::with_capacity(EVENTS),

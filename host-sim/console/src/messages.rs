@@ -43,6 +43,11 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
             Reason::SeenInFuture,
             "`seen_us` is ahead of the master's time",
         ),
+        Answer::Suspended => refused(
+            n,
+            Reason::Master("expired"),
+            "the computer stood still since: look at the robot, take the control, then give it again",
+        ),
         Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(
             n,

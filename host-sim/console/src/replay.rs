@@ -18,7 +18,7 @@ use wheeleg_telemetry::{Keep, LogError, LogFile, Recorder};
 use crate::error::ConsoleError;
 use crate::live::Live;
 use crate::record::Summary;
-use crate::record::folder::{INPUTS, ROBOT, SCENARIO, summary};
+use crate::record::folder::{INPUTS, ROBOT, SCENARIO, opened, summary};
 use crate::record::inputs::{Input, LINE_MAX, Line};
 use crate::request::Order;
 
@@ -166,7 +166,7 @@ fn unusable(what: String) -> ConsoleError {
 fn source(folder: &Path, name: &str) -> Result<Source, ConsoleError> {
     let path = folder.join(name);
     let said = |what: String| unusable(format!("{}: {what}", path.display()));
-    let file = File::open(&path).map_err(|e| said(e.to_string()))?;
+    let file = opened(&path).map_err(unusable)?;
     let mut text = String::new();
     let read = file.take(TOML_MAX).read_to_string(&mut text);
     read.map_err(|e| said(e.to_string()))?;
@@ -268,8 +268,7 @@ enum Next {
 
 impl Lines {
     fn open(path: &Path) -> Result<Self, ConsoleError> {
-        let file = File::open(path);
-        let file = file.map_err(|e| unusable(format!("{}: {e}", path.display())))?;
+        let file = opened(path).map_err(unusable)?;
         Ok(Self {
             path: path.to_owned(),
             file: BufReader::new(file),

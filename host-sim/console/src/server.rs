@@ -29,7 +29,9 @@ use crate::guard::{Hosts, Places, WrongKeys, is_host, is_origin};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
+use crate::notices::Notices;
 use crate::page::Page;
+use crate::progress::Progressing;
 use crate::record::{self, About};
 use crate::session::Context;
 use crate::tls::{Certificate, Files, Fingerprint};
@@ -40,8 +42,9 @@ pub const ADDRESS: &str = "127.0.0.1:7420";
 const WORKERS: usize = 2;
 /// Time in which a request must have come.
 const HEAD: Duration = Duration::from_secs(3);
-/// Bytes that may wait in the system for a client.
-const SEND_BUFFER: u32 = 64 * 1024;
+/// Bytes that may wait in the system for a client: who has a slow line sees what was so much before.
+/// Linux takes twice as many, its own overhead with them.
+const SEND_BUFFER: u32 = 8 * 1024;
 /// Connections that may wait to be accepted.
 const BACKLOG: u32 = 256;
 
@@ -89,6 +92,7 @@ pub struct Server {
     name: Option<String>,
     fingerprint: Option<Fingerprint>,
     look_only: bool,
+    notices: Arc<Notices>,
     hub: Arc<Hub>,
     runtime: Option<Runtime>,
     robot: Option<JoinHandle<()>>,
@@ -206,12 +210,14 @@ impl Server {
             shared,
             viewers,
         );
+        let notices = Arc::new(Notices::default());
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
                 hub: Arc::clone(&hub),
                 robot_json,
                 keys,
                 wrong_keys: WrongKeys::default(),
+                notices: Arc::clone(&notices),
                 recordings: recordings.root,
                 look_only,
             }),
@@ -229,6 +235,7 @@ impl Server {
             name: names.into_iter().next(),
             fingerprint,
             look_only,
+            notices,
             hub,
             runtime: Some(runtime),
             robot: Some(robot),
@@ -273,6 +280,13 @@ impl Server {
     #[must_use]
     pub fn recording_failure(&self) -> Option<String> {
         self.recorded.status()?.failure
+    }
+
+    /// Lines for the person at the server, since they were asked for last: clients that sent forged,
+    /// repeated or lost frames.
+    #[must_use]
+    pub fn notices(&self) -> Vec<String> {
+        self.notices.take()
     }
 
     /// Switches the robot off and ends. What the recording lacks, if it lacks something.
@@ -386,7 +400,12 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<Tls
         };
         // Without it an answer waits for the client's acknowledgement: 40 ms.
         let _ = stream.set_nodelay(true);
-        let router = router.clone().layer(Extension(Peer(peer)));
+        // A socket takes its place along.
+        let place = Arc::new(place);
+        let router = router
+            .clone()
+            .layer(Extension(Peer(peer)))
+            .layer(Extension(Arc::clone(&place)));
         let tls = tls.clone();
         tokio::spawn(async move {
             match tls {
@@ -408,7 +427,10 @@ async fn serve(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, rou
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD)
         .max_buf_size(16 * 1024)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router))
+        .serve_connection(
+            TokioIo::new(Progressing::new(stream)),
+            TowerToHyperService::new(router),
+        )
         .with_upgrades();
     let _ = connection.await;
 }

@@ -19,13 +19,13 @@ use crate::hex;
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;
 use crate::mac::{Key, Transcript};
+use crate::notices::Notices;
 use crate::outbox::Outbox;
+use crate::progress::PROGRESS;
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);
-/// Time in which a client must take one message.
-pub(crate) const PROGRESS: Duration = Duration::from_secs(5);
-/// How often a client that is sent nothing is asked whether it is there.
+/// How often a client is asked whether it is there, also one that is told much and says nothing.
 const PING: Duration = Duration::from_secs(5);
 /// Time after which a client that sends nothing, no answer to a ping either, is gone.
 pub(crate) const SILENCE: Duration = Duration::from_secs(20);
@@ -44,6 +44,8 @@ pub(crate) struct Context {
     pub(crate) keys: Keys,
     /// Wrong keys of the last minute.
     pub(crate) wrong_keys: WrongKeys,
+    /// For the person at the server.
+    pub(crate) notices: Arc<Notices>,
     /// Folder of the recordings.
     pub(crate) recordings: PathBuf,
     /// Others on the way can read all: nobody may drive, and no key is to be sent.
@@ -134,6 +136,9 @@ pub(crate) async fn serve(
                     }
                 };
                 let Some(entered) = door.open(&frame, Instant::now()) else {
+                    context.notices.tell(format!(
+                        "{name:?} at {from} is closed: it sent a frame that is not the next of its session"
+                    ));
                     outbox.close(Close::BadFrame);
                     // The writer sends the close, and ends the session.
                     std::future::pending::<()>().await;
@@ -156,9 +161,16 @@ pub(crate) async fn send_all<F: Future<Output = Message>>(
     out: &mut SplitSink<WebSocket, Message>,
     next: impl Fn() -> F,
 ) {
+    let mut ping_due = Instant::now() + PING;
     loop {
-        let message = timeout(PING, next()).await;
-        let message = message.unwrap_or_else(|_| Message::Ping(axum::body::Bytes::new()));
+        let message = match ping_due.checked_duration_since(Instant::now()) {
+            Some(rest) => timeout(rest, next()).await.ok(),
+            None => None,
+        };
+        let message = message.unwrap_or_else(|| {
+            ping_due = Instant::now() + PING;
+            Message::Ping(axum::body::Bytes::new())
+        });
         let last = matches!(message, Message::Close(_));
         let sent = timeout(PROGRESS, out.send(message)).await;
         if last || !matches!(sent, Ok(Ok(()))) {

@@ -18,7 +18,7 @@ export function boardsView() {
   const more = html("details", {}, html("summary", {}, "Table"), html("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of boards" }, table));
   let shown = "";
   return {
-    root: html("section", { class: "panel", "data-live": true, "aria-label": "Boards" }, html("h2", {}, "Boards"), chips, more),
+    root: html("section", { class: "panel boardlist", "data-live": true, "aria-label": "Boards" }, html("h2", {}, "Boards"), chips, more),
     /** @param {any} state */
     state(state) {
       const key = JSON.stringify(state.boards);

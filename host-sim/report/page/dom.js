@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An HTML element. Attributes that begin with "on" are listeners; null and false are left out.
+/** An HTML element. Attributes that begin with "on" are listeners; null and false are left out, of children too.
  * @template {keyof HTMLElementTagNameMap} T
  * @param {T} tag @param {Object<string, any>} [attributes] @param {...any} children @returns {HTMLElementTagNameMap[T]} */
 export function html(tag, attributes = {}, ...children) {
@@ -15,7 +15,7 @@ export function html(tag, attributes = {}, ...children) {
     else if (value != null && value !== false) element.setAttribute(name, String(value));
   }
   for (const child of children.flat()) {
-    if (child != null) element.append(child instanceof Node ? child : String(child));
+    if (child != null && child !== false) element.append(child instanceof Node ? child : String(child));
   }
   return element;
 }

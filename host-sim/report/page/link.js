@@ -76,6 +76,10 @@ export class Link {
     /** @type {Map<number, any>} */
     this.channels = new Map();
     this.session = "";
+    /** How long the last answer took, and since when the next one is waited for, ms. */
+    this.delay_ms = NaN;
+    /** @type {number | null} */
+    this.asked_ms = null;
   }
 
   /** A document of the HTTP API. @param {string} path */
@@ -166,6 +170,21 @@ export class Link {
 
   stop() {
     return this.answered({ op: "stop" });
+  }
+
+  /** Asks for nothing, to see how long the answer takes; one at a time. */
+  async echo() {
+    if (this.asked_ms !== null) return;
+    const asked_ms = performance.now();
+    this.asked_ms = asked_ms;
+    await this.answered({ op: "unsubscribe", channels: [] });
+    this.delay_ms = performance.now() - asked_ms;
+    this.asked_ms = null;
+  }
+
+  /** How long an answer has been waited for, ms: all that has come until now was sent before. */
+  unanswered_ms() {
+    return this.asked_ms === null ? 0 : performance.now() - this.asked_ms;
   }
 
   beat() {

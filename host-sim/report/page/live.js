@@ -5,16 +5,16 @@ import { Link } from "./link.js";
 import { HZ, Scope } from "./scope.js";
 import { LINKS, boardsView } from "./boards.js";
 import { driver } from "./drive.js";
+import { jointCard } from "./joint.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
 const BEAT_MS = 50;
+/** How often the line is measured. */
+const ECHO_MS = 100;
 const EVENTS = 200;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
-const VALVES = ["fill A", "vent A", "fill B", "vent B"];
-const STROKE_MM = 180;
-/** Faults that say of a reading that it is none: SensorRange, SensorRate. */
-const NO_READING = new Set([32, 33]);
+const WHEELS = ["/wheel/7", "/wheel/8"];
 
 /** The key from the address, which must not stay there, or of this tab. @returns {import("./link.js").Identity | null} */
 function identity() {
@@ -83,34 +83,38 @@ function unconfirmed() {
 }
 
 // ---- head ----
-const head = { robot: cell("Robot"), mode: cell("State"), gait: cell("Gait"), link: cell("Newest shown"), speed: cell("Clock"), control: cell("Control") };
+const head = { robot: cell("Robot"), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock"), control: cell("Control") };
 const banner = html("p", { class: "banner", role: "alert", hidden: true });
 
 // ---- views ----
 const pictures = { side: svg("svg"), top: svg("svg"), left: svg("svg"), right: svg("svg") };
 /** @type {any} */
 let views = null;
+/** What no board tells is not a number. */
+const known = (value, otherwise = 0) => (Number.isFinite(value) ? value : otherwise);
 function pose() {
   const joint = (i) => now.of.get(`/joint/${i + 1}`);
   const legs = [0, 1].map((side) => {
     const foot = now.of.get(side === 0 ? "/foot/left" : "/foot/right") ?? {};
     const three = [0, 1, 2].map((i) => joint(3 * side + i));
     return {
-      commanded_mm: three.map((s) => s?.commanded_mm ?? 90),
-      sensed_mm: three.map((s) => s?.sensed_mm ?? 90),
+      commanded_mm: three.map((s) => known(s?.commanded_mm, 90)),
+      sensed_mm: three.map((s) => known(s?.sensed_mm, 90)),
       load_n: foot.normal_force_n || 0,
       switches: foot.switches ?? 0,
     };
   });
   const body = now.of.get("/body") ?? {};
-  return { travel_mm: body.x_mm ?? 0, pitch_deg: body.pitch_deg ?? 0, legs };
+  /** @type {[number, number]} */
+  const wheels_mm = [known(now.of.get(WHEELS[0])?.sensed_mm), known(now.of.get(WHEELS[1])?.sensed_mm)];
+  // Of real boards nobody knows where the robot is; on their wheels it has gone so far.
+  return { travel_mm: known(body.x_mm, (wheels_mm[0] + wheels_mm[1]) / 2), wheels_mm, pitch_deg: known(body.pitch_deg), legs };
 }
-/** The same in space; where the robot is, nobody knows of real boards: it stands at the origin. */
+/** The same in space; real boards stand level where their wheels have brought them. */
 function spacePose(robot) {
   const body = now.of.get("/body") ?? {};
-  const known = (value, otherwise = 0) => (Number.isFinite(value) ? value : otherwise);
-  const [x_mm, y_mm, z_mm] = [known(body.x_mm), known(body.y_mm), known(body.z_mm, drawing.wheel_radius_mm)];
-  return { x_mm, y_mm, z_mm, roll_deg: known(body.roll_deg), pitch_deg: known(body.pitch_deg), yaw_deg: known(body.yaw_deg), travel_mm: known(body.x_mm), legs: robot.legs };
+  const [x_mm, y_mm, z_mm] = [robot.travel_mm, known(body.y_mm), known(body.z_mm, drawing.wheel_radius_mm)];
+  return { x_mm, y_mm, z_mm, roll_deg: known(body.roll_deg), pitch_deg: robot.pitch_deg, yaw_deg: known(body.yaw_deg), wheels_mm: robot.wheels_mm, legs: robot.legs };
 }
 /** Sizes of the robot, and the ground if it is not level; from the server. @type {any} */
 let drawing = null;
@@ -118,61 +122,36 @@ let drawing = null;
 let relief = null;
 /** The view in space, once somebody has asked for it. @type {any} */
 let space = null;
-const plan = html("div", { class: "plan" }, pictures.top);
-const inSpace = html("button", { class: "btn", type: "button", "aria-pressed": "false", onclick: toggleSpace }, "3D");
-plan.append(inSpace);
-async function toggleSpace() {
-  const show = inSpace.getAttribute("aria-pressed") !== "true";
+const inSpace = html("button", { class: "btn", type: "button", "aria-pressed": "false", "aria-label": "Robot in space, 3D", onclick: toggleSpace }, "3D");
+const noSpace = html("p", { class: "no-space", role: "status", hidden: true });
+const plan = html("div", { class: "plan" }, pictures.top, noSpace, inSpace);
+function showSpace(show) {
   set(inSpace, { "aria-pressed": show });
   plan.classList.toggle("in-space", show);
+}
+async function toggleSpace() {
+  const show = inSpace.getAttribute("aria-pressed") !== "true";
+  showSpace(show);
+  noSpace.hidden = true;
   if (!show || space) return;
-  const { view3d } = await import("./view3d.js");
-  if (space) return;
-  space = view3d(drawing, relief);
-  plan.prepend(space.root);
+  const failed = (why) => {
+    space = null;
+    showSpace(false);
+    noSpace.hidden = false;
+    say(noSpace, `No view in space: ${why}. Press 3D to try again.`);
+  };
+  const module = await import("./view3d.js").catch(() => failed("the server does not give its parts"));
+  if (!module || space) return;
+  try {
+    space = module.view3d(drawing, relief, failed);
+    plan.prepend(space.root);
+  } catch (error) {
+    failed(error instanceof Error ? error.message : String(error));
+  }
 }
 
 // ---- joints ----
-const joints = JOINTS.map((name, i) => {
-  const picture = svg("svg", { viewBox: "0 0 260 40", class: "cyl", role: "img" });
-  const title = svg("title", {}, picture);
-  svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "bed" }, picture);
-  const chamber = { a: svg("rect", { x: 14, y: 9, height: 22, class: "air" }, picture), b: svg("rect", { y: 9, height: 22, class: "air" }, picture) };
-  svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "wall" }, picture);
-  const rod = svg("rect", { y: 18, height: 4, class: "rod" }, picture);
-  const piston = svg("rect", { y: 9, width: 7, height: 22, class: "piston" }, picture);
-  const asked = svg("rect", { y: 5, width: 7, height: 30, class: "want" }, picture);
-  const valves = VALVES.map((_, k) => svg("path", { d: k % 2 === 0 ? "M-5,4 L5,4 L0,-4Z" : "M-5,-4 L5,-4 L0,4Z", transform: `translate(${[24, 40, 204, 188][k]},36)`, class: "v" }, picture));
-  const value = html("b", { class: "val" }, "–");
-  const side = html("span", { class: "ask" });
-  const root = html("article", { class: "panel joint", "data-live": true }, html("h2", {}, `${name} `, html("small", {}, `board ${i + 1}`)), html("p", {}, value, side), picture);
-  return {
-    root,
-    update(s, board) {
-      const found = board?.faults ?? [];
-      const blind = found.some((f) => NO_READING.has(f.number));
-      root.classList.toggle("bad", found.length > 0);
-      root.classList.toggle("blind", blind);
-      if (!s) return;
-      const x = (mm) => 14 + (Math.min(Math.max(mm, 0), STROKE_MM) / STROKE_MM) * 193;
-      const at = x(s.sensed_mm);
-      set(piston, { x: at });
-      set(rod, { x: at + 7, width: Math.max(0, 250 - at - 7) });
-      set(asked, { x: x(s.commanded_mm) });
-      const shade = (bar) => (Number.isNaN(bar) ? 0 : Math.min(1, Math.max(0, (bar - 1) / 6)).toFixed(2));
-      // Of real boards neither pressures nor valves are known, but what their law asks for.
-      const simulated = !Number.isNaN(s.pressure_a_bar);
-      const air = simulated ? `A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)` : `drive ${fixed(100 * s.drive, 0)} %`;
-      set(chamber.a, { width: at - 14, "fill-opacity": shade(s.pressure_a_bar) });
-      set(chamber.b, { x: at + 7, width: 214 - at - 7, "fill-opacity": shade(s.pressure_b_bar) });
-      for (const v of valves) v.toggleAttribute("hidden", !simulated);
-      valves.forEach((v, k) => set(v, { class: (s.valves_open >> k) & 1 ? "v on" : "v" }));
-      say(value, blind ? "No reading" : `${fixed(s.sensed_mm)} mm`);
-      say(side, ` asked ${fixed(s.commanded_mm)}${blind ? "" : `, error ${fixed(s.commanded_mm - s.sensed_mm)}`} mm; ${air}`);
-      say(title, `${name}: ${fixed(s.sensed_mm)} mm of ${STROKE_MM} mm${simulated ? `, open: ${VALVES.filter((_, k) => (s.valves_open >> k) & 1).join(", ") || "no valve"}` : ""}`);
-    },
-  };
-});
+const joints = JOINTS.map((name, i) => jointCard(name, i + 1, (stroke) => command("JointReference", { joint: i + 1, stroke })));
 
 // ---- faults, boards, events ----
 const faults = html("ul", { class: "faults" });
@@ -272,7 +251,7 @@ addEventListener("keydown", (key) => {
     keys.open = !keys.open;
   }
 });
-const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓ ← →", "drive by hand, on its buttons"], ["← →", "on a plot: its cursor, by 20 ms; with Shift by 200 ms"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
+const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓ ← →", "drive by hand, on its buttons"], ["← →", "on a plot: its cursor, by 20 ms; with Shift by 200 ms"], ["↑ ↓ ← → + −", "on the view in space: turn it, and come nearer or go away"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
 /** Who does not look does not drive. */
 const leaves = () => {
   byHand.stop();
@@ -297,7 +276,7 @@ function build({ robot, commands: list, faults: injectable }) {
       "header",
       { class: "bar" },
       html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
-      html("div", { class: "cells" }, head.mode.root, head.gait.root, head.control.root, head.link.root, head.speed.root, head.robot.root),
+      html("div", { class: "cells" }, head.mode.root, head.gait.root, head.control.root, head.link.root, head.time.root, head.speed.root, head.robot.root),
       html("div", { class: "stopbox" }, stopButton),
     ),
     alarm,
@@ -308,15 +287,15 @@ function build({ robot, commands: list, faults: injectable }) {
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"))), plan, html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
+        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"), !robot.simulated && html("span", {}, "attitude and forces: not measured"))), plan, html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
         html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
         scope?.root,
       ),
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
-        html("section", { class: "panel" }, html("h2", {}, "Faults"), faults),
+        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
+        html("section", { class: "panel faultlist" }, html("h2", {}, "Faults"), faults),
         boards.root,
         byHand.root,
         html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
@@ -363,7 +342,8 @@ function showState(state) {
 function paint() {
   requestAnimationFrame(paint);
   if (!views) return;
-  const age = performance.now() - now.heard_ms;
+  // What comes over a line that is slow was said before the answer that is still waited for.
+  const age = Math.max(performance.now() - now.heard_ms, link?.unanswered_ms() ?? 0);
   const stale = lost !== "" || age > STALE_MS;
   document.body.dataset.state = stale ? "stale" : "live";
   banner.hidden = !stale;
@@ -377,10 +357,11 @@ function paint() {
   views.top.update(robot);
   if (space && plan.classList.contains("in-space")) space.update(spacePose(robot));
   robot.legs.forEach((state, i) => views.feet[i].update(state));
-  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
+  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i], link?.identity.role === "control"));
   scope?.paint(now.t_us * 1e-6);
   if (now.state) showState(now.state);
-  say(head.link.value, `${fixed(now.t_us * 1e-6, 2)} s`);
+  say(head.link.value, link ? `${fixed(link.delay_ms, 0)} ms` : "–");
+  say(head.time.value, `${fixed(now.t_us * 1e-6, 2)} s`);
   if (link) link.seen_us = Math.floor(now.t_us);
 }
 
@@ -399,7 +380,7 @@ const listener = {
   },
   event(event) {
     const bad = event.kind === "fault";
-    events.prepend(html("li", { class: bad ? "bad" : "" }, html("time", {}, fixed(event.t_ns * 1e-9, 2)), html("span", {}, event.text)));
+    events.prepend(html("li", { class: bad ? "bad" : "" }, html("time", {}, fixed(event.t_ns * 1e-9, 2)), html("span", {}, event.holder ? `${event.text} (${event.holder})` : event.text)));
     while (events.childElementCount > EVENTS) events.lastElementChild?.remove();
   },
   asked(by) {
@@ -421,7 +402,7 @@ async function begin() {
     const opened = new Link(who, listener);
     const about = await opened.open();
     link = opened;
-    const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...LINKS]);
+    const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...WHEELS, ...LINKS]);
     scope = new Scope([...opened.channels.values()], (topic) => {
       if (drawn.has(topic)) return;
       drawn.add(topic);
@@ -430,6 +411,7 @@ async function begin() {
     build(about);
     await link.subscribe([...drawn], HZ);
     setInterval(() => mine() && link?.beat(), BEAT_MS);
+    setInterval(() => link?.echo(), ECHO_MS);
   } catch (error) {
     page.replaceChildren(html("p", { class: "alone", role: "alert" }, error instanceof Error ? error.message : String(error)));
   }

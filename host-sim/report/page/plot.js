@@ -210,7 +210,8 @@ function ticks(low, high, count) {
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= rough) ?? rough;
   const values = [];
-  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + step * 1e-6; i += 1) values.push(i * step);
+  // Counted, because of a range without sense no step might lead to its end.
+  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + step * 1e-6 && values.length <= 2 * count; i += 1) values.push(i * step);
   return values;
 }
 

@@ -8,8 +8,9 @@ import { terrainAbove, terrainSide } from "./ground.js";
 /** @typedef {import("./shape.js").Geometry} Geometry */
 /** @typedef {import("./shape.js").Strokes} Strokes */
 /** @typedef {{commanded_mm: Strokes, sensed_mm: Strokes, load_n: number, switches: number}} Leg */
-/** Where the middle of the axle is, if it is known, and how the legs are.
- * @typedef {{travel_mm: number, pitch_deg: number, y_mm?: number, z_mm?: number, yaw_deg?: number, legs: [Leg, Leg]}} Pose */
+/** Where the middle of the axle is, if it is known, how far the left and the right wheel have turned, at the
+ * rim, if that is told apart, and how the legs are.
+ * @typedef {{travel_mm: number, wheels_mm?: [number, number], pitch_deg: number, y_mm?: number, z_mm?: number, yaw_deg?: number, legs: [Leg, Leg]}} Pose */
 
 /** Outlines nearer to the measured part than this would only blur it. */
 const VISIBLE_MM = 3;
@@ -116,9 +117,9 @@ export function sideView(picture, g, terrain) {
       // The axle stays where it is in the picture; a terrain goes up and down below it.
       const down = terrain ? (pose.z_mm ?? g.wheel_radius_mm) - g.wheel_radius_mm : 0;
       set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},${tenth(down)})` });
-      const degrees = (pose.travel_mm / g.wheel_radius_mm) * (180 / Math.PI);
-      farWheel(degrees);
-      nearWheel(degrees);
+      const [left, right] = (pose.wheels_mm ?? [pose.travel_mm, pose.travel_mm]).map((mm) => (mm / g.wheel_radius_mm) * (180 / Math.PI));
+      farWheel(left);
+      nearWheel(right);
       set(root, { transform: `rotate(${(-pose.pitch_deg).toFixed(2)} 0 ${-g.wheel_radius_mm})` });
       SIDES.forEach((side, i) => {
         const [state, part, yaw] = [pose.legs[i], legs[i], yaws[i]];

@@ -4,9 +4,9 @@ import { moved, multiply, reaching, rolled, scaled, tilted, turned } from "./mat
 
 /** A unit solid (box, cylinder or cone along z, 1 wide and 1 long), how it is placed, its colour.
  * @typedef {{mesh: "box" | "cylinder" | "cone", at: import("./matrix.js").Matrix, colour: string}} Solid */
-/** Middle of the axle and attitude; strokes and load of each leg.
+/** Middle of the axle and attitude; travel of each wheel's rim; strokes and load of each leg. Left comes first.
  * @typedef {{x_mm: number, y_mm: number, z_mm: number, roll_deg: number, pitch_deg: number, yaw_deg: number,
- *   travel_mm: number, legs: {sensed_mm: import("./shape.js").Strokes, load_n: number}[]}} SpacePose */
+ *   wheels_mm: [number, number], legs: {sensed_mm: import("./shape.js").Strokes, load_n: number}[]}} SpacePose */
 
 const RAD = Math.PI / 180;
 /** Length of a force's arrow, mm per newton. */
@@ -33,13 +33,13 @@ export function solids(g, pose) {
   box("body", [nose, front], [-half, half], [chin, deck]);
   box("end", [-70, 230], [-120, 120], [deck, deck + 34]);
   rod("barrel", [-222, -110, deck + 34], [-222, 110, deck + 34], 74);
-  for (const side of [-1, 1]) {
-    const [y, r] = [(side * g.track_mm) / 2, g.wheel_radius_mm];
+  SIDES.forEach((side, i) => {
+    const [y, r] = [(side.y * g.track_mm) / 2, g.wheel_radius_mm];
     rod("tyre", [0, y - WHEEL_WIDTH / 2, r], [0, y + WHEEL_WIDTH / 2, r], 2 * r);
     // Spokes, so that it can be seen to roll.
-    const roll = multiply(moved([0, y, r]), tilted(pose.travel_mm / r));
+    const roll = multiply(moved([0, y, r]), tilted(pose.wheels_mm[i] / r));
     for (let spoke = 0; spoke < 3; spoke += 1) add("box", "rim", multiply(roll, multiply(tilted((spoke * Math.PI) / 3), scaled([18, WHEEL_WIDTH + 4, 1.5 * r]))));
-  }
+  });
   SIDES.forEach((side, i) => {
     const { sensed_mm, load_n } = pose.legs[i];
     const at = leg(g, side.y, sensed_mm);

@@ -1,6 +1,6 @@
 // The worker that draws the robot in space by WebGL 2 on the page's canvas. It is told geometry,
-// ground, colours, size, camera and poses; a pose that comes before the last one is drawn takes
-// its place. Drawing here never keeps the page from its heartbeat.
+// ground, colours, size, camera and poses, and tells the number of each pose that it has drawn: the
+// page sends the next one then. Drawing here never keeps the page from its heartbeat.
 import { looking, moved, multiply, perspective } from "./matrix.js";
 import { solids } from "./solids.js";
 
@@ -16,7 +16,7 @@ void main() {
 const FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 facing; in vec2 ground;
-uniform vec3 colour, line; uniform bool gridded;
+uniform vec3 colour, line; uniform bool gridded, plain;
 out vec4 shown;
 float lines(float every) {
   vec2 cell = ground / every, width = fwidth(cell);
@@ -24,17 +24,25 @@ float lines(float every) {
   return (1.0 - min(min(near.x, near.y), 1.0)) * (1.0 - smoothstep(0.15, 0.4, max(width.x, width.y)));
 }
 void main() {
+  if (plain) { shown = vec4(colour, 1.0); return; }
   float light = 0.68 + 0.32 * dot(normalize(facing), normalize(vec3(0.35, -0.45, 0.82)));
   vec3 base = colour;
   if (gridded) base = mix(base, line, max(0.9 * lines(500.0), 0.35 * lines(100.0)));
   shown = vec4(base * light, 1.0);
 }`;
 
-/** Places and normals, a triangle after the other. */
+/** Places and normals, a triangle after the other; edges, a line after the other. */
 class Builder {
   constructor() {
     /** @type {number[]} */
     this.numbers = [];
+    /** @type {number[]} */
+    this.lines = [];
+  }
+
+  /** @param {number[]} from @param {number[]} to */
+  edge(from, to) {
+    for (const point of [from, to]) this.lines.push(...point, 0, 0, 0);
   }
 
   /** @param {number[]} a @param {number[]} b @param {number[]} c @param {number[]} [normals] */
@@ -64,6 +72,8 @@ function boxMesh() {
         return p;
       };
       mesh.quad(corner(-h, -h), corner(h, -h), corner(h, h), corner(-h, h));
+      mesh.edge(corner(-h, -h), corner(-h, h));
+      mesh.edge(corner(h, -h), corner(h, h));
     }
   }
   return mesh;
@@ -77,6 +87,8 @@ function roundMesh(top) {
   for (let i = 0; i < sides; i += 1) {
     const [a, b, c, d] = [at(i, 0.5, -0.5), at(i + 1, 0.5, -0.5), at(i + 1, top, 0.5), at(i, top, 0.5)];
     const [n, m] = [at(i, 1, 0.5 - top), at(i + 1, 1, 0.5 - top)];
+    mesh.edge(a, b);
+    if (top > 0) mesh.edge(d, c);
     mesh.triangle(a, b, c, [...n, ...m, ...m]);
     mesh.triangle(a, c, d, [...n, ...m, ...n]);
     mesh.triangle([0, 0, 0.5], at(i, top, 0.5), at(i + 1, top, 0.5));
@@ -124,17 +136,17 @@ function program(gl) {
   return made;
 }
 
-/** @param {WebGL2RenderingContext} gl @param {Builder} mesh */
-function uploaded(gl, mesh) {
+/** @param {WebGL2RenderingContext} gl @param {number[]} numbers */
+function uploaded(gl, numbers) {
   const array = gl.createVertexArray();
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(mesh.numbers), gl.STATIC_DRAW);
+  gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(numbers), gl.STATIC_DRAW);
   for (const index of [0, 1]) {
     gl.enableVertexAttribArray(index);
     gl.vertexAttribPointer(index, 3, gl.FLOAT, false, 24, 12 * index);
   }
-  return { array, count: mesh.numbers.length / 6 };
+  return { array, count: numbers.length / 6 };
 }
 
 /** @param {OffscreenCanvas} canvas @param {import("./shape.js").Geometry} geometry @param {Relief | null} relief */
@@ -142,22 +154,35 @@ function painter(canvas, geometry, relief) {
   const gl = canvas.getContext("webgl2", { antialias: true });
   if (!gl) throw new Error("WebGL 2 is missing");
   const made = program(gl);
-  const uniform = Object.fromEntries(["world", "seen", "colour", "line", "gridded"].map((name) => [name, gl.getUniformLocation(made, name)]));
-  const meshes = { box: uploaded(gl, boxMesh()), cylinder: uploaded(gl, roundMesh(0.5)), cone: uploaded(gl, roundMesh(0)), ground: uploaded(gl, groundMesh(relief)) };
+  const uniform = Object.fromEntries(["world", "seen", "colour", "line", "gridded", "plain"].map((name) => [name, gl.getUniformLocation(made, name)]));
+  const parts = { box: boxMesh(), cylinder: roundMesh(0.5), cone: roundMesh(0), ground: groundMesh(relief) };
+  const meshes = Object.fromEntries(Object.entries(parts).map(([name, mesh]) => [name, { faces: uploaded(gl, mesh.numbers), edges: uploaded(gl, mesh.lines) }]));
   gl.enable(gl.DEPTH_TEST);
-  const draw = (mesh, at, colour) => {
+  // Faces lie a little behind their own edges.
+  gl.enable(gl.POLYGON_OFFSET_FILL);
+  gl.polygonOffset(1, 1);
+  const draw = (mesh, at, colour, edge) => {
+    const { faces, edges } = meshes[mesh];
     gl.uniformMatrix4fv(uniform.world, false, at);
     gl.uniform3fv(uniform.colour, colour);
-    gl.bindVertexArray(meshes[mesh].array);
-    gl.drawArrays(gl.TRIANGLES, 0, meshes[mesh].count);
+    gl.bindVertexArray(faces.array);
+    gl.drawArrays(gl.TRIANGLES, 0, faces.count);
+    if (!edge) return;
+    gl.uniform1i(uniform.plain, 1);
+    gl.uniform3fv(uniform.colour, edge);
+    gl.bindVertexArray(edges.array);
+    gl.drawArrays(gl.LINES, 0, edges.count);
+    gl.uniform1i(uniform.plain, 0);
   };
   /** @param {{pose: import("./solids.js").SpacePose, colours: Object<string, number[]>, camera: {turn: number, height: number, distance: number}}} told */
   return ({ pose, colours, camera: { turn, height, distance } }) => {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(colours.sky[0], colours.sky[1], colours.sky[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    // The middle of the robot is before its axle, wherever it heads.
+    const heading = (pose.yaw_deg * Math.PI) / 180;
     /** @type {[number, number, number]} */
-    const target = [pose.x_mm + 130, pose.y_mm, pose.z_mm + 20];
+    const target = [pose.x_mm + 130 * Math.cos(heading), pose.y_mm + 130 * Math.sin(heading), pose.z_mm + 20];
     const flat = distance * Math.cos(height);
     const eye = looking([target[0] + flat * Math.cos(turn), target[1] + flat * Math.sin(turn), target[2] + distance * Math.sin(height)], target);
     gl.uniformMatrix4fv(uniform.seen, false, multiply(perspective(0.6, canvas.width / Math.max(1, canvas.height), 50, 20_000), eye));
@@ -167,12 +192,12 @@ function painter(canvas, geometry, relief) {
     const floor = (v) => 500 * Math.round(v / 500);
     draw("ground", relief ? moved([0, 0, 0]) : moved([floor(pose.x_mm), floor(pose.y_mm), 0]), colours.ground);
     gl.uniform1i(uniform.gridded, 0);
-    for (const solid of solids(geometry, pose)) draw(solid.mesh, solid.at, colours[solid.colour]);
+    for (const solid of solids(geometry, pose)) draw(solid.mesh, solid.at, colours[solid.colour], solid.colour === "force" ? null : colours.edge);
   };
 }
 
-/** What was told last. @type {any} */
-const told = { pose: null, colours: null, camera: null };
+/** What was told last; `number` is that of the pose. @type {any} */
+const told = { pose: null, number: 0, colours: null, camera: null };
 /** @type {OffscreenCanvas | null} */
 let canvas = null;
 /** @type {ReturnType<typeof painter> | null} */
@@ -189,13 +214,14 @@ self.addEventListener("message", ({ data }) => {
       paint = painter(data.canvas, data.geometry, data.relief);
     }
     if (data.size && canvas) [canvas.width, canvas.height] = data.size;
-    for (const name of ["pose", "colours", "camera"]) if (data[name]) told[name] = data[name];
+    for (const name of ["pose", "number", "colours", "camera"]) if (data[name]) told[name] = data[name];
     if (waiting || !paint || !told.pose || !told.colours || !told.camera) return;
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
       try {
         paint?.(told);
+        self.postMessage({ drawn: told.number });
       } catch (error) {
         fail(error);
       }

@@ -77,7 +77,9 @@ export function stepByKey(player, event) {
 
 /** Whole seconds to label, about ten of them. */
 function seconds(player) {
-  const step = [1, 2, 5, 10, 30, 60, 300].find((s) => (player.end - player.start) / s <= 11) ?? 600;
+  const length = player.end - player.start;
+  // The times of a log may be anything.
+  const step = [1, 2, 5, 10, 30, 60, 300, 600].find((s) => length / s <= 11) ?? 10 ** Math.ceil(Math.log10(length / 11));
   const labels = [];
   for (let t = Math.ceil(player.start / step) * step; t <= player.end; t += step) labels.push(t);
   return labels;

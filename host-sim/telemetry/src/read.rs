@@ -3,13 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::io::{BufReader, Read as _};
+use std::io::{BufReader, ErrorKind};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
-use mcap::{MAGIC, McapError};
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
 use super::derived::{Derived, derived};
@@ -19,6 +18,8 @@ use crate::LogError;
 
 /// Largest record that is read, bytes: ours have at most 4 MB and a message.
 const MAX_RECORD: usize = 64 << 20;
+/// Longest topic that is kept, bytes.
+const MAX_TOPIC: usize = 256;
 /// Largest message that is read, bytes.
 const MAX_MESSAGE: usize = 64 * 1024;
 
@@ -70,7 +71,7 @@ pub fn read_from(
     let places: BTreeMap<&str, usize> = channels().iter().map(|c| c.topic).zip(0..).collect();
     let (mut messages, mut others) = (0, 0);
     let whole = each(&mut source, path, &mut |message| {
-        let topic = message.channel.topic.as_str();
+        let topic = message.topic;
         // What follows from the others.
         if derived().iter().any(|def| def.topic == topic) {
             return ControlFlow::Continue(());
@@ -84,7 +85,7 @@ pub fn read_from(
         take(Logged {
             channel: *channel,
             t_ns: message.log_time,
-            payload: &message.data,
+            payload: message.data,
         })
     })?;
     match (messages, others) {
@@ -111,36 +112,83 @@ pub fn read_derived(path: &Path, take: &mut TakeDerived<'_>) -> Result<bool, Log
     each(
         &mut BufReader::new(file),
         path,
-        &mut |message| match Derived::of_topic(&message.channel.topic) {
-            Some(channel) => take(channel, message.log_time, &message.data),
+        &mut |message| match Derived::of_topic(message.topic) {
+            Some(channel) => take(channel, message.log_time, message.data),
             None => ControlFlow::Continue(()),
         },
     )
 }
 
+/// A message on its way: topic, time and bytes.
+struct Passing<'a> {
+    topic: &'a str,
+    log_time: u64,
+    data: &'a [u8],
+}
+
 /// Gives every message until `take` breaks, or to the place where the log breaks off: false then.
+/// Of a channel only its topic is kept, which bounds what a log can make grow.
 fn each(
     source: &mut dyn std::io::Read,
     path: &Path,
-    take: &mut dyn FnMut(&mcap::Message<'_>) -> ControlFlow<()>,
+    take: &mut dyn FnMut(&Passing<'_>) -> ControlFlow<()>,
 ) -> Result<bool, LogError> {
     begins_as_log(&mut &mut *source, path)?;
-    let source = MAGIC.chain(source);
     let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(MAX_RECORD);
-    for message in MessageReader::new_with_options(source, options) {
-        match message {
-            Ok(message) if take(&message).is_break() => break,
-            Ok(_) => {}
-            Err(McapError::Io(e)) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
-                return Err(LogError::read(path, e));
+    let mut reader = LinearReader::new_with_options(options);
+    let mut topics: BTreeMap<u16, String> = BTreeMap::new();
+    while let Some(event) = reader.next_event() {
+        let (opcode, data) = match event {
+            Ok(LinearReadEvent::ReadRequest(need)) => {
+                let read = uninterrupted(source, reader.insert(need));
+                reader.notify_read(read.map_err(|e| LogError::read(path, e))?);
+                continue;
             }
+            Ok(LinearReadEvent::Record { opcode, data }) => (opcode, data),
             // The place where it breaks off.
+            Err(_) => return Ok(false),
+        };
+        if opcode != op::CHANNEL && opcode != op::MESSAGE {
+            continue;
+        }
+        match mcap::parse_record(opcode, data) {
+            Ok(Record::Channel(channel)) => {
+                // No channel of this program has a longer one.
+                let topic = Some(channel.topic).filter(|topic| topic.len() <= MAX_TOPIC);
+                topics.insert(channel.id, topic.unwrap_or_default());
+            }
+            Ok(Record::Message { header, data }) => {
+                // A message without its channel is no message.
+                let Some(topic) = topics.get(&header.channel_id) else {
+                    return Ok(false);
+                };
+                let passing = Passing {
+                    topic,
+                    log_time: header.log_time,
+                    data: &data,
+                };
+                if take(&passing).is_break() {
+                    break;
+                }
+            }
+            Ok(_) => {}
             Err(_) => return Ok(false),
         }
     }
     Ok(true)
+}
+
+/// Reads once, whatever signals come.
+fn uninterrupted(source: &mut dyn std::io::Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+    loop {
+        match source.read(buffer) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            read => return read,
+        }
+    }
 }
 
 /// A value of a message.
@@ -212,6 +260,7 @@ impl<'de> Visitor<'de> for Fields<'_> {
 mod tests {
     use super::*;
     use crate::{BodySample, FootSample, Recorder};
+    use mcap::MAGIC;
     use std::fs::File;
 
     fn log(path: &Path) {

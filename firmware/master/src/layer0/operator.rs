@@ -54,8 +54,9 @@ impl Lease {
         }
     }
 
+    /// Begins the lease. Who holds it already has seen nothing more by asking again.
     fn take(&mut self, now_us: u64) {
-        self.seen_us = Some(now_us.max(self.seen_us.unwrap_or(0)));
+        self.seen_us.get_or_insert(now_us);
     }
 
     fn release(&mut self) {

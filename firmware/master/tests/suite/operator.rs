@@ -210,6 +210,25 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
     assert!(!console.rig.master.layer0().lease().is_held());
 }
 
+/// Each time it is asked about something that was seen long before: it would be a way to drive without
+/// looking.
+#[test]
+fn who_takes_the_control_again_has_seen_nothing_more() {
+    let mut console = Console::new();
+    console.done(Command::TakeControl, 1);
+    let seen = console.rig.master.layer0().lease().seen_us();
+    for _ in 0..3 {
+        console.rig.run(10);
+        console
+            .give(OPERATOR_CLIENT, Command::TakeControl)
+            .expect("taken");
+        console.rig.run(1);
+        assert_eq!(console.rig.master.layer0().lease().seen_us(), seen);
+    }
+    console.rig.run(10);
+    assert!(!console.rig.master.layer0().lease().is_held());
+}
+
 #[test]
 fn the_timeout_cannot_be_switched_off() {
     for (asked, most) in [(0, TIMEOUT_MIN_US), (u32::MAX, TIMEOUT_MAX_US)] {

@@ -14,8 +14,9 @@ use super::outbox::{Outbox, status};
 use super::request::{Malformed, Request, parse_binary, parse_text};
 use crate::close::Close;
 use crate::hub::{Hub, Looking};
+use crate::progress::PROGRESS;
 use crate::rate::Bucket;
-use crate::session::{PROGRESS, SILENCE, send_all};
+use crate::session::{SILENCE, send_all};
 
 /// What a viewer is offered.
 pub(crate) struct Viewing {

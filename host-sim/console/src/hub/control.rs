@@ -66,6 +66,7 @@ impl Inner {
                     valid_us,
                     command,
                     spoken,
+                    by: takes.then(|| client.name.clone()),
                 };
                 (input, what)
             }
@@ -136,7 +137,12 @@ impl Inner {
         let message = outcome(n, time_us, &answer);
         let is_done = matches!(answer, Answer::Done);
         match pending.map(|p| p.what) {
-            Some(Asked::Take) if is_done => self.desk.grant(client, time_us),
+            Some(Asked::Take) if is_done => {
+                self.desk.grant(client, time_us);
+                if let Some(holder) = self.desk.holder() {
+                    self.last_holder.clone_from(&holder.name);
+                }
+            }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
             Some(Asked::Inject(fault)) if is_done => {

@@ -51,7 +51,11 @@ impl Inner {
             let gap = moving.number - arrived.number - 1;
             arrived.number = moving.number;
             if let OwnedSample::Event(event) = &moving.sample {
-                let event = event_json(moving.t_ns, event);
+                let lost = event.code == "hold" && event.detail == "operator_lost";
+                let mut event = event_json(moving.t_ns, event);
+                if lost {
+                    event["holder"] = self.last_holder.as_str().into();
+                }
                 tell_event(&self.clients, &mut self.events, event);
             }
             self.viewers

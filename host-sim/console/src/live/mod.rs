@@ -124,6 +124,8 @@ pub(crate) enum Input {
         command: Command,
         /// The same as its sender wrote it.
         spoken: Spoken,
+        /// Name of the client that takes the control.
+        by: Option<String>,
     },
     /// A command to the simulation.
     Host {
@@ -167,6 +169,8 @@ pub(crate) enum Answer {
     Paused,
     /// The sender has seen the future.
     SeenInFuture,
+    /// The computer was suspended since the sender saw the robot.
+    Suspended,
     /// The master is dead.
     NoMaster,
     /// The clock goes too fast for somebody in control.

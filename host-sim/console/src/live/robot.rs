@@ -8,6 +8,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use wheeleg_master::command::{Command, CommandCode};
+use wheeleg_master::config::OPERATOR_TIMEOUT_US;
 use wheeleg_master::dispatcher::Request;
 use wheeleg_master::event::Event;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
@@ -32,8 +33,24 @@ const TICK_NS: u64 = 1_000_000;
 const HASH_NS: u64 = 1_000_000_000;
 /// Stack of the thread: a world is built on it in one piece.
 const STACK: usize = 16 << 20;
+/// A robot that stood still for so long, unasked, was seen by nobody: the master's own timeout.
+const BLIND: Duration = Duration::from_micros(OPERATOR_TIMEOUT_US as u64);
 /// Longest sleep, so that a stop is heard however slow the clock goes.
 const NAP: Duration = Duration::from_millis(5);
+
+/// Time of a clock that goes on while the computer is suspended, where the system has one.
+fn awake() -> Duration {
+    #[cfg(target_os = "linux")]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::Boottime);
+        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        static BEGIN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+        BEGIN.get_or_init(Instant::now).elapsed()
+    }
+}
 
 /// A robot that lives in a thread of its own: what the hub has of it.
 pub(crate) struct Robot {
@@ -95,6 +112,8 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
             stops_heard: 0,
             stops: 0,
             seen_us: 0,
+            listened: awake(),
+            deaf: false,
             failed: false,
         }
         .run();
@@ -143,6 +162,11 @@ struct Loop {
     stops: u64,
     /// Newest beat that was given to the master.
     seen_us: u64,
+    /// When it listened last.
+    listened: Duration,
+    /// The computer was suspended under an operator, who is not heard again: the master ends the
+    /// lease, and all axes hold.
+    deaf: bool,
     /// The simulation cannot go on.
     failed: bool,
 }
@@ -213,8 +237,12 @@ impl Loop {
 
     fn listen(&mut self) {
         self.hear_stop();
+        let now = awake();
+        let stood = now.saturating_sub(self.listened) > BLIND;
+        self.listened = now;
+        self.deaf = self.is_held() && (self.deaf || stood);
         let seen_us = self.signals.seen_us.load(Ordering::Acquire);
-        if seen_us != self.seen_us {
+        if seen_us != self.seen_us && !self.deaf {
             self.seen_us = seen_us;
             self.machine.beat(seen_us);
             self.given(Given::Beat(seen_us));
@@ -230,14 +258,26 @@ impl Loop {
                     valid_us,
                     command,
                     spoken,
+                    by,
                 } => {
                     let deadline_us = seen_us.saturating_add(valid_us);
-                    (id, self.request(id, seen_us, deadline_us, command, spoken))
+                    let request = Request {
+                        client: OPERATOR_CLIENT,
+                        id,
+                        deadline_us,
+                        command,
+                    };
+                    (id, self.request(request, seen_us, spoken, by))
                 }
                 Input::Host { id, command } => (id, self.host(id, command)),
             };
             self.answer(id, answer);
         }
+    }
+
+    /// Somebody is in control.
+    fn is_held(&self) -> bool {
+        self.machine.master().layer0().lease().is_held()
     }
 
     /// Gives a stop that was asked for; it waits neither for a ring nor for the clock.
@@ -266,11 +306,10 @@ impl Loop {
 
     fn request(
         &mut self,
-        id: u32,
+        request: Request,
         seen_us: u64,
-        deadline_us: u64,
-        command: Command,
         spoken: Spoken,
+        by: Option<String>,
     ) -> Answer {
         let now_us = self.now_us();
         let pace = self.pace.status();
@@ -283,20 +322,18 @@ impl Loop {
         if seen_us > now_us {
             return Answer::SeenInFuture;
         }
+        if self.deaf {
+            return Answer::Suspended;
+        }
         let too_fast = pace.speed.is_none_or(|speed| speed > SPEED_OF_CONTROL);
-        if too_fast && command.code() == CommandCode::TakeControl {
+        if too_fast && request.command.code() == CommandCode::TakeControl {
             return Answer::TooFast;
         }
-        let request = Request {
-            client: OPERATOR_CLIENT,
-            id,
-            deadline_us,
-            command,
-        };
         self.given(Given::Command {
-            id,
-            deadline_us,
+            id: request.id,
+            deadline_us: request.deadline_us,
             spoken,
+            by,
         });
         match self.machine.request(request, &mut self.recorder) {
             Some(Ok(_)) => Answer::Accepted,
@@ -325,8 +362,7 @@ impl Loop {
                 self.steps = cycles;
             }
             HostCommand::Speed(speed) => {
-                let held = self.machine.master().layer0().lease().is_held();
-                if held && speed > SPEED_OF_CONTROL {
+                if self.is_held() && speed > SPEED_OF_CONTROL {
                     return Answer::TooFast;
                 }
                 self.pace.set_speed(Some(speed), now);

@@ -2,7 +2,7 @@
 //! `recording.json`, which says what it is of and how it ended.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, ErrorKind, Write as _};
+use std::io::{BufWriter, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -250,14 +250,29 @@ impl Folder {
 /// Largest `recording.json`.
 const SUMMARY_MAX: u64 = 64 * 1024;
 
+/// Opens a file of a recording, which may be anybody's: a pipe may have no writer, a device no end.
+///
+/// # Errors
+/// What is wrong, with the path.
+pub(crate) fn opened(path: &Path) -> Result<File, String> {
+    let about = fs::metadata(path).map_err(|e| said(path, &e))?;
+    if !about.is_file() {
+        return Err(format!("{}: it is not a file", path.display()));
+    }
+    File::open(path).map_err(|e| said(path, &e))
+}
+
 /// Reads the `recording.json` of a folder.
 pub(crate) fn summary(folder: &Path) -> Result<Summary, String> {
     let path = folder.join(SUMMARY);
-    let size = fs::metadata(&path).map_err(|e| said(&path, &e))?.len();
+    let file = opened(&path)?;
+    let size = file.metadata().map_err(|e| said(&path, &e))?.len();
     if size > SUMMARY_MAX {
         return Err(format!("{}: {size} bytes are too many", path.display()));
     }
-    let text = fs::read_to_string(&path).map_err(|e| said(&path, &e))?;
+    let mut text = String::new();
+    let read = file.take(SUMMARY_MAX).read_to_string(&mut text);
+    read.map_err(|e| said(&path, &e))?;
     serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
 

@@ -50,6 +50,9 @@ pub(crate) struct CommandInput {
     pub(crate) deadline_us: u64,
     /// The command.
     pub(crate) spoken: Spoken,
+    /// Name of the client that takes the control; it stands here for who reads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) by: Option<String>,
 }
 
 /// How the clock goes.
@@ -75,10 +78,12 @@ impl Line {
                 id,
                 deadline_us,
                 spoken,
+                by,
             } => Input::Command(CommandInput {
                 id,
                 deadline_us,
                 spoken,
+                by,
             }),
             Given::Fault(fault, true) => Input::FaultBegins(name(&fault)),
             Given::Fault(fault, false) => Input::FaultEnds(name(&fault)),
@@ -112,6 +117,7 @@ mod tests {
                 id: 7,
                 deadline_us: 81_730_000,
                 spoken: spoken.expect("a command"),
+                by: Some("tablet".to_owned()),
             },
             Given::Fault("supply-sag=3.25@0s".parse().expect("a fault"), true),
             Given::Fault("pot-open:joint3@0s".parse().expect("a fault"), false),

@@ -132,6 +132,8 @@ pub(crate) enum Given {
         deadline_us: u64,
         /// The command.
         spoken: Spoken,
+        /// Name of the client that takes the control.
+        by: Option<String>,
     },
     /// A fault begins, or ends.
     Fault(FaultSpec, bool),

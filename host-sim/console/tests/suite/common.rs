@@ -7,6 +7,9 @@ use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::Keys;
 use wheeleg_console::{ConsoleError, Live, Options, Server};
 
+/// Where a line to the server begins that is slower than this computer.
+pub(crate) const RELAY: std::net::Ipv4Addr = std::net::Ipv4Addr::new(127, 0, 0, 2);
+
 /// A foreign page that may look by Foxglove's protocol.
 pub(crate) const PAGE: &str = "https://viewer.example";
 
@@ -62,7 +65,7 @@ impl TestRig {
             listen: "127.0.0.1:0".parse().expect("an address"),
             keys: keys.clone(),
             page: None,
-            names: Vec::new(),
+            names: vec![RELAY.to_string()],
             protection: wheeleg_console::Protection::AsNeeded,
             viewer_pages: vec![PAGE.to_owned()],
             viewers_write: true,

@@ -138,6 +138,27 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
             "{code}"
         );
     }
+    // A frame of another session: the first of each.
+    let mut other = rig.control("other");
+    let of_other = other.sealed(json!({ "op": "stop" }));
+    let mut client = rig.control("forger");
+    client.send_raw(of_other.clone()).expect("sent");
+    assert_eq!(closed(&mut client), 4003);
+    // One bit of it flipped, by its owner.
+    for bit in (0..8 * of_other.len()).step_by(7) {
+        let mut client = rig.control("forger");
+        let mut frame = client.sealed(json!({ "op": "stop" }));
+        frame[bit / 8] ^= 1 << (bit % 8);
+        client.send_raw(frame).expect("sent");
+        assert_eq!(closed(&mut client), 4003, "bit {bit}");
+    }
+    // The session's own frame, once more.
+    let mut client = rig.control("forger");
+    let frame = client.sealed(json!({ "op": "unsubscribe", "channels": [] }));
+    client.send_raw(frame.clone()).expect("sent");
+    assert_eq!(client.outcome(1), Outcome::Done);
+    client.send_raw(frame).expect("sent");
+    assert_eq!(closed(&mut client), 4003);
     // The session's own frame, out of order: `n` of the client below is one ahead.
     let mut client = rig.control("forger");
     look(&mut client, "state");
@@ -149,6 +170,12 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
     client.send(json!({ "op": "stop" })).expect("sent");
     assert_eq!(closed(&mut client), 4003);
     assert_eq!(rig.state()["emergency_stop"], false);
+    // The person at the server is told, by name and address.
+    let told = rig.server.notices();
+    let named = told
+        .iter()
+        .all(|line| line.contains("\"forger\" at 127.0.0.1"));
+    assert!(named && !told.is_empty(), "{told:?}");
     // The next session works.
     let mut client = rig.control("owner");
     look(&mut client, "state");
@@ -185,24 +212,19 @@ fn half_requests_and_half_handshakes_lose_their_place() {
     let upgrade = format!(
         "GET /ws HTTP/1.1\r\nHost: {address}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: wheeleg.console.v1\r\n\r\n"
     );
-    let mut open = Vec::new();
-    for i in 0..300 {
-        let Ok(mut stream) = TcpStream::connect(address) else {
-            continue;
-        };
-        let text = if i % 2 == 0 { "GET / HT" } else { &upgrade };
-        let _ = stream.write_all(text.as_bytes());
-        open.push(stream);
-    }
-    let begin = Instant::now();
-    let back = loop {
-        if let Ok(client) = Client::connect(&rig.url, "control", "owner", &rig.keys.control) {
-            break client;
+    // A thousand, of which as many are open as a program may have.
+    for _ in 0..4 {
+        let mut open = Vec::new();
+        for i in 0..250 {
+            let Ok(mut stream) = TcpStream::connect(address) else {
+                continue;
+            };
+            let text = if i % 2 == 0 { "GET / HT" } else { &upgrade };
+            let _ = stream.write_all(text.as_bytes());
+            open.push(stream);
         }
-        assert!(begin.elapsed() < Duration::from_secs(10), "locked out");
-        std::thread::sleep(Duration::from_millis(100));
-    };
-    drop(back);
+        gets_in(&rig);
+    }
     let state = rig.state();
     assert_eq!(state["alive"], true, "{state}");
 }
@@ -240,6 +262,44 @@ fn requests_without_an_end_and_idle_connections_lose_their_place() {
         false,
         "no key, no stop over HTTP"
     );
+}
+
+/// Hundreds of files are asked for by each, and none is read.
+#[test]
+fn who_asks_and_never_reads_loses_its_place() {
+    let rig = TestRig::new();
+    let address = rig.server.address();
+    let request = format!("GET /openapi.json HTTP/1.1\r\nHost: {address}\r\n\r\n").repeat(300);
+    let mut open = Vec::new();
+    for _ in 0..150 {
+        let Ok(mut stream) = TcpStream::connect(address) else {
+            continue;
+        };
+        let waits = stream.set_write_timeout(Some(Duration::from_millis(20)));
+        waits.expect("set");
+        let _ = stream.write_all(request.as_bytes());
+        open.push(stream);
+    }
+    gets_in(&rig);
+}
+
+/// Sockets that nobody has proved a key on take places, too: no more of them are open at a time.
+#[test]
+fn half_handshakes_take_no_more_places_than_others() {
+    let rig = TestRig::new();
+    let address = rig.server.address();
+    let uri = format!("ws://{address}/ws");
+    let open: Vec<_> = (0..200)
+        .map_while(|_| {
+            let uri = uri.parse().expect("an address");
+            let request = tungstenite::client::ClientRequestBuilder::new(uri);
+            let request = request.with_sub_protocol("wheeleg.console.v1");
+            let stream = TcpStream::connect(address).ok()?;
+            tungstenite::client(request, stream).ok()
+        })
+        .collect();
+    assert!((90..=96).contains(&open.len()), "{}", open.len());
+    gets_in(&rig);
 }
 
 #[test]

@@ -32,9 +32,10 @@ struct Scale {
 impl Scale {
     fn at(&self, value: f64) -> f64 {
         let ((v0, v1), (p0, p1)) = (self.values, self.pixels);
-        // A range without length has everything in its middle.
-        let share = if v1 > v0 {
-            (value - v0) / (v1 - v0)
+        // A range without length, or with more than numbers can tell, has everything in its middle.
+        let share = (value - v0) / (v1 - v0);
+        let share = if v1 > v0 && share.is_finite() {
+            share
         } else {
             0.5
         };
@@ -47,14 +48,15 @@ impl Scale {
         if hi <= lo {
             return Vec::new();
         }
-        let count = |step: f64| ((hi / step).floor() - (lo / step).ceil()) as i64 + 1;
-        let decade = (hi - lo).log10().floor() as i32;
+        let count = |step: f64| (hi / step).floor() - (lo / step).ceil() + 1.0;
+        // Of a range that is larger or smaller than any, there are no such multiples.
+        let decade = (hi - lo).log10().floor().clamp(-300.0, 300.0) as i32;
         let decades = (decade - 2..=decade + 1).map(|k| 10_f64.powi(k));
         let steps = decades.flat_map(|ten| [1.0, 2.0, 5.0].map(|m| m * ten));
-        let mut fitting = steps.filter(|step| count(*step) <= most as i64);
+        let mut fitting = steps.filter(|step| count(*step) <= most as f64);
         fitting.next().map_or_else(Vec::new, |step| {
             let first = (lo / step).ceil();
-            (0..count(step))
+            (0..count(step) as usize)
                 .map(|k| (first + k as f64) * step)
                 .collect()
         })

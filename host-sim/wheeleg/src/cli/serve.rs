@@ -74,7 +74,6 @@ pub(super) struct ServeArgs {
     /// disarmed and nobody is in control.
     #[arg(long)]
     foxglove_write: bool,
-    /// Folder of the page, instead of the one in this program: for who works on it.
     /// Folder of the page, instead of the one in this program, for work on the page.
     #[arg(long, value_name = "DIR")]
     page_dir: Option<PathBuf>,
@@ -190,6 +189,9 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
             break signal;
         }
         tell_cut_short(server.recording_failure(), &mut told);
+        for line in server.notices() {
+            tell(&line);
+        }
         std::thread::sleep(Duration::from_millis(50));
     };
     let failure = server.end();

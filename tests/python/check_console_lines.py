@@ -1,0 +1,218 @@
+"""What becomes of a console's page whose line, server, view or time is gone, in a browser.
+
+    python3 check_console_lines.py WHEELEG SCREENSHOTS AXE
+
+A second browser is refused and may stop. A line that goes dead in mid-walk, a page that freezes and one that is hidden
+lose the robot, which holds and says whose it was; when they are back they move nothing. What comes late over a slow
+line is marked as old. A server that is gone is told, and one that is there again moves nothing. Real boards are
+shown without what they do not tell.
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import check_console
+from check_console import FLAGS, Console, becomes_ready, cell, expect, opened, press, problems, waits, walks
+from playwright.sync_api import sync_playwright
+from relay import Relay
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "host-sim/console/python"))
+from wheeleg import Robot
+
+# The browser comes by this address, so that its line can be tampered with.
+NEAR = "127.0.0.2"
+
+
+def lost(robot, what):
+    """The master holds the robot of an operator who is gone, and the events name them."""
+    try:
+        robot.until(lambda state: state["hold"] == "operator_lost", 5)
+    except TimeoutError:
+        problems.append(f"{what}: the robot is not held: {robot.state()}")
+        return
+    held = [event for event in robot.events() if event["detail"] == "operator_lost"]
+    expect(held and held[-1]["holder"] == "browser", f"{what}: the events do not name the operator: {held[-1:]}")
+    robot.until(lambda state: state["control"] is None, 2)
+
+
+def moves_nothing(robot, what):
+    """For two seconds nobody is in control, and the robot is held."""
+    begin = time.monotonic()
+    while time.monotonic() - begin < 2:
+        state = robot.state()
+        expect(state["control"] is None and state["hold"] and not state["stepping"], f"{what}: {state}")
+        time.sleep(0.1)
+
+
+def recovers(page):
+    page.bring_to_front()
+    expect(becomes_ready(page), f"does not recover: {page.inner_text('.answer')!r}")
+
+
+def second_browser(browser, console, first, robot):
+    second = opened(browser, console, f"#k={console.keys['control']}")
+    second.wait_for_selector(".joint")
+    expect(waits(second, "Control", ["browser"]), "the second does not see who is in control")
+    for _ in range(check_console.ATTEMPTS):
+        press(second, "Take control")
+        second.wait_for_timeout(500)
+        if "browser is in control" in second.inner_text(".answer"):
+            break
+        recovers(first)
+    expect("refused" in second.inner_text(".answer"), f"a second takes the control: {second.inner_text('.answer')!r}")
+    expect("asks for the control" in first.inner_text(".answer"), f"the first is not told: {first.inner_text('.answer')!r}")
+    expect(robot.state()["armed"], "the first is disturbed")
+    second.click(".stop")
+    expect(waits(first, "State", ["STOPPED"]), "a second cannot stop the first")
+    second.context.close()
+    recovers(first)
+
+
+def dead_line(page, robot, relay):
+    expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
+    relay.dead.set()
+    begin = time.monotonic()
+    page.wait_for_selector("body[data-state=stale]", timeout=3000)
+    took = time.monotonic() - begin
+    expect(took < 1.5, f"a dead line is shown after {took:.1f} s")
+    expect("old" in page.inner_text(".banner:not(.alarm)"), "a dead line is not told")
+    lost(robot, "a dead line")
+    page.click(".stop")
+    page.wait_for_selector(".banner.alarm:not([hidden])", timeout=2000)
+    expect("CUT THE AIR" in page.inner_text(".banner.alarm"), "a stop over a dead line seems confirmed")
+    press(page, "Walk")
+    relay.dead.clear()
+    # What was pressed meanwhile arrives now: the stop counts, the walk does not.
+    expect(waits(page, "State", ["STOPPED"]), f"after a dead line: {cell(page, 'State')}")
+    moves_nothing(robot, "after a dead line")
+    recovers(page)
+
+
+def slow_line(page, robot, relay, folder):
+    """The line delivers all, and late: what arrives is old, however steadily it comes."""
+    relay.delay_s = 0.8
+    try:
+        page.wait_for_function("() => document.body.dataset.state === 'stale' && /old/.test(document.querySelector('.banner:not(.alarm)').textContent)", timeout=5000)
+        page.wait_for_timeout(1500)
+        states = [page.get_attribute("body", "data-state") for _ in range(20) if page.wait_for_timeout(30) is None]
+        expect(states.count("stale") >= 15, f"what comes 0.8 s late looks live: {states}")
+        page.screenshot(path=folder / "slow-line.png")
+    except Exception:
+        problems.append("what comes 0.8 s late looks live")
+    lost(robot, "a slow line")
+    relay.delay_s = 0.0
+    page.wait_for_selector("body[data-state=live]", timeout=10000)
+    moves_nothing(robot, "after a slow line")
+    recovers(page)
+
+
+def frozen_page(page, robot):
+    expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
+    tools = page.context.new_cdp_session(page)
+    tools.send("Page.setWebLifecycleState", {"state": "frozen"})
+    lost(robot, "a frozen page")
+    tools.send("Page.setWebLifecycleState", {"state": "active"})
+    moves_nothing(robot, "a page that is awake again")
+    recovers(page)
+
+
+def hidden_page(page, robot):
+    expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
+    page.evaluate("""() => {
+        Object.defineProperty(document, "hidden", { value: true, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+    }""")
+    robot.until(lambda state: not state["stepping"] and state["phase"] != "walk", 5)
+    expect(waits(page, "Gait", ["hold", "idle", "ready"]), f"a hidden page: {cell(page, 'Gait')}")
+    page.evaluate("() => { delete document.hidden; }")
+    recovers(page)
+
+
+def server_again(program, home, console, page, browser):
+    """The server ends and is there again, under the same address and keys."""
+    listen = console.address.removeprefix("http://")
+    console.end()
+    page.wait_for_selector(".banner:not(.alarm):not([hidden])", timeout=5000)
+    expect("reload" in page.inner_text(".banner:not(.alarm)"), "a server that is gone is not told")
+    expect(page.get_attribute("body", "data-state") == "stale", "without a server the page looks live")
+    again = Console(program, home, listen, "--name", NEAR)
+    page.reload()
+    page.wait_for_selector(".joint", timeout=10000)
+    expect(waits(page, "State", ["disarmed"]) and cell(page, "Control") == "free", f"after a restart: {cell(page, 'State')}")
+    with Robot(listen, again.keys["view"], role="view") as robot:
+        begin = robot.state()["master_us"]
+        robot.until(lambda state: state["master_us"] > begin + 1_500_000, 10)
+        state = robot.state()
+        expect(state["control"] is None and not state["armed"], f"a page that reconnects moves something: {state}")
+    page.context.close()
+    return again
+
+
+def real_boards(program, browser, home, folder):
+    """Boards at a port tell neither attitude nor forces: nothing on the page is made up, and no number is broken."""
+    boards = subprocess.Popen([program, "boards", "--pty"], stdout=subprocess.PIPE, text=True)
+    try:
+        port = boards.stdout.readline().split()[-1]
+        console = Console(program, home, "127.0.0.1:0", "--robot", "wheeleg", "--port", port)
+        try:
+            page = opened(browser, console, f"#v={console.keys['view']}")
+            page.wait_for_selector(".joint")
+            page.wait_for_timeout(1500)
+            broken = page.evaluate("() => [...document.querySelectorAll('svg *')].filter((e) => [...e.attributes].some((a) => /NaN|undefined/.test(a.value))).length")
+            expect(broken == 0, f"{broken} parts of the drawings have no number")
+            text = page.inner_text("body")
+            expect("not measured" in text, "what real boards do not tell is not named")
+            expect("NaN" not in text and "false" not in text, "the page shows words of the machine")
+            expect(not page.get_by_role("button", name="Inject").count(), "faults can be tried on real boards")
+            page.get_by_role("button", name="3D").click()
+            page.wait_for_timeout(1500)
+            page.screenshot(path=folder / "real-boards.png")
+            page.context.close()
+        finally:
+            console.end()
+    finally:
+        boards.terminate()
+        boards.wait()
+
+
+def main(program, folder, _axe=None):
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as home, sync_playwright() as playwright:
+        home = Path(home)
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        console = Console(program, home, "127.0.0.1:0", "--name", NEAR)
+        listen = console.address.removeprefix("http://")
+        port = int(listen.rsplit(":", 1)[1])
+        try:
+            with Relay((NEAR, port), ("127.0.0.1", port)) as relay, Robot(listen, console.keys["view"], role="view") as robot:
+                page = opened(browser, console, f"#k={console.keys['control']}", address=f"http://{NEAR}:{port}")
+                page.wait_for_selector(".joint")
+                robot.until(lambda state: state["ready"])
+                recovers(page)
+                second_browser(browser, console, page, robot)
+                dead_line(page, robot, relay)
+                slow_line(page, robot, relay, folder)
+                frozen_page(page, robot)
+                hidden_page(page, robot)
+                robot.close()
+                console = server_again(program, home, console, page, browser)
+            console.end()
+            real_boards(program, browser, home, folder)
+        finally:
+            console.end()
+            browser.close()
+    if problems:
+        print("\n".join(problems))
+        sys.exit(1)
+    assert threading.active_count() < 4
+    print("lines, servers, views and time went, and nothing moved unseen")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
