@@ -2,9 +2,12 @@
 
     python3 bench_console.py WHEELEG [SECONDS]
 
+SECONDS: how long twenty clients look, 60 unless told otherwise; 3600 is the hour of the specification.
+
 Exit code 1 if a bar is missed.
 """
 
+import contextlib
 import os
 import statistics
 import subprocess
@@ -22,6 +25,9 @@ from wheeleg import Robot
 CLICKS = 100
 STOPS = 50
 CLIENTS = 20
+DEAF = 100
+# Parts that come when somebody asks for them.
+IN_SPACE = {"view3d.js", "space.js", "solids.js", "matrix.js"}
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 rows = []
 
@@ -55,7 +61,8 @@ def first_page(program, home):
             page.read()
         told("start of the program to the first page", (time.monotonic() - begin) * 1e3, "ms", 2000)
     folder = Path(__file__).parents[2] / "host-sim/report/page"
-    told("the page with all its parts", sum(f.stat().st_size for f in folder.iterdir()) / 1e3, "kB", 300)
+    parts = [f for f in folder.iterdir() if f.name not in IN_SPACE]
+    told("the page without its view in space", sum(f.stat().st_size for f in parts) / 1e3, "kB", 300)
 
 
 def clicks(robot):
@@ -80,6 +87,43 @@ def stops(robot):
         robot.stop()
         times.append((time.monotonic() - begin) * 1e3)
     told("stop to its bit in SYNC, p99", percentile(times, 0.99), "ms", 40)
+
+
+class Deaf(Robot):
+    """A client that asks for everything and reads nothing."""
+
+    def _read(self):
+        pass
+
+
+def answers_p99(robot):
+    """Of a question that asks for nothing, ms."""
+    times = []
+    for _ in range(200):
+        begin = time.monotonic()
+        robot._answered({"op": "unsubscribe", "channels": []}, 5)
+        times.append((time.monotonic() - begin) * 1e3)
+        time.sleep(0.02)
+    return percentile(times, 0.99)
+
+
+def deaf(robot, address, key, pid):
+    """A hundred clients that never read: what they cost the one in control."""
+    topics = [c["topic"] for c in robot.get("channels")["channels"]]
+    before, memory = answers_p99(robot), status(pid, "VmRSS")
+    clients = []
+    for i in range(DEAF):
+        # The rest are refused.
+        with contextlib.suppress(Exception):
+            client = Deaf(address, key, role="view", name=f"deaf {i}")
+            client._send({"op": "subscribe", "channels": topics, "hz": "all"})
+            clients.append(client)
+    time.sleep(2.0)
+    told(f"clients that never read and got a place, of {DEAF}", float(len(clients)), "", 30)
+    told("an answer beside them, p99, over that without", 100 * answers_p99(robot) / before, "%", 120)
+    told("memory of them", status(pid, "VmRSS") - memory, "MB", 32)
+    for client in clients:
+        client.close()
 
 
 def crowd(address, key, pid, seconds):
@@ -114,6 +158,7 @@ def main(program, seconds=60.0):
                 robot.command("RecordStart")
                 robot.command("Arm")
                 clicks(robot)
+                deaf(robot, address, keys["view"], pid)
             crowd(address, keys["view"], pid, float(seconds))
             with robot.control():
                 stops(robot)

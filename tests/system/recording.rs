@@ -134,6 +134,7 @@ fn a_recording_repeats_after_term_and_after_a_kill() {
 
 /// A computer that sleeps for a while under a walking robot: nobody has seen it meanwhile.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
     let served = Served::new("");
     served.until("ready", |state| state["ready"] == true);

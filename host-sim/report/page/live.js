@@ -14,6 +14,10 @@ const BEAT_MS = 50;
 const ECHO_MS = 100;
 const EVENTS = 200;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
+/** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
+const HOLDS = {
+  operator_lost: ["Operator lost: the robot holds.", "Nothing was seen of who drove for 0.4 s. Check that the page is in front and the line is good; then take the control, clear the fault, and press Ready."],
+};
 const WHEELS = ["/wheel/7", "/wheel/8"];
 
 /** The key from the address, which must not stay there, or of this tab. @returns {import("./link.js").Identity | null} */
@@ -38,9 +42,9 @@ let link = null;
 let lost = "";
 
 const page = /** @type {HTMLElement} */ (document.getElementById("page"));
-const cell = (name) => {
+const cell = (name, minor = false) => {
   const value = html("b", {}, "–");
-  return { root: html("div", { class: "cell" }, html("small", {}, name), value), value };
+  return { root: html("div", { class: minor ? "cell minor" : "cell" }, html("small", {}, name), value), value };
 };
 const button = (name, code, act) => html("button", { class: "btn", type: "button", onclick: act }, html("span", {}, name), code && html("small", {}, code));
 
@@ -83,7 +87,7 @@ function unconfirmed() {
 }
 
 // ---- head ----
-const head = { robot: cell("Robot"), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock"), control: cell("Control") };
+const head = { robot: cell("Robot", true), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock", true), control: cell("Control") };
 const banner = html("p", { class: "banner", role: "alert", hidden: true });
 
 // ---- views ----
@@ -163,9 +167,13 @@ const events = html("ol", { class: "events", tabindex: 0, "aria-label": "Events"
 function showFaults(state) {
   const rows = new Map();
   for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
+  const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Mend what the boards and events tell, then clear the fault and press Ready."];
+  // A stop is told by the boards.
+  const held = state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault";
   faults.replaceChildren(
+    ...(held ? [html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${cause}`), html("p", {}, remedy))] : []),
     ...[...rows.values()].map(({ fault: f, boards: of }) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`), html("p", {}, f.remedy), html("small", {}, `${f.name}, number ${f.number}`))),
-    ...(rows.size === 0 ? [html("li", { class: "none" }, sign("met"), " No board has a fault.")] : []),
+    ...(rows.size === 0 && !held ? [html("li", { class: "none" }, sign("met"), " No board has a fault.")] : []),
   );
 }
 let shownFaults = "";
@@ -206,7 +214,8 @@ function showFields() {
   say(effect, chosen.effect);
   fields.replaceChildren(
     ...chosen.arguments.map((a) => {
-      const label = `${a.name}${a.unit ? ` [${a.unit}]` : ""}`;
+      const unit = a.kind === "value of the parameter" ? "raw, as on the bus" : a.unit;
+      const label = `${a.name}${unit ? ` [${unit}]` : ""}`;
       const range = a.min != null ? `${a.min} to ${a.max}` : "";
       let input;
       if (a.choices) input = html("select", { name: a.name, "data-kind": "text" }, a.choices.map((c) => html("option", {}, c)));
@@ -326,7 +335,7 @@ function showState(state) {
   for (const b of [take, ready, walk, hold, disarm, clear, record]) b.toggleAttribute("disabled", looks);
   boards.state(state);
   showRecording(state);
-  const key = JSON.stringify(state.boards.map((b) => b.faults));
+  const key = JSON.stringify([state.hold, state.boards.map((b) => b.faults)]);
   if (key !== shownFaults) {
     shownFaults = key;
     showFaults(state);
@@ -343,14 +352,16 @@ function paint() {
   requestAnimationFrame(paint);
   if (!views) return;
   // What comes over a line that is slow was said before the answer that is still waited for.
-  const age = Math.max(performance.now() - now.heard_ms, link?.unanswered_ms() ?? 0);
+  const silent = performance.now() - now.heard_ms;
+  const age = Math.max(silent, link?.unanswered_ms() ?? 0);
   const stale = lost !== "" || age > STALE_MS;
   document.body.dataset.state = stale ? "stale" : "live";
   banner.hidden = !stale;
   if (stale) {
     say(banner, lost || `Nothing new for ${fixed(age / 1000)} s: what is shown is old.`);
     say(head.link.value, `${fixed(age / 1000)} s old`);
-    return;
+    // What is old and still comes is drawn, and says that it is old.
+    if (lost !== "" || silent > STALE_MS) return;
   }
   const robot = pose();
   views.side.update(robot);
@@ -360,7 +371,7 @@ function paint() {
   joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i], link?.identity.role === "control"));
   scope?.paint(now.t_us * 1e-6);
   if (now.state) showState(now.state);
-  say(head.link.value, link ? `${fixed(link.delay_ms, 0)} ms` : "–");
+  if (!stale) say(head.link.value, link ? `${fixed(link.delay_ms, 0)} ms` : "–");
   say(head.time.value, `${fixed(now.t_us * 1e-6, 2)} s`);
   if (link) link.seen_us = Math.floor(now.t_us);
 }

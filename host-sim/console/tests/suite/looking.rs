@@ -109,6 +109,7 @@ fn every_sample_of_every_channel_comes_once_and_in_order() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
     let rig = TestRig::new();
     let subscribe = |client: &mut Client| {
@@ -157,6 +158,7 @@ fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
 
 /// It is told much, and says nothing but that it is there when it is asked.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn who_only_looks_is_not_taken_for_gone() {
     let rig = TestRig::new();
     let mut viewer = rig.view();

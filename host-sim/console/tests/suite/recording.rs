@@ -227,4 +227,15 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
     assert!(error(folder.path()).contains("100000 bytes"));
     fs::write(&summary, "{}").expect("written");
     assert!(error(folder.path()).contains("recording.json"));
+    // A device has no end, and a pipe may never begin.
+    #[cfg(unix)]
+    {
+        fs::remove_file(&summary).expect("removed");
+        std::os::unix::fs::symlink("/dev/zero", &summary).expect("linked");
+        assert!(error(folder.path()).contains("not a file"));
+        fs::remove_file(&summary).expect("removed");
+        let made = std::process::Command::new("mkfifo").arg(&summary).status();
+        assert!(made.expect("mkfifo").success());
+        assert!(error(folder.path()).contains("not a file"));
+    }
 }

@@ -8,6 +8,7 @@ use wheeleg_config::Drawing;
 use wheeleg_protocol::Address;
 use wheeleg_telemetry::{EventKind, Logged, Read, Scalar, channels, read};
 
+use super::plain::plain;
 use super::signals::{self, Signal, foot, joint, signal};
 use super::thin::Thin;
 use crate::StudyError;
@@ -121,7 +122,9 @@ fn drawn() -> Vec<Signal> {
     signals
 }
 
-fn cut(mut text: String) -> String {
+/// A text of a log as it can be shown, also on a terminal: at most as long as a line.
+fn cut(text: &str) -> String {
+    let mut text = plain(text);
     if let Some((end, _)) = text.char_indices().nth(TEXT) {
         text.truncate(end);
         text.push('…');
@@ -365,7 +368,7 @@ fn texts<const N: usize>(logged: &Logged<'_>, names: [&str; N]) -> [String; N] {
     let mut found = [const { String::new() }; N];
     logged.fields(&names, &mut |i, value| {
         if let Scalar::Text(text) = value {
-            found[i] = cut(text);
+            found[i] = cut(&text);
         }
     });
     found

@@ -7,6 +7,7 @@
 mod content;
 mod difference;
 mod page;
+mod plain;
 mod signals;
 mod thin;
 
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 use wheeleg_config::{Drawing, builtin};
 
 use self::content::{Content, Span};
+pub use self::plain::plain;
 use self::signals::Signal;
 use crate::StudyError;
 use crate::export::write_new;
@@ -92,7 +94,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
                 "leave out --from and --to to see where the log begins and ends",
             ));
         }
-        let name = path.display().to_string();
+        let name = plain(&path.display().to_string());
         logs.push(Named { name, content });
     }
     let differences = match logs.as_slice() {
@@ -224,12 +226,17 @@ mod tests {
     fn a_page_stands_beside_its_log_and_nothing_in_the_log_is_markup() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("log.mcap");
-        log(&path, "<script>alert(1)</script>", 90.0);
+        let evil = "<script>alert(1)</script>\u{1b}]0;x\u{7}\u{202e}";
+        log(&path, evil, 90.0);
         let viewed = viewed(&options(&[&path])).expect("a page");
         assert_eq!(viewed.page, folder.path().join("log.html"));
         assert!(viewed.broken_off.is_empty());
         let page = std::fs::read_to_string(&viewed.page).expect("written");
         assert!(page.contains("&lt;script&gt;alert(1)") && !page.contains("<script>alert"));
+        // Nor does anything in it act on a terminal.
+        for text in [&viewed.verdict, &page] {
+            assert!(!text.contains(['\u{1b}', '\u{7}', '\u{202e}']), "{text}");
+        }
         for id in [
             "motion-data",
             "id=\"strokes\"",

@@ -10,6 +10,7 @@ use wheeleg_console::replay::{Replayed, replay};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Progress;
+use wheeleg_studies::view::plain;
 
 use super::exit::{self, FAILED, TARGETS_MISSED};
 use super::serve::refused;
@@ -129,7 +130,7 @@ fn as_text(replayed: &Replayed) -> String {
                 "the robot did something else from between {:.3} s and {:.3} s on; {why}: {}",
                 s(from),
                 s(to),
-                summary.program
+                plain(&summary.program)
             )
         }
     };
@@ -140,9 +141,9 @@ fn as_text(replayed: &Replayed) -> String {
     };
     format!(
         "{cut_short}{verdict}\nrecording {}: {} on {}, seed {}\ntime    {:.3} s since power-up, {} inputs\nhash    {}\n",
-        summary.id,
-        summary.robot,
-        summary.scenario,
+        plain(&summary.id),
+        plain(&summary.robot),
+        plain(&summary.scenario),
         summary.seed,
         s(replayed.end_ms),
         replayed.inputs,

@@ -7,7 +7,7 @@ use clap::Args;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::export::log_of;
 use wheeleg_studies::study::Progress;
-use wheeleg_studies::view::{Options, view};
+use wheeleg_studies::view::{Options, plain, view};
 
 use super::{print, stop_on_signals, tell};
 
@@ -59,13 +59,13 @@ pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
             for log in &viewed.broken_off {
                 tell(&format!(
                     "{} breaks off: what was written until then is shown",
-                    log.display()
+                    plain(&log.display().to_string())
                 ));
             }
             print(&format!(
                 "{}\npage    {}\n",
                 viewed.verdict,
-                viewed.page.display()
+                plain(&viewed.page.display().to_string())
             ))
         }
         (None, Some(signal)) => {

@@ -1,0 +1,20 @@
+//! Texts of somebody else's, as they can be shown.
+
+/// A text of somebody else's, without what would tell a terminal or a page to do something: control
+/// characters, and those that turn the direction of a text, become `�`.
+#[must_use]
+pub fn plain(text: &str) -> String {
+    let acts = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    text.chars()
+        .map(|c| {
+            if acts(c) {
+                char::REPLACEMENT_CHARACTER
+            } else {
+                c
+            }
+        })
+        .collect()
+}
