@@ -61,11 +61,11 @@ fn acts<'a>(s: &'a Source<'_>, side: Side, act: fn(Side) -> Act) -> impl Iterato
 
 fn foot_fall(s: &Source<'_>) -> Figure {
     let mut rows = Vec::new();
-    let legs: [(usize, &str, Side, fn(&BehaviourSample) -> u8); 2] = [
-        (0, "L", Side::Left, |v| v.left),
-        (1, "R", Side::Right, |v| v.right),
-    ];
-    for (foot, name, side, code) in legs {
+    for (foot, (name, side)) in [("L", Side::Left), ("R", Side::Right)]
+        .into_iter()
+        .enumerate()
+    {
+        let code = |v: &BehaviourSample| [v.left, v.right][foot];
         let planned = s.recording.behaviours.iter();
         let planned = planned.map(|r| (s.t(r.t_s()), f64::from(u8::from(code(&r.v) == STANCE))));
         let loaded = s.recording.feet[foot].iter().filter(|r| s.regular(r));
