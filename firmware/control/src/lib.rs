@@ -31,6 +31,10 @@
 //!   the next one
 //! * **moment**: the time in a period for which the observer's estimates hold
 //! * **dead time**: from the moment until a pulse of the next period acts at its chamber
+//! * **nimble mass**: the heaviest mass that the valves can still move as the dead time would allow
+//! * **pressure swap**: the drive chamber makes up for a counter chamber that cannot vent any faster
+//! * **patience**: how long the servo acts near a target before a wider band of rest is accepted
+//! * **break-away ramp**: a force that grows while the piston sticks: the integral term of this law
 //! * **expected**: at the end of the dead time, with the pulses that are under way
 //! * **band**: error within which a piston rests
 //! * **seat**: a piston pressed against the end stop that is its target

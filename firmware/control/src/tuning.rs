@@ -49,7 +49,8 @@ tuning! {
     // Observer: pressure.
     AMBIENT_PA: u64 = 101_325, "Pa", "ASSUMED: sea level", "coefficients_are_those_of_the_formulas";
     EXPONENT_PERCENT: u64 = 120, "polytropic exponent n, × 100", "ASSUMED: between isothermal and adiabatic, usual for small cylinders", "what_somebody_else_sends_is_counted_once";
-    PRESSURE_MAX: i32 = (1 << 29) - 1, "1/256 Pa (2.1 MPa)", "format: products with it fit", "extreme_inputs_never_panic_and_stay_in_range";
+    PRESSURE_MAX: i32 = (1 << 29) - 1, "1/256 Pa (2.1 MPa)", "format: its power at the fastest speed fits", "air_that_is_compressed_ends_at_a_pressure_that_fits";
+    VACUUM_SHIFT: u32 = 1, "log2 of the atmosphere over the lowest pressure of a chamber that is shut", "ASSUMED: no motion makes a deeper vacuum", "air_that_is_stretched_ends_at_half_the_atmosphere";
     CHAMBER_LENGTH_MIN: i32 = 4 << 8, "1/256 mm (4 mm)", "keeps n/L in its format; the lines of small bores alone are longer", "a_chamber_is_never_shorter_than_its_line";
 
     // Observer: motion and load.
@@ -62,10 +63,10 @@ tuning! {
     STOP_ZONE: i32 = 1 << 16, "raw mm (1 mm)", "give of a stop, and error of the stroke told", "an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
     CUSHION: i32 = 6 << 16, "raw mm (6 mm)", "length of the longest cushion of the cylinders in axes/", "an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
     FRICTION_COUNTED: i32 = 60_293, "share of the friction told, × 2^16 (0.92)", "searched: friction that is less than told would let the observer overlook speed", "a_sliding_piston_loses_speed_to_friction";
-    MASS_MIN: i32 = 1311, "kg × 2^16 (0.02 kg)", "the least that may be told", "extreme_inputs_never_panic_and_stay_in_range";
+    MASS_MIN: i32 = 1311, "kg × 2^16 (0.02 kg)", "the least that may be told; format: its inverse fits", "no_mass_counts_as_less_than_the_least_that_may_be_told";
 
     // Observer: mass.
-    LEARN_PERIODS_MAX: u16 = 250, "periods (1 s)", "format: the impulse fits", "what_tells_nothing_is_left";
+    LEARN_PERIODS_MAX: u16 = 250, "periods (1 s)", "format: the impulse fits", "a_move_without_end_is_judged_after_a_second";
     LEARN_PERIODS_MIN: u16 = 20, "periods (80 ms)", "with fewer the noise of the speed counts", "what_tells_nothing_is_left";
     LEARN_SLIDES: i32 = 20 << 16, "raw mm/s (20 mm/s)", "usual Stribeck speed: from there on friction nears its sliding value", "a_move_begins_and_ends_with_sliding";
     LEARN_PEAK_SPEED: i32 = 200 << 16, "raw mm/s (200 mm/s)", "a slower move has little impulse of its mass", "what_tells_nothing_is_left";
@@ -75,6 +76,7 @@ tuning! {
 
     // Law: switching curve and inverse dynamics.
     SLOPE_PERCENT: u64 = 36, "slope of the curve times the dead time, × 100", "searched; 1/e = 37 is the aperiodic limit of an integrator with dead time", "coefficients_are_those_of_the_formulas";
+    SLOPE_LEAST: i32 = 1 << 8, "1/s × 2^8 (1/s)", "format: 1/(2 k²) fits", "the_slope_of_the_heaviest_mass_fits_its_format";
     DAMPING_PERCENT: u64 = 95, "gain of the speed error times the dead time, × 100", "searched", "coefficients_are_those_of_the_formulas";
     BRAKE_PERCENT: u64 = 60, "deceleration over slope times top speed, × 100", "searched", "coefficients_are_those_of_the_formulas";
     NIMBLE_PERCENT: u64 = 60, "nimble mass over what half of both chambers could, × 100", "searched", "coefficients_are_those_of_the_formulas";
@@ -102,11 +104,14 @@ tuning! {
     NEAR_BANDS: i32 = 24, "bands", "searched", "patience_begins_within_24_bands";
     NEAR_PERIODS: u16 = 4, "periods (16 ms)", "searched", "patience_begins_within_24_bands";
     PATIENCE: u16 = 100, "periods (0.4 s)", "most moves are at rest after 0.3 s", "patience_widens_the_band_and_waits_for_a_swing";
+    PATIENCE_MOST: u16 = 400, "periods (1.6 s)", "what it widens is then 2.4 times as wide, 0.29 mm of the bar of 0.5 mm on the bench", "patience_widens_the_band_and_waits_for_a_swing";
     WIDENS_AFTER: i32 = 120, "periods (0.48 s)", "a pause and a swing are over", "patience_widens_the_band_and_waits_for_a_swing";
     WIDENS_SHIFT: u32 = 7, "log2 of periods (0.51 s)", "by one band in so long", "patience_widens_the_band_and_waits_for_a_swing";
+    FADES_AFTER: i32 = 32, "periods (0.13 s)", "searched; then friction fades in the time in which the band widens by one", "friction_fades_where_the_piston_does_not_come_to_rest";
     BAND_WIDEST: i32 = mm(40), "raw mm (0.4 mm)", "the bar of the bench is 0.5 mm", "a_wide_band_is_released_within_the_bar";
     RELEASE_SIXTEENTHS: i32 = 16, "sixteenths of the band beyond it", "searched", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
     RELEASE_WIDEST: i32 = mm(45), "raw mm (0.45 mm)", "the bar of the bench is 0.5 mm", "a_wide_band_is_released_within_the_bar";
+    RELEASE_BEYOND_SIXTEENTHS: i32 = 8, "sixteenths of the band beyond one that is wider than the widest release", "searched: hysteresis of a wide band", "a_wide_band_is_released_within_the_bar";
     RELEASE_PERIODS: u16 = 5, "periods (20 ms)", "one swing of noise is shorter", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
     START_PERIODS: u16 = 1, "periods", "a new target is no noise", "rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
     FRICTION_STOPS: i32 = 55_705, "share of the friction told, × 2^16 (0.85)", "searched", "friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
@@ -125,6 +130,8 @@ tuning! {
     SEATED_WITHIN: i32 = mm(150), "raw mm (1.5 mm)", "cushion and load of the robot's foot hold it that far off", "a_seat_has_its_target_zone_speed_and_force";
     SEAT_FORCE_BREAKAWAYS: i32 = 3, "break-away forces", "with 4 a start without notice was 30 ms later", "a_seat_has_its_target_zone_speed_and_force";
     SEAT_PRESSED_SHIFT: u32 = 2, "log2 of the share of the force that may be missing", "resolution of the valves", "a_seat_has_its_target_zone_speed_and_force";
+    PRELOAD_EDGE_SHIFT: u32 = 1, "log2 of the friction over the force", "half of the friction is left for what is not known", "the_force_of_a_preload_is_half_the_friction";
+    PRELOAD_AGAIN_SHIFT: u32 = 1, "log2 of the friction over what may be missing before pulses begin again", "hysteresis: the estimated load of a piston at rest wanders", "a_preload_that_is_there_sends_no_pulse";
     PRELOAD_THERE_SHIFT: u32 = 3, "log2 of the friction over what may be missing", "resolution of the valves", "a_preload_that_is_there_sends_no_pulse";
     PRELOAD_MOVED_BANDS: i32 = 2, "bands", "that far, and it has begun to move", "a_preload_ends_when_the_piston_has_moved_by_two_bands";
 }

@@ -32,7 +32,7 @@ pub struct AxisModel {
     pub flow_a: i32,
     /// The same for B.
     pub flow_b: i32,
-    /// Polytropic exponent × 1.048576 × 2^30: see `AxisModel::stiffness`.
+    /// Polytropic exponent × 1.048576 × 2^30: see `AxisModel::exponent_per_length`.
     pub exponent: i32,
     /// mN per 1/256 Pa, × 2^32, of A and B.
     pub force_a: i32,
@@ -68,13 +68,13 @@ pub struct AxisModel {
     pub breakaway: i32,
     /// Viscous friction, mN per mm/s, × 2^8.
     pub viscous: i32,
-    /// Look-ahead from the moment of a period to that at which pulses of the next act: t_on and
+    /// Dead time: from the moment of a period to that at which pulses of the next act, t_on and
     /// the line behind its begin, in s × 2^32.
-    pub horizon: i32,
-    /// Look-ahead in µs.
-    pub horizon_us: i32,
-    /// Look-ahead from the tick that works out the force, in s × 2^32.
-    pub horizon_reference: i32,
+    pub dead_time: i32,
+    /// Dead time in µs.
+    pub dead_time_us: i32,
+    /// Dead time from the tick that works out the force on, in s × 2^32.
+    pub dead_time_reference: i32,
     /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
     /// middle of the two ticks whose stroke is used.
     pub moment: i32,
@@ -170,7 +170,7 @@ impl AxisModel {
         // Between the last two ticks, and from there to the next period.
         let moment_us = tick_us.wrapping_mul(5).wrapping_shr(1);
         let valve_us = micros(data.valve_on).wrapping_add(micros(data.line_delay));
-        let horizon_us = less(period_us, moment_us).wrapping_add(valve_us);
+        let dead_time_us = less(period_us, moment_us).wrapping_add(valve_us);
 
         let ambient_8 = AMBIENT_PA << 8;
         // kPa × 2^16 to Pa × 2^8: × 1000 / 256.
@@ -188,17 +188,19 @@ impl AxisModel {
         // Speed law. The larger piston side is the slower outlet, of choked speed
         // C ρ0 R T / area.
         let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1));
-        let per_horizon_8 = |percents: u64| divide(percents.wrapping_mul(2_560_000), horizon_us);
+        let per_dead_time_8 =
+            |percents: u64| divide(percents.wrapping_mul(2_560_000), dead_time_us);
         // × 2^14, below 256/s: that of a dead time of 1.4 ms, and no steeper below it.
         // 2^22 × 2^37.
-        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, horizon_us).min(65_535 << 6);
+        let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, dead_time_us).min(65_535 << 6);
         let slope_8 = slope_14.wrapping_shr(6);
         let brake = percent(
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
             BRAKE_PERCENT,
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
-        // how fast the force can change, mN/s.
+        // how fast the force can change, mN/s. Filled from a supply of about 7 bar at the mean of that and the
+        // atmosphere the flow is 0.9 of the choked one, by ISO 6358 with b of 0.3.
         let both_8 = percent(
             stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke),
             90,
@@ -266,15 +268,15 @@ impl AxisModel {
             coulomb: number(to_mn(data.coulomb)),
             breakaway: number(to_mn(data.breakaway)),
             viscous: number(raw(data.viscous).wrapping_shr(8)),
-            horizon: seconds_32(horizon_us),
-            horizon_us: number(horizon_us),
-            horizon_reference: seconds_32(tick_us.wrapping_add(valve_us)),
+            dead_time: seconds_32(dead_time_us),
+            dead_time_us: number(dead_time_us),
+            dead_time_reference: seconds_32(tick_us.wrapping_add(valve_us)),
             moment: number(moment_us),
             period: seconds_32(period_us),
             mass: number(raw(data.mass)),
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             slope: number(slope_8),
-            damping: number(per_horizon_8(DAMPING_PERCENT)),
+            damping: number(per_dead_time_8(DAMPING_PERCENT)),
             brake: number(brake),
             top_speed: number(top_16),
             observe_stroke: number(OBSERVE_STROKE),

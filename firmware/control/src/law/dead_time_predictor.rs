@@ -43,14 +43,14 @@ impl PredictedState {
             let mean = force.saturating_add(then) >> 1;
             let viscous = mul_shr(motion.speed, model.viscous, 24);
             let sliding = mean.saturating_add(motion.load).saturating_sub(viscous);
-            let gained = mul_shr_sat(inertia.acceleration(sliding), model.horizon, 16);
+            let gained = mul_shr_sat(inertia.acceleration(sliding), model.dead_time, 16);
             let free = motion.speed.saturating_add(gained);
             after_coulomb(free, inertia.coulomb_speed_ahead)
         };
         let mean = motion.speed.saturating_add(speed) >> 1;
         let free = motion
             .stroke
-            .saturating_add(mul_shr(mean, model.horizon, 32));
+            .saturating_add(mul_shr(mean, model.dead_time, 32));
         Self {
             stroke: free.max(0).min(model.stroke),
             speed,

@@ -96,7 +96,7 @@ impl ForceDemand<'_> {
         } = observer;
         let load = motion.load;
         let error = reference
-            .saturating_add(mul_shr(reference_speed, model.horizon_reference, 32))
+            .saturating_add(mul_shr(reference_speed, model.dead_time_reference, 32))
             .saturating_sub(ahead.stroke);
         // The force that can brake, beside the load.
         let left = if error > 0 {

@@ -1,7 +1,7 @@
 //! Preload: ahead of an announced move the force stands at the edge of slipping in its direction.
 //!
 //! ```text
-//! F* = ½ Fc sgn(next − x) − load
+//! F* = ½ Fc sgn(next − x) − load            Fc: Coulomb friction; load, x: observer
 //! ```
 //!
 //! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
@@ -11,13 +11,21 @@
 //! force alone is not enough: by the pressure swap two full chambers make it, too, and one of them would have to vent
 //! when the move begins.
 //!
+//! Assumes: at least half of the friction that is told, so that the piston stands; that the observer's load and
+//! pressures are right to the other half; the move as announced. If the supply falls, the drive chamber has less than
+//! was reckoned: the force is short of the edge, the piston stands, and the move begins later. The counter chamber
+//! vents as before. Of an announcement that is not followed nothing is left but the air.
+//!
 //! Config [`AxisModel`], state [`Preload`], update [`Predictive::preload`].
 
 use super::Predictive;
 use super::allocation::{self, PressureSwap};
 use crate::axis::AxisModel;
 use crate::joint::JointInput;
-use crate::tuning::{PRELOAD_MOVED_BANDS, PRELOAD_THERE_SHIFT, REFERENCE_RESTS};
+use crate::tuning::{
+    PRELOAD_AGAIN_SHIFT, PRELOAD_EDGE_SHIFT, PRELOAD_MOVED_BANDS, PRELOAD_THERE_SHIFT,
+    REFERENCE_RESTS,
+};
 
 /// A move that is awaited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -68,7 +76,7 @@ impl Predictive {
         {
             return None;
         }
-        let edge = model.coulomb.wrapping_shr(1);
+        let edge = model.coulomb.wrapping_shr(PRELOAD_EDGE_SHIFT);
         let edge = if distance > 0 {
             edge
         } else {
@@ -83,7 +91,7 @@ impl Predictive {
             let swap = PressureSwap::towards(next.reference.raw(), stroke);
             missing > model.coulomb >> PRELOAD_THERE_SHIFT || swap.lags(model, possible, expected)
         } else {
-            missing > model.coulomb >> 1
+            missing > model.coulomb >> PRELOAD_AGAIN_SHIFT
         };
         Some(if self.preload.acts {
             Awaited::Force(force)

@@ -5,10 +5,10 @@
 //! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
 //! ```
 //!
-//! Pulses are timed to the microsecond and may outlast a period. Of what is less than half of the shortest
-//! opening nothing is sent, from there on the shortest. The valve that would undo it shuts as soon as its own pulse
-//! allows, and a chamber's two valves are never on together. Near the target a pulse of one chamber alone: two may
-//! be too much of valves that cannot open for less.
+//! Pulses are timed to the microsecond and may outlast a period. An opening below the shortest is rounded to that or
+//! to nothing, whichever is nearer. The valve that would undo it shuts as soon as its own pulse allows, and a chamber's
+//! two valves are never on together. Near the target a pulse of one chamber alone: two may be too much of valves that
+//! cannot open for less.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 
@@ -60,6 +60,7 @@ impl Ready {
             Self::On(left) => microseconds(left.saturating_add(need), times),
             Self::Shut if !matches!(rival, Self::On(_)) => {
                 let shortest = times.shortest_opening();
+                // Rounded to what can be made: errs by half of it at most.
                 if need <= shortest >> 1 {
                     return 0;
                 }
@@ -85,11 +86,11 @@ fn ready(chamber: &Chamber, next: u32, times: &ValveTimes) -> [Ready; 2] {
 }
 
 /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa, not
-/// negative) in a chamber of `stiffness`.
-fn opening(power: i32, change: i32, stiffness: i32) -> i32 {
+/// negative) in a chamber of `n_per_length`.
+fn opening(power: i32, change: i32, n_per_length: i32) -> i32 {
     // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
-    let rate = mul_shr(power, stiffness, 22).max(PRESSURE_RATE_LEAST);
-    // Below 2^31.
+    let rate = mul_shr(power, n_per_length, 22).max(PRESSURE_RATE_LEAST);
+    // Of at most 5 bar: below 2^31, and more than a period can make.
     let size = change.min(500_000 << 8).wrapping_shl(4);
     size.checked_div(rate).unwrap_or(0)
 }
@@ -105,18 +106,18 @@ fn pulses(
 ) -> [u16; 2] {
     let times = &model.times;
     let [fill, vent] = ready(chamber, next, times);
-    let stiffness = model.stiffness(length);
+    let n_per_length = model.exponent_per_length(length);
     let change = target.saturating_sub(chamber.expected);
     // Of the pressure between now and the end of the dead time.
     let mean = chamber.pressure.saturating_add(chamber.expected) >> 1;
     if change > 0 {
-        let need = opening(model.fill_power(flow, mean), change, stiffness);
+        let need = opening(model.fill_power(flow, mean), change, n_per_length);
         [fill.on_time(need, vent, times), vent.rest(times)]
     } else {
         let need = opening(
             model.vent_power(flow, mean),
             change.saturating_neg(),
-            stiffness,
+            n_per_length,
         );
         [fill.rest(times), vent.on_time(need, fill, times)]
     }

@@ -19,6 +19,12 @@
 //! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
 //!   a new target.
 //!
+//! Assumes: friction of at least 0.85 of what is told, where it is counted on; that shut valves hold the air, so that a
+//! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
+//! rest stays there: nothing of it asks for air. One on its way may lack the force to arrive: it stays in SERVO, its
+//! band widens no further than 2.4 times, and supervision sees the error. REST tells the force nothing: a load that
+//! grows beyond friction moves the piston out of the band of release, and SERVO acts again.
+//!
 //! The hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
 //! pause are ours, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
 //!
@@ -28,10 +34,11 @@ use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
 use crate::tuning::{
-    BAND_WIDEST, CATCH_SPEED, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
-    PATIENCE, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST,
-    REST_PERIODS, START_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX,
-    SWING_PERIODS_MIN, WIDENS_AFTER, WIDENS_SHIFT,
+    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS,
+    NEAR_PERIODS, PATIENCE, PATIENCE_MOST, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS,
+    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, START_PERIODS, STILL_SPEED,
+    STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX, SWING_PERIODS_MIN, WIDENS_AFTER,
+    WIDENS_SHIFT,
 };
 
 /// Periods in which the band widens by one.
@@ -161,7 +168,7 @@ impl Standstill {
             .saturating_abs();
         // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
-            self.near.wrapping_add(1).min(PATIENCE * 4)
+            self.near.wrapping_add(1).min(PATIENCE_MOST)
         } else {
             self.near.saturating_sub(1)
         };
@@ -189,13 +196,13 @@ impl Standstill {
     /// Whether a piston at rest stays so.
     fn stays(&mut self, model: &AxisModel, now: &Approach, steps: bool) -> bool {
         let band = self.band(model);
-        let half = model.band >> 1;
+        let beyond = model.band.wrapping_mul(RELEASE_BEYOND_SIXTEENTHS) >> 4;
         let release = model
             .band
             .wrapping_mul(RELEASE_SIXTEENTHS)
             .wrapping_shr(4)
             .wrapping_add(band)
-            .min(RELEASE_WIDEST.max(band.wrapping_add(half)));
+            .min(RELEASE_WIDEST.max(band.wrapping_add(beyond)));
         // The ground pushes a standing joint to and fro. A target that has moved is another matter.
         let release = if self.aimed {
             release
@@ -262,11 +269,11 @@ impl Standstill {
 
     /// What is fed forward for friction that is less than told makes a relay: where
     /// the piston does not come to rest, it fades.
-    pub(super) fn faded(&self, grip: i32) -> i32 {
-        let left = (WIDENS_STEP + WIDENS_STEP / 4)
+    pub(super) fn faded(&self, friction: i32) -> i32 {
+        let left = (FADES_AFTER + WIDENS_STEP)
             .saturating_sub(self.beyond())
             .max(0);
-        mul_shr(grip, left.min(WIDENS_STEP), WIDENS_SHIFT)
+        mul_shr(friction, left.min(WIDENS_STEP), WIDENS_SHIFT)
     }
 }
 

@@ -15,7 +15,7 @@
 
 use crate::axis::AxisModel;
 use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root};
-use crate::tuning::MASS_MIN;
+use crate::tuning::{MASS_MIN, SLOPE_LEAST};
 
 /// What of the law follows from the moving mass; worked out when that changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -41,7 +41,7 @@ impl SpeedGains {
         } else {
             1 << 16
         };
-        let slope = mul_shr(model.slope, share, 16).max(1 << 8);
+        let slope = mul_shr(model.slope, share, 16).max(SLOPE_LEAST);
         // 2^32 / (2 k²) with k × 2^8, below 2^16: 2^47 / k².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
         Self {
@@ -146,6 +146,21 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// One slope a second at least: half of 1/k² has to fit 2^-32 s².
+    #[test]
+    fn the_slope_of_the_heaviest_mass_fits_its_format() {
+        let data = AxisData {
+            valve_on: Micros(50_000),
+            line_delay: Micros(20_000),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+        let gains = SpeedGains::new(&model, i32::MAX);
+        assert_eq!((gains.slope, gains.linear), (1 << 8, i32::MAX));
+        let (speed, _) = gains.speed(1 << 10, gains.brake, model.top_speed);
+        assert_eq!(speed, 1 << 10, "a millimetre a second for a millimetre");
     }
 
     /// A light piston behind large and fast valves: brake × 2^13 must fit 32 bits, or the

@@ -435,6 +435,27 @@ fn a_seat_has_its_target_zone_speed_and_force() {
     );
 }
 
+/// Half of the friction towards the target, and what the load takes away.
+#[test]
+fn the_force_of_a_preload_is_half_the_friction() {
+    let awaited = |reference_mm: i16, load: i32| {
+        let (model, mut law) = at_a_stop(900, 0, if reference_mm > 90 { -40 } else { 40 });
+        law.standstill.seat(true);
+        law.observer.motion.load = load;
+        let announced = JointInput {
+            announced: Some(Announced {
+                reference: PositionMm::from_int(reference_mm),
+                after: Ticks(200),
+            }),
+            ..input(90, 90)
+        };
+        law.preload(&model, &announced, true)
+    };
+    assert_eq!(awaited(150, 0), Some(Awaited::Force(5_000)));
+    assert_eq!(awaited(30, 0), Some(Awaited::Force(-5_000)));
+    assert_eq!(awaited(150, 12_000), Some(Awaited::Force(-7_000)));
+}
+
 /// Two bands from where it stood, it has begun to move.
 #[test]
 fn a_preload_ends_when_the_piston_has_moved_by_two_bands() {

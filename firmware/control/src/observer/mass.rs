@@ -198,6 +198,18 @@ mod tests {
         assert_eq!((told(&from(21)), told(&from(280))), (1, 0));
     }
 
+    /// One that still slides a second after its begin is taken as far as it went.
+    #[test]
+    fn a_move_without_end_is_judged_after_a_second() {
+        let model = model();
+        let mut estimator = MassEstimator::default();
+        let mut speeds = (21..=400).step_by(8).chain((100..400).rev());
+        let period =
+            speeds.position(|speed: i32| estimator.update(&model, speed << 16, 20_000).is_some());
+        // The first only begins it: 250 periods of 4 ms after that.
+        assert_eq!(period, Some(250));
+    }
+
     /// What lies between 19 and 21 mm/s is the end of a slide.
     #[test]
     fn a_move_begins_and_ends_with_sliding() {

@@ -54,7 +54,7 @@ impl Inertia {
             // Below 2^27: times an innovation it fits.
             load_gain: mul_shr(model.observe_load, mass, 16).min((1 << 27) - 1),
             coulomb_speed: mul_shr_sat(friction, model.period, 16),
-            coulomb_speed_ahead: mul_shr_sat(friction, model.horizon, 16),
+            coulomb_speed_ahead: mul_shr_sat(friction, model.dead_time, 16),
         }
     }
 
@@ -270,6 +270,26 @@ mod tests {
         };
         assert_eq!(after(80), after(8));
         assert_ne!(after(7), after(8));
+    }
+
+    /// 0.02 kg: the inverse of less would not fit 2^30.
+    #[test]
+    fn no_mass_counts_as_less_than_the_least_that_may_be_told() {
+        let told = |mass_kg: f64| {
+            let data = AxisData {
+                mass: wheeleg_units::PositionMm::from_f64(mass_kg),
+                ..AxisData::default()
+            };
+            AxisModel::new(&data, Micros(1000))
+        };
+        assert!(told(0.0199).is_err());
+        let model = told(0.02).expect("the least");
+        let least = Inertia::new(&model, model.mass);
+        assert_eq!(least.mass, model.mass, "what may be told is taken");
+        assert!((1 << 29..1 << 30).contains(&least.per_force));
+        for raw in [i32::MIN, -1, 0, 1, model.mass - 1] {
+            assert_eq!(Inertia::new(&model, raw), least, "{raw}");
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ use super::flow::power;
 use super::valve_delay::ValveTrack;
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat};
-use crate::tuning::{CHAMBER_LENGTH_MIN, PRESSURE_MAX};
+use crate::tuning::{CHAMBER_LENGTH_MIN, PRESSURE_MAX, VACUUM_SHIFT};
 
 /// Pressures of A and B in 1/256 Pa absolute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -123,30 +123,37 @@ impl Chamber {
 
         let [length, length_ahead] = motion.lengths;
         let [speed, speed_ahead] = motion.speeds;
-        let stiffness = model.stiffness(length);
+        let n_per_length = model.exponent_per_length(length);
         let both = [open[0] | committed[0], open[1] | committed[1]];
         let limits = limits(model, both);
         // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
         let mean = self.pressure.saturating_add(self.expected) >> 1;
         let flows = Flows::at(model, motion.flow, mean, both);
-        let step = |p: i32, flows: &Flows, open, speed, span, stiffness| {
+        let step = |p: i32, flows: &Flows, open, speed, span, n_per_length| {
             within_limits(
-                p.saturating_add(flows.change(open, power(p, speed), span, stiffness)),
+                p.saturating_add(flows.change(open, power(p, speed), span, n_per_length)),
                 limits,
             )
         };
-        self.pressure = step(self.pressure, &flows, open, speed, times.period, stiffness);
+        self.pressure = step(
+            self.pressure,
+            &flows,
+            open,
+            speed,
+            times.period,
+            n_per_length,
+        );
         self.expected = step(
             self.pressure,
             &flows,
             committed,
             speed_ahead,
-            model.horizon_us,
-            model.stiffness(length_ahead),
+            model.dead_time_us,
+            model.exponent_per_length(length_ahead),
         );
         self.bounds = self.bounds.map(|p| {
             let flows = Flows::at(model, motion.flow, p, open);
-            step(p, &flows, open, speed, times.period, stiffness)
+            step(p, &flows, open, speed, times.period, n_per_length)
         });
     }
 
@@ -186,18 +193,24 @@ impl Flows {
     }
 
     /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
-    /// and with the piston giving the power `squeeze` for `span` µs, in a chamber of
-    /// `stiffness` ([`AxisModel::stiffness`]).
-    fn change(&self, [fill, vent]: [i32; 2], squeeze: i32, span: i32, stiffness: i32) -> i32 {
+    /// and with the piston giving the power `compression` for `span` µs, in a chamber of
+    /// `n_per_length` ([`AxisModel::exponent_per_length`]).
+    fn change(
+        &self,
+        [fill, vent]: [i32; 2],
+        compression: i32,
+        span: i32,
+        n_per_length: i32,
+    ) -> i32 {
         let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
         // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
         let work = product(self.fill, fill)
             .wrapping_sub(product(self.vent, vent))
-            .wrapping_add(product(squeeze, span))
+            .wrapping_add(product(compression, span))
             .wrapping_add(1 << 15)
             .wrapping_shr(16) as i32;
-        // × n/L: see `AxisModel::stiffness`.
-        mul_shr_sat(work, stiffness, 10)
+        // × n/L: see `AxisModel::exponent_per_length`.
+        mul_shr_sat(work, n_per_length, 10)
     }
 }
 
@@ -209,7 +222,7 @@ const fn limits(model: &AxisModel, [fill, vent]: [i32; 2]) -> [i32; 2] {
         if vent > 0 {
             model.ambient
         } else {
-            model.ambient.wrapping_shr(1)
+            model.ambient.wrapping_shr(VACUUM_SHIFT)
         },
         if fill > 0 { model.supply } else { PRESSURE_MAX },
     ]
@@ -241,7 +254,7 @@ impl AxisModel {
     /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
     #[inline]
     #[must_use]
-    pub(crate) fn stiffness(&self, length: i32) -> i32 {
+    pub(crate) fn exponent_per_length(&self, length: i32) -> i32 {
         let short = length.wrapping_shr(8).max(CHAMBER_LENGTH_MIN);
         self.exponent.checked_div(short).unwrap_or(0)
     }
@@ -337,7 +350,54 @@ mod tests {
         );
     }
 
-    /// The stiffness of a chamber without dead volume is that of 4 mm.
+    /// Bounds, and the pressure, of a chamber that is shut while the piston makes it shorter at this speed for 2 s.
+    fn compressed(speed_mm_s: i32) -> Chamber {
+        let model = model();
+        let mut chamber = Chamber::new(model.mean, [model.ambient, model.supply]);
+        for number in 0..500 {
+            let begin = number * 4000;
+            let period = Period {
+                begin,
+                next: begin + 4000,
+                moment: begin + 2500,
+            };
+            let motion = ChamberMotion {
+                flow: model.flow_a,
+                lengths: [90 << 16; 2],
+                speeds: [speed_mm_s << 16; 2],
+            };
+            chamber.update(&model, &period, &motion, Sent::default());
+        }
+        chamber
+    }
+
+    /// 2.1 MPa: the power of that at the fastest speed of the format is below 2^28, as those of the valves.
+    #[test]
+    fn air_that_is_compressed_ends_at_a_pressure_that_fits() {
+        let chamber = compressed(500);
+        for p in [chamber.pressure, chamber.expected]
+            .into_iter()
+            .chain(chamber.bounds)
+        {
+            let megapascals = f64::from(p) / 256e6;
+            assert!((2.05..2.15).contains(&megapascals), "{megapascals}");
+            assert!(power(p, i32::MAX) < 1 << 28);
+        }
+    }
+
+    #[test]
+    fn air_that_is_stretched_ends_at_half_the_atmosphere() {
+        let chamber = compressed(-500);
+        for p in [chamber.pressure, chamber.expected]
+            .into_iter()
+            .chain(chamber.bounds)
+        {
+            let kilopascals = f64::from(p) / 256e3;
+            assert!((50.5..50.8).contains(&kilopascals), "{kilopascals}");
+        }
+    }
+
+    /// n/L of a chamber without dead volume is that of 4 mm.
     #[test]
     fn a_chamber_is_never_shorter_than_its_line() {
         let model = AxisModel::new(
@@ -349,10 +409,10 @@ mod tests {
             Micros(1000),
         )
         .expect("in range");
-        let stiffness = |tenths: i32| model.stiffness((tenths << 16) / 10);
-        assert_eq!(stiffness(0), stiffness(39));
-        assert!(stiffness(42) < stiffness(39));
+        let per_length = |tenths: i32| model.exponent_per_length((tenths << 16) / 10);
+        assert_eq!(per_length(0), per_length(39));
+        assert!(per_length(42) < per_length(39));
         let exact = 1.2 * 1.048_576 * 2_f64.powi(22) / 4.0;
-        assert!((f64::from(stiffness(0)) / exact - 1.0).abs() < 1e-3);
+        assert!((f64::from(per_length(0)) / exact - 1.0).abs() < 1e-3);
     }
 }

@@ -42,7 +42,7 @@ impl PeriodTrajectory {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
         let half = mul_shr(speed, model.period >> 1, 32);
         let middle = motion.stroke.saturating_add(half);
-        let way = half.saturating_add(mul_shr(motion.speed, model.horizon, 32));
+        let way = half.saturating_add(mul_shr(motion.speed, model.dead_time, 32));
         let free = middle.saturating_add(way);
         let end = free.max(0).min(model.stroke);
         Self {
@@ -78,7 +78,7 @@ mod tests {
         }
         let free = trajectory(90, 400);
         let way = f64::from(free.end) / 65_536.0 - 90.0;
-        let time_us = model.times.period + model.horizon_us;
+        let time_us = model.times.period + model.dead_time_us;
         assert!((way - 400e-6 * f64::from(time_us)).abs() < 1e-2, "{way}");
         assert_eq!(free.ahead, 400 << 16);
     }

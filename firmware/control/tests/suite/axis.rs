@@ -191,12 +191,12 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let (flow_a, flow_b) = (flow / area_a, flow / area_b);
     // From the moment, two and a half ticks after the begin of a period, to the next one's valves.
     let period = 4.0 * f64::from(TICK.get()) * 1e-6;
-    let horizon = (1.5 * f64::from(TICK.get()) + on + line) * 1e-6;
+    let dead_time = (1.5 * f64::from(TICK.get()) + on + line) * 1e-6;
     let ambient = 101_325.0;
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
     let top = flow_b.min(1.5 * flow_a);
-    let slope = f64::min(0.36 / horizon, 65_535.0 / 256.0);
+    let slope = f64::min(0.36 / dead_time, 65_535.0 / 256.0);
     let brake = 0.6 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
@@ -227,9 +227,9 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
             "force_in",
             1e-3 * (high * area_b - low * area_a) + force_rod,
         ),
-        ("horizon", horizon * two(32)),
+        ("dead_time", dead_time * two(32)),
         ("slope", slope * two(8)),
-        ("damping", 0.95 / horizon * two(8)),
+        ("damping", 0.95 / dead_time * two(8)),
         ("brake", brake),
         ("top_speed", top * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
@@ -244,7 +244,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ),
         ("stick_step", 5e3 * number(data.breakaway) * period * two(8)),
         ("period", period * two(32)),
-        ("horizon_reference", (1e3 + on + line) * 1e-6 * two(32)),
+        ("dead_time_reference", (1e3 + on + line) * 1e-6 * two(32)),
         ("stretch", two(19) / 0.7),
         ("choked", 0.3 * two(19) / 0.7),
     ]
@@ -269,7 +269,7 @@ fn coefficient(model: &AxisModel, name: &str) -> i32 {
         "high" => model.high,
         "force_out" => model.force_out,
         "force_in" => model.force_in,
-        "horizon" => model.horizon,
+        "dead_time" => model.dead_time,
         "slope" => model.slope,
         "damping" => model.damping,
         "brake" => model.brake,
@@ -280,7 +280,7 @@ fn coefficient(model: &AxisModel, name: &str) -> i32 {
         "observe_load" => model.observe_load,
         "stick_step" => model.stick_step,
         "period" => model.period,
-        "horizon_reference" => model.horizon_reference,
+        "dead_time_reference" => model.dead_time_reference,
         "stretch" => model.curve.stretch,
         "choked" => model.curve.choked,
         other => panic!("{other}"),

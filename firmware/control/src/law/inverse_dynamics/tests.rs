@@ -43,7 +43,7 @@ fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
     assert_eq!(demanded(&model, 0.0, 20_000, 0, 0), -20_000);
     // At the speed that is wanted, at the place that the reference has in the dead time: friction alone.
     let at = |speed: i32| {
-        let lead = f64::from(speed) * f64::from(model.horizon_reference) / 2_f64.powi(32);
+        let lead = f64::from(speed) * f64::from(model.dead_time_reference) / 2_f64.powi(32);
         demanded(&model, -lead, 0, speed, speed)
     };
     for (speed, expected) in [

@@ -90,7 +90,7 @@ impl Observer {
 
     /// Where the piston is at the end of the dead time at its present speed, raw mm.
     pub(crate) fn end_of_dead_time(&self, model: &AxisModel) -> i32 {
-        let way = mul_shr(self.motion.speed, model.horizon, 32);
+        let way = mul_shr(self.motion.speed, model.dead_time, 32);
         self.motion
             .stroke
             .saturating_add(way)
