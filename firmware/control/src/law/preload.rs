@@ -33,7 +33,7 @@ pub(super) struct Preload {
     /// Where the piston stood when it was announced, raw mm; `None` without one.
     place: Option<i32>,
     /// The force is not there yet, or made by a counter chamber that lags.
-    acts: bool,
+    pub(super) acts: bool,
 }
 
 /// What an announced move asks for.

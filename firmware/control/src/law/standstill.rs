@@ -36,7 +36,7 @@ use crate::observer::motion::Motion;
 use crate::tuning::{
     BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS,
     NEAR_PERIODS, PATIENCE, PATIENCE_MOST, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS,
-    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, START_PERIODS, STILL_SPEED,
+    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, STILL_SPEED,
     STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX, SWING_PERIODS_MIN, WIDENS_AFTER,
     WIDENS_SHIFT,
 };
@@ -216,12 +216,8 @@ impl Standstill {
             return true;
         }
         self.outside = self.outside.wrapping_add(1);
-        let periods = if self.aimed {
-            START_PERIODS
-        } else {
-            RELEASE_PERIODS
-        };
-        steps && self.outside < periods
+        // A new target is no noise.
+        steps && !self.aimed && self.outside < RELEASE_PERIODS
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,

@@ -95,7 +95,12 @@ fn a_moving_reference_is_not_rested_at() {
 /// After a stop in the middle of a move nothing of its force is left.
 #[test]
 fn a_move_after_a_stop_does_not_begin_with_the_force_of_the_one_before() {
-    let model = model();
+    // Moved by hand, as no force moves a piston: nothing is to be learnt from it.
+    let data = AxisData {
+        learns_mass: false,
+        ..AxisData::default()
+    };
+    let model = AxisModel::new(&data, Micros(1000)).expect("in range");
     for ticks in 200..204 {
         let mut law = moving(&model, ticks);
         for _ in 0..1000 {
@@ -433,6 +438,28 @@ fn a_seat_has_its_target_zone_speed_and_force() {
         (seat(1800, 1790, 2, 40), seat(1800, 1790, 4, 40)),
         (seated, press)
     );
+}
+
+/// One that acts goes on while more than an eighth of the 10 N of friction is missing.
+#[test]
+fn a_preload_acts_until_an_eighth_of_the_friction_is_missing() {
+    let awaited = |missing: i32| {
+        let (model, mut law) = at_a_stop(900, 0, 5);
+        law.standstill.seat(true);
+        let announced = JointInput {
+            announced: Some(Announced {
+                reference: PositionMm::from_int(150),
+                after: Ticks(200),
+            }),
+            ..input(90, 90)
+        };
+        let made = model.pressure_force(law.observer.expected());
+        law.preload.acts = true;
+        law.observer.motion.load = 5_000 - missing - made;
+        law.preload(&model, &announced, true)
+    };
+    assert_eq!(awaited(1_200), Some(Awaited::Ready));
+    assert!(matches!(awaited(1_300), Some(Awaited::Force(_))));
 }
 
 /// Half of the friction towards the target, and what the load takes away.

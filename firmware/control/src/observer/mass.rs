@@ -12,16 +12,20 @@
 //! is due to c; what the fastest has above that line is due to m, in J as in v. (Newton's second law,
 //! integrated; the derivation is ours.)
 //!
+//! Where the bounds of the pressures are far apart, as after a power-up with air that nobody knows, the force is wrong by
+//! more than the mass needs: there the mass comes with the pressures from [`super::identification`].
+//!
 //! Assumes: the load does not come or go in the move; axes for which it does switch it off
 //! ([`crate::axis::AxisData::learns_mass`]).
 //!
 //! Config [`AxisModel`], state [`MassEstimator`], update [`MassEstimator::update`].
 
+use super::identification::{Identified, Regression};
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, quotient};
 use crate::tuning::{
-    LEARN_PEAK_ABOVE, LEARN_PEAK_SPEED, LEARN_PERIODS_MAX, LEARN_PERIODS_MIN, LEARN_SLIDES,
-    MASS_LEARNT_LEAST, MASS_LEARNT_MOST,
+    AIR_UNKNOWN, LEARN_PEAK_ABOVE, LEARN_PEAK_SPEED, LEARN_PERIODS_MAX, LEARN_PERIODS_MIN,
+    LEARN_SLIDES, MASS_LEARNT_LEAST, MASS_LEARNT_MOST,
 };
 
 /// A moment of a move.
@@ -42,12 +46,19 @@ pub struct MassEstimator {
     first: i32,
     fastest: Moment,
     last: Moment,
+    regression: Regression,
 }
 
 impl MassEstimator {
-    /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it, mN. Gives
-    /// the mass, kg × 2^16, of a move that has ended with it, if it tells one.
-    pub fn update(&mut self, model: &AxisModel, speed: i32, force: i32) -> Option<i32> {
+    /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it and with the `widths` of the
+    /// bounds of both pressures as forces, mN. Gives what a move that has ended with it tells, if it does.
+    pub(crate) fn update(
+        &mut self,
+        model: &AxisModel,
+        speed: i32,
+        force: i32,
+        widths: [i32; 2],
+    ) -> Option<Identified> {
         let sliding = speed.wrapping_abs() > LEARN_SLIDES;
         if self.first == 0 {
             if sliding {
@@ -62,6 +73,9 @@ impl MassEstimator {
             // Forces below 2^24 mN (100 mm of bore at 2.1 MPa) in 16 mN, of up to 2^8 periods.
             impulse: self.last.impulse.wrapping_add(used.wrapping_shr(4)),
         };
+        let gained = speed.saturating_sub(self.first);
+        self.regression
+            .add(model, gained, self.last.periods, used, widths);
         if speed.wrapping_abs() > self.fastest.speed.wrapping_abs() {
             self.fastest = self.last;
         }
@@ -69,17 +83,32 @@ impl MassEstimator {
         if sliding && !turned && self.last.periods < LEARN_PERIODS_MAX {
             return None;
         }
-        core::mem::take(self).mass(model)
+        let ended = core::mem::take(self);
+        let by_moments = ended.mass(model)?;
+        let is_unknown = ended.regression.width(ended.last.periods) > AIR_UNKNOWN;
+        let identified = is_unknown.then(|| ended.regression.solve(model)).flatten();
+        let found = identified.unwrap_or(Identified {
+            mass: by_moments,
+            shares: [0; 2],
+        });
+        let told = model.mass;
+        let least = mul_shr_sat(told, MASS_LEARNT_LEAST, 16);
+        let most = told.saturating_mul(MASS_LEARNT_MOST);
+        Some(Identified {
+            mass: found.mass.max(least).min(most),
+            ..found
+        })
     }
 
-    /// The mass, if it can be told.
+    /// The mass by three moments, if it can be told.
     #[cold]
-    fn mass(self, model: &AxisModel) -> Option<i32> {
+    fn mass(&self, model: &AxisModel) -> Option<i32> {
         let Self {
             first,
             fastest,
             last,
-        } = self;
+            ..
+        } = *self;
         let share = u32::from(fastest.periods)
             .wrapping_shl(16)
             .checked_div(u32::from(last.periods))
@@ -104,12 +133,7 @@ impl MassEstimator {
         // 16 mN × s × 2^32 over mm/s × 2^16.
         let impulse = i64::from(impulse.max(0)).wrapping_mul(i64::from(model.period));
         let impulse = impulse.wrapping_shr(8).cast_unsigned();
-        let mass = quotient(impulse, speed.cast_unsigned(), 12);
-        let told = model.mass;
-        Some(
-            mass.max(mul_shr_sat(told, MASS_LEARNT_LEAST, 16))
-                .min(told.saturating_mul(MASS_LEARNT_MOST)),
-        )
+        Some(quotient(impulse, speed.cast_unsigned(), 12))
     }
 }
 
@@ -135,9 +159,9 @@ mod tests {
             let force = acceleration * mass_kg / 4.0 + 10.0 + viscous;
             let force = (sign * force - load) * 1e3;
             let raw = (sign * speed * 65_536.0) as i32;
-            if let Some(mass) = estimator.update(model, raw, force as i32) {
+            if let Some(found) = estimator.update(model, raw, force as i32, [0; 2]) {
                 assert!(speed < 20.0, "not before the end");
-                return Some(f64::from(mass) / 65_536.0);
+                return Some(f64::from(found.mass) / 65_536.0);
             }
         }
         None
@@ -158,6 +182,29 @@ mod tests {
         }
     }
 
+    /// With bounds that are a quarter of the largest force apart in the mean the air is identified, too; with less the three
+    /// moments tell the mass, and the pressures are left.
+    #[test]
+    fn a_move_with_unknown_air_tells_its_mass_and_the_air() {
+        let model = model();
+        let found = |share: f64| {
+            let mut estimator = MassEstimator::default();
+            let width = (share * f64::from(model.force_out)) as i32;
+            let mut speed = 0.0_f64;
+            (0..75).find_map(|period| {
+                speed = f64::max(speed + if period < 30 { 12.0 } else { -10.4 }, 0.0);
+                // A reckons 0.5 of a width that closes too little.
+                let left = (f64::from(width) * (1.0 - f64::from(period) / 75.0)) as i32 * 2;
+                let force = if period < 30 { 4_500 } else { -3_900 } + 10_000 - left / 2;
+                let raw = (speed * 65_536.0) as i32;
+                estimator.update(&model, raw, force, [left, 0])
+            })
+        };
+        let unknown = found(0.26).expect("told");
+        assert!(unknown.shares[0] > 1 << 13, "{unknown:?}");
+        assert_eq!(found(0.18).expect("told").shares, [0; 2]);
+    }
+
     #[test]
     fn what_cannot_be_is_bounded() {
         let model = model();
@@ -174,7 +221,7 @@ mod tests {
         let model = model();
         let told = |speeds: &[i32]| {
             let mut estimator = MassEstimator::default();
-            let told = |speed: &i32| estimator.update(&model, *speed << 16, 20_000);
+            let told = |speed: &i32| estimator.update(&model, *speed << 16, 20_000, [0; 2]);
             speeds.iter().filter_map(told).count()
         };
         let triangle = |peak: i32, periods: i32| -> Vec<i32> {
@@ -204,8 +251,11 @@ mod tests {
         let model = model();
         let mut estimator = MassEstimator::default();
         let mut speeds = (21..=400).step_by(8).chain((100..400).rev());
-        let period =
-            speeds.position(|speed: i32| estimator.update(&model, speed << 16, 20_000).is_some());
+        let period = speeds.position(|speed: i32| {
+            estimator
+                .update(&model, speed << 16, 20_000, [0; 2])
+                .is_some()
+        });
         // The first only begins it: 250 periods of 4 ms after that.
         assert_eq!(period, Some(250));
     }
@@ -216,7 +266,7 @@ mod tests {
         let model = model();
         let begun = |speed_mm_s: i32| {
             let mut estimator = MassEstimator::default();
-            estimator.update(&model, speed_mm_s << 16, 0);
+            estimator.update(&model, speed_mm_s << 16, 0, [0; 2]);
             estimator != MassEstimator::default()
         };
         assert_eq!((begun(19), begun(21), begun(-21)), (false, true, true));

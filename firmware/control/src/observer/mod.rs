@@ -7,7 +7,8 @@
 //! | [`pressure`] | pressure of a chamber, and its bounds | openings, motion |
 //! | [`motion`] | stroke, speed, load | pressure force, measured stroke |
 //! | `trajectory` | where the piston goes in the dead time | motion |
-//! | [`mass`] | moving mass | pressure force, speed |
+//! | [`mass`] | moving mass, from three moments of a move | pressure force, speed |
+//! | `identification` | mass and pressures from one move, where those are not known | the same, bounds |
 //!
 //! All of it once in a period of [`PERIOD_TICKS`] ticks, in this order ([`Observer::update`]). The law in
 //! [`crate::law`] only reads it.
@@ -16,6 +17,7 @@
 //! times µs or s × 2^32. Chamber A extends the piston; positive forces and speeds extend.
 
 pub mod flow;
+mod identification;
 pub mod mass;
 pub mod motion;
 pub mod pressure;
@@ -101,12 +103,17 @@ impl Observer {
     /// By how much the pressure force can be wrong, mN.
     #[must_use]
     pub fn uncertainty(&self, model: &AxisModel) -> i32 {
+        let [a, b] = self.widths(model);
+        a.saturating_add(b)
+    }
+
+    /// Widths of the bounds of A and of B as forces, mN.
+    fn widths(&self, model: &AxisModel) -> [i32; 2] {
         let [[low_a, high_a], [low_b, high_b]] = self.bounds();
-        mul_shr(high_a.saturating_sub(low_a), model.force_a, 32).saturating_add(mul_shr(
-            high_b.saturating_sub(low_b),
-            model.force_b,
-            32,
-        ))
+        [
+            mul_shr(high_a.saturating_sub(low_a), model.force_a, 32),
+            mul_shr(high_b.saturating_sub(low_b), model.force_b, 32),
+        ]
     }
 
     /// Bounds of the pressures of A and of B, lowest and highest.
@@ -163,9 +170,20 @@ impl Observer {
         if !model.learns_mass {
             return None;
         }
-        let mass = self.mass.update(model, self.motion.speed, force)?;
-        self.inertia = Inertia::new(model, mass);
-        Some(mass)
+        let widths = self.widths(model);
+        let found = self.mass.update(model, self.motion.speed, force, widths)?;
+        self.inertia = Inertia::new(model, found.mass);
+        let [share_a, share_b] = found.shares;
+        if share_a | share_b != 0 {
+            self.a.correct(share_a);
+            self.b.correct(share_b);
+            // The load had taken what the pressures had wrong.
+            let corrected = model.pressure_force(self.pressures());
+            let wrong = corrected.saturating_sub(self.force);
+            self.motion.load = self.motion.load.saturating_sub(wrong);
+            self.force = corrected;
+        }
+        Some(found.mass)
     }
 }
 

@@ -19,7 +19,7 @@ use super::flow::power;
 use super::valve_delay::ValveTrack;
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat};
-use crate::tuning::{CHAMBER_LENGTH_MIN, PRESSURE_MAX, VACUUM_SHIFT};
+use crate::tuning::{AIR_LEFT_SHIFT, CHAMBER_LENGTH_MIN, PRESSURE_MAX, VACUUM_SHIFT};
 
 /// Pressures of A and B in 1/256 Pa absolute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -155,6 +155,23 @@ impl Chamber {
             let flows = Flows::at(model, motion.flow, p, open);
             step(p, &flows, open, speed, times.period, n_per_length)
         });
+    }
+
+    /// A move has told that the pressure was wrong by this share (× 2^16) of the width of its bounds. From now on these
+    /// are what is left in doubt.
+    pub(crate) fn correct(&mut self, share: i32) {
+        let [low, high] = self.bounds;
+        let width = high.saturating_sub(low);
+        let wrong = mul_shr_sat(width, share, 16);
+        let pressure = self.pressure.saturating_add(wrong).max(low).min(high);
+        let moved = pressure.saturating_sub(self.pressure);
+        self.expected = self.expected.saturating_add(moved).max(low).min(high);
+        self.pressure = pressure;
+        let left = width.wrapping_shr(AIR_LEFT_SHIFT);
+        self.bounds = [
+            low.max(pressure.saturating_sub(left)),
+            high.min(pressure.saturating_add(left)),
+        ];
     }
 
     /// Everything that others have sent is over with the tick that ends at `end`: `plan` is what of
@@ -395,6 +412,26 @@ mod tests {
             let kilopascals = f64::from(p) / 256e3;
             assert!((50.5..50.8).contains(&kilopascals), "{kilopascals}");
         }
+    }
+
+    /// By a quarter of the width, of which an eighth on each side is left in doubt; and never out of the bounds.
+    #[test]
+    fn a_pressure_is_corrected_within_its_bounds() {
+        let model = model();
+        let bounds = [model.ambient, model.supply];
+        let width = model.supply - model.ambient;
+        let mut chamber = Chamber::new(model.mean, bounds);
+        chamber.correct(1 << 14);
+        assert!((chamber.pressure - model.mean - width / 4).abs() < 256);
+        assert_eq!(chamber.expected, chamber.pressure);
+        let [low, high] = chamber.bounds;
+        for half in [chamber.pressure - low, high - chamber.pressure] {
+            assert!((half - width / 8).abs() < 256, "{half}");
+        }
+        let mut chamber = Chamber::new(model.mean, bounds);
+        chamber.correct(-(1 << 16));
+        assert_eq!(chamber.pressure, model.ambient);
+        assert_eq!(chamber.bounds[0], model.ambient);
     }
 
     /// n/L of a chamber without dead volume is that of 4 mm.

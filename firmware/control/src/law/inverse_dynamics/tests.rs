@@ -134,20 +134,25 @@ fn the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides() {
     for (speed, reference_speed) in [(4, 0), (9, 0), (0, 2)] {
         assert_eq!(newton(ramped(speed, reference_speed, 50)), 0.0, "{speed}");
     }
-    let mut ramp = ramped(0, 0, 50);
-    let mut law = Predictive::new(&model);
-    law.observer.motion.speed = 11 << 16;
-    let demand = ForceDemand {
-        reference: 5 << 16,
-        reference_speed: 0,
-        observer: &law.observer,
-        ahead: PredictedState {
-            stroke: 0,
-            speed: 0,
-        },
-        gains: &law.gains,
+    // A period at a speed takes four tenths from it, from 10 mm/s on.
+    let left_at = |speed: i32| {
+        let mut ramp = ramped(0, 0, 50);
+        let mut law = Predictive::new(&model);
+        law.observer.motion.speed = speed << 16;
+        let demand = ForceDemand {
+            reference: 5 << 16,
+            reference_speed: 0,
+            observer: &law.observer,
+            ahead: PredictedState {
+                stroke: 0,
+                speed: 0,
+            },
+            gains: &law.gains,
+        };
+        demand.ramp(&model, &mut ramp);
+        newton(ramp) / grown
     };
-    demand.ramp(&model, &mut ramp);
-    let left = newton(ramp) / grown;
+    let left = left_at(11);
     assert!((0.57..0.61).contains(&left), "{left}");
+    assert_eq!(left_at(9), 1.0);
 }

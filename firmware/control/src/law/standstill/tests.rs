@@ -124,14 +124,15 @@ fn patience_widens_the_band_and_waits_for_a_swing() {
         usize::from(swing)
     );
     // One that is fast, or has fled, is not waited for.
-    for (off, speed) in [(5, 41), (210, 10)] {
+    for (off, speed, state) in [
+        (5, 39, State::Pause),
+        (5, 41, State::Servo),
+        (190, 10, State::Pause),
+        (210, 10, State::Servo),
+    ] {
         let mut other = standstill;
         other.pause = 50;
-        assert_eq!(
-            states(&mut other, off, speed, 1),
-            [State::Servo],
-            "{off} {speed}"
-        );
+        assert_eq!(states(&mut other, off, speed, 1), [state], "{off} {speed}");
     }
 }
 
