@@ -50,6 +50,8 @@ fn small(threads: usize) -> Options {
         seeds: 2,
         seed: 5,
         combinations: 2,
+        root: 0,
+        against: None,
         quick: true,
         threads,
     }
@@ -151,6 +153,64 @@ fn any_number_of_threads_writes_the_same_bytes() {
         assert!(!links.contains(forbidden), "{forbidden}");
     }
     assert!(page.contains("pwm-pid") && page.contains("supply 4 bar"));
+}
+
+/// A version against itself: every combination has its pair, and none turns. Against one that kept what this one misses,
+/// and the other way round, each is counted on its side.
+#[test]
+fn two_versions_are_compared_case_by_case() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let only = Options {
+        moves: Some(vec![Move::Step100]),
+        seeds: 1,
+        combinations: 3,
+        ..small(2)
+    };
+    let out = folder.path().join("before");
+    compare::compare(&only, &Settings::new(&out)).expect("written");
+    let path = out.join("summary.json");
+    let text = fs::read_to_string(&path).expect("written");
+    let summary: Value = serde_json::from_str(&text).expect("JSON");
+    assert_valid(&summary, "compare");
+    let judged = &summary["judged"][1];
+    assert_eq!(
+        (&judged["combinations"], &judged["controller"]),
+        (&3.into(), &"predictive".into())
+    );
+    // 1 - 0.05^(1/3) of none missed; three values bound no p99.
+    assert_eq!(judged["missed"], 0);
+    let bound = judged["missed_at_most"].as_f64().expect("a bound");
+    assert!((bound - 0.6316).abs() < 1e-3, "{bound}");
+    assert!(judged["overshoot_mm"][0]["value"].is_number());
+    assert!(judged["overshoot_mm"][0]["at_most"].is_null());
+
+    let again = Options {
+        against: Some(path.clone()),
+        ..only.clone()
+    };
+    let split = |text: &str| {
+        fs::write(&path, text).expect("written");
+        let comparison = Comparison::run(&again, &Progress::silent()).expect("runs");
+        let paired = comparison.judged()[1].paired.expect("paired");
+        (paired.pairs, paired.worse, paired.better, paired.p)
+    };
+    assert_eq!(split(&text), (3, 0, 0, 1.0));
+    // As if the other version had been stopped in all of them.
+    let stopped = text.replace("\"stopped\": false", "\"stopped\": true");
+    assert_eq!(split(&stopped), (3, 0, 3, 0.25));
+}
+
+/// The combinations that judge a law follow from its sources.
+#[test]
+fn the_judging_root_is_that_of_the_laws_sources() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let (digest, _) =
+        wheeleg_identity::sources::digest_of(&root, &["firmware/control"]).expect("the sources");
+    let [a, b, c, d, ..] = digest;
+    assert_eq!(
+        compare::judging_root(),
+        u64::from(u32::from_le_bytes([a, b, c, d]))
+    );
 }
 
 #[test]
@@ -275,6 +335,19 @@ fn wrong_input_is_refused_by_name() {
         refused(&[&argument], &[wrong, "from 0 to 10000"]);
     }
     refused(&["--axis", "bench"], &["bench", "bench-vq110u"]);
+    refused(&["--against", "nowhere.json"], &["--root"]);
+    let against = ["--root", "1", "--against"];
+    refused(
+        &[&against[..], &["nowhere.json"]].concat(),
+        &["nowhere.json", "--root N"],
+    );
+    let wrong = folder.path().join("wrong.json");
+    fs::write(&wrong, "{\"schema\": \"wheeleg.run/1\", \"cases\": []}").expect("written");
+    let wrong = wrong.to_string_lossy().into_owned();
+    refused(
+        &[&against[..], &[&wrong]].concat(),
+        &["wrong.json", "wheeleg.run/1"],
+    );
     refused(&["--axis", "nowhere/a.toml"], &["nowhere/a.toml"]);
     refused(
         &["--case", "predictive"],

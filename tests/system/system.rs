@@ -11,6 +11,7 @@ mod bus_budget;
 mod check_vectors;
 mod cli;
 mod closed_loop;
+mod combinations;
 mod compare;
 mod control_bars;
 mod cylinders;

@@ -193,10 +193,11 @@ const SIM: [&str; 10] = [
     "wheeleg-units",
 ];
 
-const STUDIES: [&str; 15] = [
+const STUDIES: [&str; 16] = [
     "wheeleg-config",
     "wheeleg-console",
     "wheeleg-control",
+    "wheeleg-identity",
     "wheeleg-interface",
     "wheeleg-kinematics",
     "wheeleg-master",

@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 18] = [
+const CHECKS: [Check; 19] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -48,9 +48,15 @@ const CHECKS: [Check; 18] = [
     ),
     Check(
         "cylinders",
-        "the predictive law on 240 cylinders drawn at random",
+        "the predictive law on 2 600 cylinders drawn at random, one combination each",
         2,
         cylinders,
+    ),
+    Check(
+        "combinations",
+        "the predictive law on the four axes, 5 000 and 2 000 combinations, vented and with unknown air",
+        12,
+        combinations,
     ),
     Check(
         "field",
@@ -259,8 +265,17 @@ fn cylinders() -> StepResult<String> {
     let test = "cylinders::few_combinations_miss_on_cylinders_drawn_at_random";
     measured(
         ["system", test],
-        ("WHEELEG_CYLINDERS", 240),
+        ("WHEELEG_CYLINDERS", 2_600),
         " cylinders from number ",
+    )
+}
+
+fn combinations() -> StepResult<String> {
+    let test = "combinations::few_combinations_miss_on_the_four_axes";
+    measured(
+        ["system", test],
+        ("WHEELEG_COMBINATIONS", 5_000),
+        "combinations from number ",
     )
 }
 

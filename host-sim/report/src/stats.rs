@@ -8,7 +8,9 @@ mod binomial;
 mod rank;
 mod resample;
 
-pub use binomial::{ALPHA, at_most, clopper_pearson, mcnemar, quantile_ranks, wilson};
+pub use binomial::{
+    ALPHA, at_most, clopper_pearson, mcnemar, quantile_bound_rank, quantile_ranks, wilson,
+};
 pub use rank::spearman;
 pub use resample::bootstrap;
 
@@ -26,6 +28,17 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let low = sorted.get(at.floor() as usize)?;
     let high = sorted.get(at.ceil() as usize)?;
     Some(low + (high - low) * at.fract())
+}
+
+/// A quantile with its upper bound, one-sided 95 %, whatever the distribution is: the order statistic that the quantile
+/// does not exceed. `None` where there are too few values for either.
+#[must_use]
+pub fn bounded_quantile(values: &[f64], share: f64) -> [Option<f64>; 2] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = quantile_bound_rank(sorted.len() as u64, share);
+    let bound = rank.and_then(|rank| sorted.get(rank as usize - 1).copied());
+    [quantile(values, share), bound]
 }
 
 /// Median; `None` of no values.
@@ -95,6 +108,24 @@ mod tests {
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(quantile(&[7.0], 0.9), Some(7.0));
         assert_eq!((mean(&values), largest(&values)), (Some(2.5), Some(4.0)));
+    }
+
+    /// 0.99^299 < 5 % < 0.99^298, and 0.999^2995 < 5 %: from so many values on the largest bounds the quantile.
+    #[test]
+    fn a_quantile_is_bounded_by_an_order_statistic() {
+        let bound = |n: u32, share: f64| {
+            let values: Vec<f64> = (1..=n).rev().map(f64::from).collect();
+            bounded_quantile(&values, share)[1]
+        };
+        assert_eq!((bound(298, 0.99), bound(299, 0.99)), (None, Some(299.0)));
+        assert_eq!(
+            (bound(2994, 0.999), bound(2995, 0.999)),
+            (None, Some(2995.0))
+        );
+        // Of 5000 values 39 or fewer beyond p99 have 5 %: the 39th from above.
+        assert_eq!(bound(5000, 0.99), Some(4962.0));
+        // The bound of a median of a hundred: SciPy's binom.ppf(0.95, 100, 0.5) + 1.
+        assert_eq!(bound(100, 0.5), Some(59.0));
     }
 
     #[test]

@@ -108,6 +108,14 @@ pub fn quantile_ranks(n: u64, share: f64) -> [Option<u64>; 2] {
     [low, high.map(|rank| n + 1 - rank)]
 }
 
+/// Rank, from 1, of the value that is an upper bound of a quantile of `n` sorted values: one-sided 95 %; `None` where so
+/// few values do not bound it. Whatever the distribution is.
+#[must_use]
+pub fn quantile_bound_rank(n: u64, share: f64) -> Option<u64> {
+    let rank = largest(n, |rank| at_most(rank - 1, n, 1.0 - share) <= ALPHA)?;
+    Some(n + 1 - rank)
+}
+
 /// Largest rank from 1 to `n` for which a condition holds that holds below it, too.
 fn largest(n: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
     let (mut low, mut high) = (0, n);

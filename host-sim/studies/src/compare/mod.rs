@@ -8,12 +8,13 @@
 
 mod case;
 mod charts;
+mod judged;
 mod moves;
 mod page;
 mod single;
 mod variation;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -21,6 +22,7 @@ use wheeleg_plant::axis::AxisParams;
 
 pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
 pub(crate) use charts::panel;
+pub use judged::{Before, ERROR_MM, Judged, OVERSHOOT_MM, Paired, Quantile, judging_root};
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
 pub use single::{Single, play};
 pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
@@ -48,6 +50,10 @@ pub struct Options {
     pub seed: u64,
     /// Random combinations per axis.
     pub combinations: u64,
+    /// Number of the first of them: [`judging_root`], or one that another version was played with.
+    pub root: u64,
+    /// `summary.json` of another version, whose combinations these are compared with.
+    pub against: Option<PathBuf>,
     /// Fewer factors, a coarser bound.
     pub quick: bool,
     /// Threads; 0: as many as the machine has.
@@ -91,6 +97,8 @@ pub struct Comparison {
     pub rows: Vec<Row>,
     /// Of the first seed, as on the sheet.
     pub overlays: Vec<Overlay>,
+    /// What another version did in the random combinations.
+    pub before: Option<Before>,
     /// What stopped it before all cases were played.
     pub stopped: Option<Stopped>,
 }
@@ -100,6 +108,8 @@ pub struct Comparison {
 pub struct Cases<'a> {
     /// One object per case that was played or is not feasible.
     pub(crate) cases: &'a [Row],
+    /// What the random combinations say, one object per axis and controller.
+    pub(crate) judged: &'a [Judged],
 }
 
 impl study::Summary for Cases<'_> {
@@ -131,8 +141,9 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
 /// [`StudyError`] if an axis cannot be read or used, or something not be drawn or written.
 pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
     let configs = configs(options)?;
+    let before = options.against.as_deref().map(judged::read).transpose()?;
     let job = Job::begin("compare", settings)?;
-    let comparison = Comparison::play(options, configs, &job.progress)?;
+    let comparison = Comparison::play(options, configs, before, &job.progress)?;
     Ok(comparison.write(job))
 }
 
@@ -158,12 +169,14 @@ impl Comparison {
     /// # Errors
     /// [`StudyError`] if an axis cannot be read or used.
     pub fn run(options: &Options, progress: &Progress) -> Result<Self, StudyError> {
-        Self::play(options, configs(options)?, progress)
+        let before = options.against.as_deref().map(judged::read).transpose()?;
+        Self::play(options, configs(options)?, before, progress)
     }
 
     fn play(
         options: &Options,
         configs: Vec<AxisConfig>,
+        before: Option<Before>,
         progress: &Progress,
     ) -> Result<Self, StudyError> {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -173,12 +186,13 @@ impl Comparison {
             .map_err(|e| {
                 StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
             })?;
-        pool.install(|| Self::play_here(options, configs, progress))
+        pool.install(|| Self::play_here(options, configs, before, progress))
     }
 
     fn play_here(
         options: &Options,
         configs: Vec<AxisConfig>,
+        before: Option<Before>,
         progress: &Progress,
     ) -> Result<Self, StudyError> {
         let planned: Vec<(usize, Variation, u64)> = plan(options, &configs);
@@ -212,6 +226,7 @@ impl Comparison {
         Ok(Self {
             options: options.clone(),
             axes,
+            before,
             stopped: progress.stopped(rows.len() as u64, of as u64, "cases"),
             rows,
             overlays: overlays.into_iter().flatten().collect(),
@@ -221,7 +236,12 @@ impl Comparison {
     /// Writes report, figures, tables and `summary.json`.
     fn write(self, job: Job) -> Finished<Self> {
         let stopped = self.stopped.clone();
-        let summary = json(&Cases { cases: &self.rows }, stopped.as_ref());
+        let judged = self.judged();
+        let cases = Cases {
+            cases: &self.rows,
+            judged: &judged,
+        };
+        let summary = json(&cases, stopped.as_ref());
         job.finish(self, summary, stopped, |job, comparison| {
             let folder = job.subfolder("csv");
             job.keep(folder.and_then(|folder| table(&folder.join("cases.csv"), &comparison.rows)));
@@ -301,6 +321,7 @@ fn plan(options: &Options, axes: &[AxisConfig]) -> Vec<(usize, Variation, u64)> 
             list.push((i, variation, options.seed));
         }
         for number in 0..options.combinations {
+            let number = options.root.wrapping_add(number);
             list.push((i, Variation::Drawn(number), options.seed));
         }
     }

@@ -3,19 +3,17 @@
 use serde::Serialize;
 
 use super::case::MARGIN;
+use super::judged::{ERROR_MM, Judged, Quantile, judging_root};
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
-use wheeleg_report::number::{DASH, or_dash, signed};
+use wheeleg_report::number::{DASH, fixed, or_dash, signed};
 use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// Bars that cells are coloured by: error at rest and overshoot of one factor at a
-/// time, overshoot of combinations \[mm\].
-const ERROR_MM: f64 = 0.5;
+/// Bar that cells are coloured by: overshoot of one factor at a time \[mm\].
 const OVERSHOOT_MM: f64 = 3.0;
-const COMBINED_OVERSHOOT_MM: f64 = 6.0;
 
 /// The largest of the values; `None` if one is missing or there is none.
 fn largest<'a>(
@@ -141,6 +139,8 @@ struct Page<'a> {
     seed: u64,
     last_seed: u64,
     combinations: u64,
+    root: u64,
+    judges: bool,
 }
 
 #[derive(Serialize)]
@@ -182,19 +182,60 @@ struct Cell {
     class: &'static str,
 }
 
-/// A controller in the table of combinations; the worst of each \[mm\].
+/// A controller in the table of combinations; each quantile with its bound.
 #[derive(Serialize)]
 struct Combined {
     name: &'static str,
-    kept: usize,
-    count: usize,
+    kept: u64,
+    count: u64,
     /// Upper bound of the probability to miss, one-sided 95 %, per cent.
     missed_at_most: f64,
-    error_mm: Option<f64>,
-    overshoot_mm: Option<f64>,
-    first_mm: Option<f64>,
+    error_mm: [String; 2],
+    overshoot_mm: [String; 2],
+    settle_s: [String; 2],
+    first_mm: String,
     cycles: usize,
     stopped: usize,
+    paired: Option<String>,
+}
+
+impl Combined {
+    fn of(comparison: &Comparison, judged: &Judged) -> Self {
+        let rows = || comparison.combined(&judged.axis, judged.controller);
+        let [_, first] = judged.first_overshoot_mm;
+        Self {
+            name: judged.controller.name(),
+            kept: judged.combinations - judged.missed,
+            count: judged.combinations,
+            missed_at_most: 100.0 * judged.missed_at_most,
+            error_mm: judged.steady_error_mm.map(|q| bounded(q, 2)),
+            overshoot_mm: judged.overshoot_mm.map(|q| bounded(q, 1)),
+            settle_s: judged.settle_s.map(|q| bounded(q, 2)),
+            first_mm: bounded(first, 1),
+            cycles: rows()
+                .filter(|r| r.figures.limit_cycle == Some(true))
+                .count(),
+            stopped: rows().filter(|r| r.figures.stopped == Some(true)).count(),
+            paired: judged.paired.map(|paired| {
+                format!(
+                    "{} worse, {} better of {}; p {}",
+                    paired.worse,
+                    paired.better,
+                    paired.pairs,
+                    fixed(paired.p, 3)
+                )
+            }),
+        }
+    }
+}
+
+/// A quantile and its bound.
+fn bounded(quantile: Quantile, digits: usize) -> String {
+    format!(
+        "{} ≤ {}",
+        or_dash(quantile.value, digits),
+        or_dash(quantile.at_most, digits)
+    )
 }
 
 /// A cell of the factor table: error and overshoot of a step, coloured by the bars.
@@ -243,6 +284,7 @@ pub(super) fn render(
             |[back, out]| format!("{back:.3} s retracting, {out:.3} s extending"),
         )
     };
+    let judged = comparison.judged();
     let axes = comparison.axes.iter().map(|axis| {
         let name = axis.config.name.as_str();
         let table = comparison.table(name).into_iter();
@@ -253,7 +295,11 @@ pub(super) fn render(
             bound_small: bound(axis.bound_s[1]),
             table: table.map(|(kind, cells)| (kind.name(), cells)).collect(),
             factors: factors(comparison, name),
-            combined: combined(comparison, name),
+            combined: judged
+                .iter()
+                .filter(|j| j.axis == name)
+                .map(|j| Combined::of(comparison, j))
+                .collect(),
             hash: hash(axis),
         }
     });
@@ -284,6 +330,8 @@ pub(super) fn render(
         seed: options.seed,
         last_seed: options.seed + options.seeds - 1,
         combinations: options.combinations,
+        root: options.root,
+        judges: options.root == judging_root(),
     };
     Ok(page(TEMPLATE, values)?)
 }
@@ -354,41 +402,4 @@ fn with_unit(variation: Variation) -> String {
             variation.to_string()
         }
     }
-}
-
-/// One line per controller: how many combinations keep the bars, and the worst.
-fn combined(comparison: &Comparison, axis: &str) -> Vec<Combined> {
-    comparison
-        .options
-        .kinds
-        .iter()
-        .filter_map(|kind| {
-            let rows = || comparison.combined(axis, *kind);
-            let count = rows().count();
-            let cycles = rows()
-                .filter(|r| r.figures.limit_cycle == Some(true))
-                .count();
-            let kept = rows().filter(|r| keeps(r)).count();
-            (count > 0).then(|| Combined {
-                name: kind.name(),
-                kept,
-                count,
-                missed_at_most: 100.0
-                    * stats::failure_bound(count.saturating_sub(kept) as u32, count as u32),
-                error_mm: largest(rows(), |r| r.figures.steady_error_mm.map(f64::abs)),
-                overshoot_mm: largest(rows(), |r| r.figures.overshoot_mm),
-                first_mm: largest(rows(), |r| r.figures.first_overshoot_mm),
-                cycles,
-                stopped: rows().filter(|r| r.figures.stopped == Some(true)).count(),
-            })
-        })
-        .collect()
-}
-
-fn keeps(row: &Row) -> bool {
-    let f = &row.figures;
-    f.steady_error_mm.is_some_and(|e| e.abs() <= ERROR_MM)
-        && f.overshoot_mm.is_some_and(|o| o <= COMBINED_OVERSHOOT_MM)
-        && f.limit_cycle == Some(false)
-        && f.stopped == Some(false)
 }

@@ -58,7 +58,8 @@ impl Single {
     pub fn write(&self, settings: &Settings) -> Result<Finished<Vec<PathBuf>>, StudyError> {
         let job = Job::begin("case", settings)?;
         let cases = std::slice::from_ref(&self.row);
-        let summary = json(&Cases { cases }, None);
+        let judged = &[];
+        let summary = json(&Cases { cases, judged }, None);
         job.keep(job.save("summary.json", &summary));
         let Some(played) = &self.played else {
             return Ok(job.end(Vec::new(), summary, None));

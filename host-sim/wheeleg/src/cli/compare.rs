@@ -39,6 +39,14 @@ pub(super) struct CompareArgs {
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
     #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]
     combinations: Option<u64>,
+    /// Number of the first random combination. A fixed one serves to compare two versions
+    /// [default: from a hash of the sources of firmware/control, so that no law is tuned to it].
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
+    root: Option<u64>,
+    /// `summary.json` of another version, played with the same --root: in how many random
+    /// combinations this one is better or worse.
+    #[arg(long, value_name = "FILE", requires = "root")]
+    against: Option<PathBuf>,
     /// One seed, fewer factors and combinations, a coarser bound.
     #[arg(long)]
     quick: bool,
@@ -51,7 +59,7 @@ pub(super) struct CompareArgs {
     out: PathBuf,
     /// Play one case alone, by its id in the tables:
     /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
-    #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "quick"])]
+    #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "root", "against", "quick"])]
     case: Option<CaseId>,
     #[command(flatten)]
     drawing: Drawing,
@@ -144,6 +152,8 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         combinations: args
             .combinations
             .unwrap_or(if args.quick { 20 } else { 200 }),
+        root: args.root.unwrap_or_else(compare::judging_root),
+        against: args.against.clone(),
         quick: args.quick,
         threads: args.threads.map_or(0, usize::from),
     };
@@ -161,6 +171,7 @@ fn text(comparison: &Comparison, report: &Path) -> String {
             let _ = writeln!(out, "  {advice}");
         }
     }
+    out += &combinations(comparison);
     let alarms = comparison.false_alarms();
     let mut told = String::new();
     for row in alarms.clone().take(ALARMS_TOLD) {
@@ -177,6 +188,31 @@ fn text(comparison: &Comparison, report: &Path) -> String {
         comparison.rows.len(),
         place(report, 12)
     );
+    out
+}
+
+/// What the random combinations say, a line each.
+fn combinations(comparison: &Comparison) -> String {
+    let mut out = String::new();
+    for judged in comparison.judged() {
+        let _ = write!(
+            out,
+            "missed      {} of {} combinations on {} by {}, at most {:.2} %",
+            judged.missed,
+            judged.combinations,
+            judged.axis,
+            judged.controller.name(),
+            100.0 * judged.missed_at_most
+        );
+        if let Some(paired) = judged.paired {
+            let _ = write!(
+                out,
+                "; against the other version {} worse, {} better of {}, p {:.3}",
+                paired.worse, paired.better, paired.pairs, paired.p
+            );
+        }
+        out.push('\n');
+    }
     out
 }
 

@@ -1,0 +1,218 @@
+//! What random combinations say of a law: how likely it misses, quantiles of its figures, each with its bound, and
+//! one version against another, pair by pair.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use wheeleg_report::stats;
+
+use super::{Comparison, Row, Variation};
+use crate::StudyError;
+use crate::axis_sim::Kind;
+
+/// Largest error at rest \[mm\] of a combination that is no miss.
+pub const ERROR_MM: f64 = 0.5;
+/// Largest overshoot of it \[mm\].
+pub const OVERSHOOT_MM: f64 = 6.0;
+
+/// Digest of the sources of `firmware/control`.
+const CONTROL: [u8; 24] = *include_bytes!(concat!(env!("OUT_DIR"), "/control"));
+
+/// Root of the combinations that judge the laws. It follows from the sources of `firmware/control`, so a change of a law
+/// is judged by combinations that it was not made with.
+#[must_use]
+pub const fn judging_root() -> u64 {
+    let [a, b, c, d, ..] = CONTROL;
+    u32::from_le_bytes([a, b, c, d]) as u64
+}
+
+/// A quantile, and its upper bound with 95 %, whatever the distribution is (order statistic).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Quantile {
+    /// Share below it.
+    pub share: f64,
+    /// The quantile; absent where that is a move that never ends as it should.
+    pub value: Option<f64>,
+    /// Its bound; absent where so few combinations give none.
+    pub at_most: Option<f64>,
+}
+
+/// Combinations in which a version kept the bars and the other one did not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Paired {
+    /// Played by both.
+    pub pairs: u64,
+    /// Kept by the other version, missed by this one.
+    pub worse: u64,
+    /// The other way round.
+    pub better: u64,
+    /// Probability of as unequal a split if neither version is better: exact test of McNemar.
+    pub p: f64,
+}
+
+/// What the random combinations of a controller on an axis say.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Judged {
+    /// Axis.
+    pub axis: String,
+    /// Controller.
+    pub controller: Kind,
+    /// Combinations that were played.
+    pub combinations: u64,
+    /// Of these: error beyond 0.5 mm, overshoot beyond 6 mm, a limit cycle, or stopped.
+    pub missed: u64,
+    /// Upper bound of the probability to miss, one-sided 95 % (Clopper and Pearson).
+    pub missed_at_most: f64,
+    /// Error at rest \[mm\].
+    pub steady_error_mm: [Quantile; 2],
+    /// Overshoot \[mm\].
+    pub overshoot_mm: [Quantile; 2],
+    /// Until within ±1 mm for good \[s\].
+    pub settle_s: [Quantile; 2],
+    /// Overshoot of the first move after power-up \[mm\].
+    pub first_overshoot_mm: [Quantile; 2],
+    /// Against another version; absent without one.
+    pub paired: Option<Paired>,
+}
+
+/// Which combinations another version kept, by their names.
+pub type Before = BTreeMap<String, bool>;
+
+/// The part of a row that says whether its bars are kept, as it is read again.
+#[derive(Deserialize)]
+struct Told {
+    id: String,
+    variation: String,
+    steady_error_mm: Option<f64>,
+    overshoot_mm: Option<f64>,
+    limit_cycle: Option<bool>,
+    stopped: Option<bool>,
+}
+
+#[derive(Deserialize)]
+struct ToldCases {
+    schema: String,
+    cases: Vec<Told>,
+}
+
+/// Whether a combination keeps its bars.
+fn keeps(
+    error_mm: Option<f64>,
+    overshoot_mm: Option<f64>,
+    cycle: Option<bool>,
+    stopped: Option<bool>,
+) -> bool {
+    error_mm.is_some_and(|mm| mm.abs() <= ERROR_MM)
+        && overshoot_mm.is_some_and(|mm| mm <= OVERSHOOT_MM)
+        && cycle == Some(false)
+        && stopped == Some(false)
+}
+
+impl Row {
+    /// Whether it keeps the bars of a combination: error, overshoot, no limit cycle, not stopped.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        let f = &self.figures;
+        keeps(f.steady_error_mm, f.overshoot_mm, f.limit_cycle, f.stopped)
+    }
+}
+
+/// Reads which combinations another version kept, from its `summary.json`.
+///
+/// # Errors
+/// [`StudyError`] if the file cannot be read, is no summary of a comparison or has no combination.
+pub(super) fn read(path: &Path) -> Result<Before, StudyError> {
+    let help = "give the summary.json that `wheeleg compare --root N` of the other version wrote";
+    let named = |what: String| StudyError::refused(format!("`{}` {what}", path.display()), help);
+    let text = fs::read_to_string(path).map_err(|e| named(format!("cannot be read: {e}")))?;
+    let told: ToldCases = serde_json::from_str(&text)
+        .map_err(|e| named(format!("is no summary of a comparison: {e}")))?;
+    if !told.schema.starts_with("wheeleg.compare/") {
+        return Err(named(format!("is a `{}`, no comparison", told.schema)));
+    }
+    let drawn = |row: &Told| matches!(row.variation.parse(), Ok(Variation::Drawn(_)));
+    let before: Before = told
+        .cases
+        .into_iter()
+        .filter(drawn)
+        .map(|row| {
+            let kept = keeps(
+                row.steady_error_mm,
+                row.overshoot_mm,
+                row.limit_cycle,
+                row.stopped,
+            );
+            (row.id, kept)
+        })
+        .collect();
+    if before.is_empty() {
+        return Err(named("has no random combinations".to_owned()));
+    }
+    Ok(before)
+}
+
+/// A quantile of values of which some are missing: larger than any.
+fn quantile(values: &[Option<f64>], share: f64) -> Quantile {
+    let all: Vec<f64> = values.iter().map(|v| v.unwrap_or(f64::INFINITY)).collect();
+    let [value, at_most] = stats::bounded_quantile(&all, share);
+    let finite = |v: Option<f64>| v.filter(|v| v.is_finite());
+    Quantile {
+        share,
+        value: finite(value),
+        at_most: finite(at_most),
+    }
+}
+
+impl Comparison {
+    /// What the random combinations say, by axis and controller; nothing where none was played.
+    #[must_use]
+    pub fn judged(&self) -> Vec<Judged> {
+        let axes = self.axes.iter().map(|axis| axis.config.name.as_str());
+        axes.flat_map(|axis| {
+            let kinds = self.options.kinds.iter();
+            kinds.filter_map(move |kind| self.judge(axis, *kind))
+        })
+        .collect()
+    }
+
+    fn judge(&self, axis: &str, kind: Kind) -> Option<Judged> {
+        let rows: Vec<&Row> = self.combined(axis, kind).collect();
+        let count = rows.len() as u64;
+        let missed = rows.iter().filter(|r| !r.keeps()).count() as u64;
+        let of = |value: fn(&Row) -> Option<f64>, shares: [f64; 2]| {
+            let values: Vec<Option<f64>> = rows.iter().map(|r| value(r)).collect();
+            shares.map(|share| quantile(&values, share))
+        };
+        (count > 0).then(|| Judged {
+            axis: axis.to_owned(),
+            controller: kind,
+            combinations: count,
+            missed,
+            missed_at_most: stats::failure_bound(missed as u32, count as u32),
+            steady_error_mm: of(|r| r.figures.steady_error_mm.map(f64::abs), [0.99, 0.999]),
+            overshoot_mm: of(|r| r.figures.overshoot_mm, [0.99, 0.999]),
+            settle_s: of(|r| r.figures.settle_s, [0.5, 0.99]),
+            first_overshoot_mm: of(|r| r.figures.first_overshoot_mm, [0.5, 0.99]),
+            paired: self.before.as_ref().map(|before| paired(&rows, before)),
+        })
+    }
+}
+
+/// Rows against those of the same name in another version.
+fn paired(rows: &[&Row], before: &Before) -> Paired {
+    let both: Vec<(bool, bool)> = rows
+        .iter()
+        .filter_map(|row| Some((*before.get(&row.case.id)?, row.keeps())))
+        .collect();
+    let count = |split: (bool, bool)| both.iter().filter(|pair| **pair == split).count() as u64;
+    let (worse, better) = (count((true, false)), count((false, true)));
+    Paired {
+        pairs: both.len() as u64,
+        worse,
+        better,
+        p: stats::mcnemar(worse, better),
+    }
+}
