@@ -18,11 +18,11 @@ const ROOT_VARIABLE: &str = "WHEELEG_COMBINATIONS_ROOT";
 /// Axis, whether its chambers start with unknown air, bar of the probability to miss, and the upper bound that was
 /// measured: what is clearly above it is a step back.
 const CASES: [(&str, bool, f64, f64); 8] = [
-    ("bench-vq110u", true, 0.005, 0.03),
-    ("bench-vq110u", false, 0.003, 0.003),
-    ("small-12x50", true, 0.01, 0.07),
+    ("bench-vq110u", true, 0.005, 0.023),
+    ("bench-vq110u", false, 0.003, 0.0075),
+    ("small-12x50", true, 0.01, 0.036),
     ("small-12x50", false, 0.01, 0.02),
-    ("long-16x400", true, 0.01, 0.07),
+    ("long-16x400", true, 0.01, 0.03),
     ("long-16x400", false, 0.01, 0.02),
     ("heavy-40x250", true, 0.025, 0.1),
     ("heavy-40x250", false, 0.025, 0.05),
@@ -54,6 +54,7 @@ fn played(axis: &str, drawn: bool, root: u64, count: u64) -> Vec<Row> {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn few_combinations_miss_on_the_four_axes() {
     let bench = number(COMBINATIONS_VARIABLE, 250);
     let root = number(ROOT_VARIABLE, judging_root());
