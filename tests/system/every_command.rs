@@ -66,6 +66,19 @@ fn lab() -> String {
     text
 }
 
+/// What begins as a shared library does, and does not shrink when it is packed.
+fn library() -> Vec<u8> {
+    let mut bytes = b"\x7fELF".to_vec();
+    let mut state = 1_u64;
+    bytes.extend((0..400_000).map(|_| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 56) as u8
+    }));
+    bytes
+}
+
 impl Inputs {
     /// Makes them: a run and its log, a measurement, a campaign with its table, a recording.
     pub(crate) fn new() -> Self {
@@ -76,6 +89,7 @@ impl Inputs {
                     uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
         fs::write(inputs.path("two.toml"), plan).expect("written");
         fs::write(inputs.path("lab.csv"), lab()).expect("written");
+        fs::write(inputs.path("library"), library()).expect("written");
         inputs.run(&["run", "stand", "--out", "run"]);
         inputs.run(&["campaign", "run", "two.toml", "--out", "two"]);
         inputs.run(&["campaign", "merge", "two", "--out", "two.parquet"]);
@@ -123,9 +137,10 @@ impl Inputs {
     pub(crate) fn commands(&self, quick: bool) -> Vec<Tried> {
         use Leaves::{File, Folder, Nothing, Parts, Study};
         let input = |name: &str| self.path(name).to_string_lossy().into_owned();
-        let [log, lab, two, plan, table, live] = [
+        let [log, lab, library, two, plan, table, live] = [
             "run/log.mcap",
             "lab.csv",
+            "library",
             "two",
             "two.toml",
             "two.parquet",
@@ -179,6 +194,12 @@ impl Inputs {
             (vec!["export", "parquet", &log], OUT, Folder, 2),
             (vec!["export", "ros2", &log], OUT, Folder, 2),
             (vec!["export", "urdf"], OUT, File, 2),
+            (
+                vec!["export", "fmu", "bench-vq110u", "--library", &library],
+                OUT,
+                File,
+                2,
+            ),
             (vec!["export", "layout"], OUT, File, 2),
             (vec!["plant", "export"], OUT, File, 2),
             (vec!["plant", "check"], None, Nothing, 2),
@@ -211,4 +232,103 @@ impl Inputs {
         }
         command
     }
+}
+
+/// Commands that neither write nor compute for long, and why they are not on the list.
+const BRIEF: [(&str, &str); 23] = [
+    ("list", "prints"),
+    ("params", "prints"),
+    ("faults list", "prints"),
+    ("channels", "prints"),
+    ("commands", "prints"),
+    ("commission", "asks boards for a moment, and prints"),
+    ("check", "compares within a second, and prints"),
+    ("interface", "prints"),
+    ("campaign submit", "prints, or hands over to a scheduler"),
+    ("campaign status", "prints"),
+    (
+        "campaign case",
+        "one case for `campaign run`, which is on the list",
+    ),
+    ("ctl status", "asks a server"),
+    (
+        "ctl watch",
+        "prints until it is stopped: `service` has its tests",
+    ),
+    ("ctl take", "asks a server"),
+    ("ctl stop", "asks a server"),
+    ("ctl inject", "asks a server"),
+    ("ctl end-fault", "asks a server"),
+    ("ctl pause", "asks a server"),
+    ("ctl resume", "asks a server"),
+    ("ctl step", "asks a server"),
+    ("ctl speed", "asks a server"),
+    ("ctl rec", "asks a server"),
+    ("help", "prints"),
+];
+
+/// What the program prints as its help, from its own tree of commands.
+fn help(path: &[String]) -> String {
+    let mut command = Command::new(program::path());
+    let output = command.args(path).arg("--help").output().expect("start");
+    assert!(output.status.success(), "{path:?}");
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+/// Every command without others below it, with its help.
+fn leaves(path: &[String], found: &mut Vec<(String, String)>) {
+    let text = help(path);
+    let list = text.split("\nCommands:\n").nth(1).unwrap_or_default();
+    let names = list
+        .lines()
+        .take_while(|line| !line.is_empty())
+        // What follows a name that is too long for its column stands deeper.
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help");
+    let below: Vec<Vec<String>> = names
+        .map(|name| [path, &[name.to_owned()]].concat())
+        .collect();
+    if below.is_empty() {
+        found.push((path.join(" "), text));
+    }
+    for path in below {
+        leaves(&path, found);
+    }
+}
+
+/// The list above is compared with the program's own: a command that can be told where to write is on
+/// it; every other is there too, or is known to be brief.
+#[test]
+fn no_command_is_left_out() {
+    let inputs = Inputs {
+        folder: tempfile::tempdir().expect("temporary folder"),
+    };
+    let tried = inputs.commands(true);
+    let mut found = Vec::new();
+    leaves(&[], &mut found);
+    assert!(found.len() > 40, "{}", found.len());
+    let is_tried = |name: &str| {
+        let words: Vec<&str> = name.split(' ').collect();
+        tried.iter().any(|t| {
+            let given = t.arguments.iter().map(String::as_str);
+            given.take(words.len()).eq(words.iter().copied())
+        })
+    };
+    let mut wrong = Vec::new();
+    for (name, help) in &found {
+        let brief = BRIEF.iter().any(|(brief, _)| brief == name);
+        let writes = ["--out", "--recordings"].iter().any(|o| help.contains(o));
+        if is_tried(name) == brief || (writes && brief) {
+            wrong.push(name);
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "neither on the list nor brief, or both: {wrong:?}"
+    );
+    let gone = |name: &&str| found.iter().all(|(known, _)| known != name);
+    let hidden = ["campaign case", "help"];
+    let gone: Vec<&str> = BRIEF.iter().map(|(name, _)| *name).filter(gone).collect();
+    assert_eq!(gone, hidden, "no commands any more");
 }

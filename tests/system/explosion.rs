@@ -5,7 +5,8 @@ use std::fs;
 use std::ops::ControlFlow;
 
 use miette::Diagnostic as _;
-use wheeleg_config::{AxisConfig, Scenario};
+use wheeleg_config::{AxisConfig, RobotConfig, Scenario};
+use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::robot::Inputs;
 use wheeleg_sim::SimError;
 use wheeleg_studies::axis_sim::suite::{AxisSimError, TestRig};
@@ -32,11 +33,11 @@ fn four_times_the_supply_is_too_much() {
     assert!(error.to_string().contains("pressure_a_pa[2]"), "{error}");
 }
 
-/// A whole run of a robot that stands, and is told to drive: with a winding of a hundredth of an ohm and
-/// next to no torque, which a file may say, its motors draw more than the model means.
-#[test]
-fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
-    const AT_S: f64 = 0.5;
+/// When the robot is told to drive, s.
+const AT_S: f64 = 0.5;
+
+/// A robot that is told to drive, with a winding of a hundredth of an ohm and next to no torque.
+pub(crate) fn drives_without_torque() -> (Scenario, RobotConfig) {
     let mut robot = wheeleg_config::builtin::robot("wheeleg").expect("built in");
     for motor in &mut robot.plant.motors {
         (motor.resistance_ohm, motor.supply_v) = (0.01, 60.0);
@@ -49,6 +50,14 @@ fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
          action = \"command\"\ncommand = \"WheelReference\"\ntravel = \"800 mm\"\n"
     );
     let scenario = Scenario::parse("drive.toml", &text).expect("a scenario");
+    (scenario, robot)
+}
+
+/// A whole run of a robot that stands, and is told to drive: with a winding of a hundredth of an ohm and
+/// next to no torque, which a file may say, its motors draw more than the model means.
+#[test]
+fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
+    let (scenario, robot) = drives_without_torque();
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out");
     let finished = run_read(&scenario, &robot, 1, &Settings::new(&out)).expect("a run");
@@ -94,10 +103,8 @@ fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
     assert!(worst_a <= 1000.0, "{worst_a} A");
 }
 
-/// The same of one cylinder: a hundred kilograms on a piston of 32 mm run through its stop or press
-/// the air before it to many times the supply. Every field is within its range.
-#[test]
-fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
+/// A hundred kilograms on a piston of 32 mm; every field is within its range.
+pub(crate) fn heavy() -> AxisParams {
     let text = include_str!("../../host-sim/axes/heavy-40x250.toml");
     let heavy = crate::axis_text::changed(
         text,
@@ -116,9 +123,16 @@ fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
             ("line.volume", 0.3, "cm3"),
         ],
     );
-    let axis = AxisConfig::parse("heavy.toml", &heavy)
+    AxisConfig::parse("heavy.toml", &heavy)
         .expect("within all ranges")
-        .axis;
+        .axis
+}
+
+/// The same of one cylinder: a hundred kilograms on a piston of 32 mm run through its stop or press
+/// the air before it to many times the supply. Every field is within its range.
+#[test]
+fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
+    let axis = heavy();
     let told = |error: &AxisSimError| {
         let AxisSimError::Unphysical { what, help } = error else {
             panic!("another error: {error}");
@@ -143,7 +157,5 @@ fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
         .cycle()
         .take(20)
         .try_for_each(|to_m| rig.step(*to_m, 2.0).map(drop));
-    if let Err(error) = moved {
-        told(&error);
-    }
+    told(&moved.expect_err("it explodes"));
 }

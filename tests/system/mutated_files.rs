@@ -2,12 +2,14 @@
 //! signs and magnitudes wrong, lines swapped, sections pasted from other files. Each is run or
 //! refused in words; none panics, hangs, leaves its folder, or leaves physics without a word.
 //!
-//! A few here; `cargo xtask deep practice` takes many, with numbers of their own.
+//! Two hundred here; `cargo xtask deep practice` takes more, with numbers of their own.
 
+use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{fmt, fs, thread};
 
@@ -29,7 +31,7 @@ use mutate::mutate;
 /// How many files, and the number of the first.
 const FILES_VARIABLE: &str = "WHEELEG_MUTATED_FILES";
 const FIRST_VARIABLE: &str = "WHEELEG_MUTATED_FIRST";
-const FILES: u64 = 60;
+const FILES: u64 = 200;
 /// A run that is not over is stopped with Ctrl-C then; a mistake may have made it a long one.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// One that goes on after that hangs. It may share its processor with others.
@@ -97,14 +99,23 @@ fn files() -> Vec<(Kind, String)> {
 const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
     duration = \"0.3 s\"\nseed = 1\ntargets = \"stand\"\n[motion]\nkind = \"stand\"\n";
 
-/// Says what a user is told, and that it is told in words: what, where or what about it, and no
-/// value as a program prints it for itself.
+/// Says what a user is told, and that it is told in words: the file, the field or section, what about
+/// it, and no value as a program prints it for itself.
 fn messages(error: &dyn Diagnostic) -> String {
     let mut text = error.to_string();
     let mut remedy = error.help().is_some() || error.related().is_some();
     for problem in error.related().into_iter().flatten() {
-        text += &format!("\n{problem}");
+        let said = problem.to_string();
+        let of_file = text.contains("mutant.toml") || text.contains("stand.toml");
+        assert!(of_file, "no file: {text}\n{said}");
+        let field = said.contains('`') || said.contains('[') || said.contains("not valid TOML");
+        assert!(field, "no field: {said}");
+        text += &format!("\n{said}");
         remedy |= problem.help().is_some();
+    }
+    if let (None, Some(help)) = (error.related(), error.help()) {
+        let help = help.to_string();
+        assert!(help.contains(['`', '[']), "no field: {text}: {help}");
     }
     assert!(error.code().is_some(), "no code: {text}");
     assert!(remedy, "no remedy: {text}");
@@ -280,6 +291,7 @@ struct Tally {
     ran: u64,
     ended: u64,
     refused: u64,
+    wrong: Vec<String>,
 }
 
 impl fmt::Display for Tally {
@@ -288,8 +300,39 @@ impl fmt::Display for Tally {
             ran,
             ended,
             refused,
+            ..
         } = self;
         write!(f, "{ran} run, {ended} ended early, {refused} refused")
+    }
+}
+
+/// Makes the file of a number, and tells what came of it.
+fn try_one(files: &[(Kind, String)], number: u64, tally: &Mutex<Tally>) {
+    let mut rng = Pcg64Mcg::seed_from_u64(number);
+    let wanted = KINDS[rng.random_range(0..KINDS.len())];
+    let of_kind: Vec<_> = files.iter().filter(|(kind, _)| *kind == wanted).collect();
+    let (kind, text) = of_kind[rng.random_range(0..of_kind.len())];
+    let (_, other) = &files[rng.random_range(0..files.len())];
+    let mutant = mutate(&mut rng, text, other);
+    // What leaves its folder lands in the one around it.
+    let around = tempfile::tempdir().expect("temporary folder");
+    let folder = around.path().join("its-own");
+    fs::create_dir(&folder).expect("created");
+    let file = laid_down(&folder, &mutant.text);
+    let before = names(&folder);
+    let fate = judged(*kind, file);
+    let left = names(&folder) != before || names(around.path()) != ["its-own"];
+    let told = format!("{number} {kind:?}{}: {fate:?}", mutant.what);
+    println!("{told}");
+    let mut tally = tally.lock().expect("no panic while it is held");
+    match &fate {
+        Ok(Fate::Ran) => tally.ran += 1,
+        Ok(Fate::Ended(_)) => tally.ended += 1,
+        Ok(Fate::Refused(_)) => tally.refused += 1,
+        Err(_) => {}
+    }
+    if fate.is_err() || left {
+        tally.wrong.push(format!("{told}, left its folder: {left}"));
     }
 }
 
@@ -298,39 +341,25 @@ fn each_is_run_or_refused_in_words() {
     let files = files();
     let first = variable(FIRST_VARIABLE, 1);
     let count = variable(FILES_VARIABLE, FILES);
-    let mut tally = Tally::default();
-    let mut wrong = Vec::new();
-    for number in first..first + count {
-        let mut rng = Pcg64Mcg::seed_from_u64(number);
-        let wanted = KINDS[rng.random_range(0..KINDS.len())];
-        let of_kind: Vec<_> = files.iter().filter(|(kind, _)| *kind == wanted).collect();
-        let (kind, text) = of_kind[rng.random_range(0..of_kind.len())];
-        let (_, other) = &files[rng.random_range(0..files.len())];
-        let mutant = mutate(&mut rng, text, other);
-        // What leaves its folder lands in the one around it.
-        let around = tempfile::tempdir().expect("temporary folder");
-        let folder = around.path().join("its-own");
-        fs::create_dir(&folder).expect("created");
-        let file = laid_down(&folder, &mutant.text);
-        let before = names(&folder);
-        let fate = judged(*kind, file);
-        let left = names(&folder) != before || names(around.path()) != ["its-own"];
-        match &fate {
-            Ok(Fate::Ran) => tally.ran += 1,
-            Ok(Fate::Ended(_)) => tally.ended += 1,
-            Ok(Fate::Refused(_)) => tally.refused += 1,
-            Err(_) => {}
+    let tally = Mutex::new(Tally::default());
+    let next = AtomicU64::new(first);
+    let processors = thread::available_parallelism().map_or(1, NonZero::get);
+    thread::scope(|scope| {
+        for _ in 0..processors {
+            scope.spawn(|| {
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    if number >= first + count {
+                        break;
+                    }
+                    try_one(&files, number, &tally);
+                }
+            });
         }
-        println!("{number} {kind:?}{}: {fate:?}", mutant.what);
-        if fate.is_err() || left {
-            wrong.push(format!(
-                "{number} {kind:?}{}: {fate:?}, left its folder: {left}",
-                mutant.what
-            ));
-        }
-    }
+    });
+    let tally = tally.into_inner().expect("no panic while it is held");
     println!("{count} mutated files from number {first}: {tally}");
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(tally.wrong.is_empty(), "{}", tally.wrong.join("\n"));
     // Mistakes of all kinds: some matter, some do not.
     let few = count / 10;
     assert!(tally.ran > few && tally.refused > few, "{tally}");

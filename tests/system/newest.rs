@@ -65,7 +65,7 @@ const SERVE: [Case; 29] = [
     ),
 ];
 
-const OTHERS: [Case; 42] = [
+const OTHERS: [Case; 49] = [
     (
         &["serve", "--listen", "localhost:0"],
         &["'localhost:0'", "127.0.0.1:7450"],
@@ -181,7 +181,35 @@ const OTHERS: [Case; 42] = [
     ),
     (
         &["view", "none", "--from", "nan"],
-        &["NaN s", "--from from 0 on"],
+        &["'nan'", "seconds with a decimal point"],
+    ),
+    (
+        &["view", "none", "--from", "0,1"],
+        &["'0,1'", "such as 0.1"],
+    ),
+    (
+        &["identify", "short.csv", "--axis", "bench-vq110u"],
+        &["line 3", "`vent_b`", "5 values", "6 columns"],
+    ),
+    (
+        &["identify", "long.csv", "--axis", "bench-vq110u"],
+        &["line 3", "7 values", "6 columns"],
+    ),
+    (
+        &["identify", "empty.csv", "--axis", "bench-vq110u"],
+        &["line 3", "`fill_b`", "there is no value", "from 0 to 1"],
+    ),
+    (
+        &["identify", "digits.csv", "--axis", "bench-vq110u"],
+        &["line 3", "`position_mm`", "1e299 is outside -3.6 to 183.6"],
+    ),
+    (
+        &["identify", "words.csv", "--axis", "bench-vq110u"],
+        &["line 3", "`time_s`", "xxx…\" is no number"],
+    ),
+    (
+        &["run", "stand", "--png", "--out", "none"],
+        &["`--png`", "built without PNG", "SVG"],
     ),
     (&["replay", "none"], &["none/recording.json", "runs/"]),
     (&["replay", "/dev/zero"], &["/dev/zero/recording.json"]),
@@ -222,6 +250,15 @@ fn files(folder: &Path) {
         )
     };
     write("late.csv", &rows("0.9,40,0,0,0,0"));
+    write("short.csv", &rows("0.005,40,0,0,0"));
+    write("long.csv", &rows("0.005,40,0,0,0,0,0"));
+    write("empty.csv", &rows("0.005,40,0,0,,0"));
+    let digits = format!("0.005,1{},0,0,0,0", "0".repeat(299));
+    write("digits.csv", &rows(&digits));
+    write(
+        "words.csv",
+        &rows(&format!("{},40,0,0,0,0", "x".repeat(300))),
+    );
     write("nan.csv", &format!("{head}\n0,40,0,nan,0,0\n"));
     // As some programs begin a file.
     write("marked.csv", &format!("\u{feff}{head}\r\n0,40,0,0,0,0\r\n"));

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::run::Run;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
@@ -71,6 +72,9 @@ pub fn replay(
     png: bool,
     stop: &Stop,
 ) -> Result<Option<Replayed>, CampaignError> {
+    if png {
+        ensure_png()?;
+    }
     let (place, plan_file) = if from.is_dir() {
         let store = Store::open(from)?;
         let plan = store.plan().clone();

@@ -154,14 +154,18 @@ impl Submission {
                 '-'
             }
         };
+        // A label of DNS (RFC 1123), with room for the number of a pod behind it.
         let name: String = self.name.chars().map(plain).take(40).collect();
-        let name = name.trim_matches('-');
+        let name = match name.trim_matches('-') {
+            "" => String::new(),
+            name => format!("-{name}"),
+        };
         let shards = self.shards;
         let (image, claim) = (quoted(image), quoted(claim));
         format!(
             "apiVersion: batch/v1\n\
              kind: Job\n\
-             metadata:\n  name: wheeleg-{name}\n\
+             metadata:\n  name: wheeleg{name}\n\
              spec:\n  completionMode: Indexed\n  completions: {shards}\n  parallelism: {shards}\n  \
              backoffLimitPerIndex: 3\n  podFailurePolicy:\n    rules:\n      \
              - action: FailIndex\n        onExitCodes:\n          operator: In\n          \
@@ -284,5 +288,29 @@ mod tests {
             assert!(yaml.lines().any(|l| l == line), "{line} in\n{yaml}");
         }
         assert!(yaml.contains("--shards, \"8\""));
+    }
+
+    /// Names of plans have characters that a job's has not, and may have no others.
+    #[test]
+    fn a_job_has_a_name_that_kubernetes_takes() {
+        for (plan, job) in [
+            ("_", "wheeleg"),
+            ("_.-", "wheeleg"),
+            ("9", "wheeleg-9"),
+            ("A_b", "wheeleg-a-b"),
+            (&"x".repeat(64), &*format!("wheeleg-{}", "x".repeat(40))),
+            (
+                &format!("{}_-y", "x".repeat(39)),
+                &*format!("wheeleg-{}", "x".repeat(39)),
+            ),
+        ] {
+            let of_plan = Submission {
+                name: plan.to_owned(),
+                ..submission()
+            };
+            let yaml = of_plan.kubernetes("wheeleg", "claim");
+            let line = format!("  name: {job}");
+            assert!(yaml.lines().any(|l| l == line), "{plan}: {yaml}");
+        }
     }
 }

@@ -184,6 +184,10 @@ impl AxisConfig {
         let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let axis = read(&mut r);
+        relations::check(&mut r, axis.as_ref().map(moved).as_ref(), None);
+        if let (true, Some(axis)) = (r.is_clean(), &axis) {
+            relations::check_plant(&mut r, Axis::new(axis).map(drop));
+        }
         let config = (|| {
             Some(Self {
                 name: name?,
@@ -231,34 +235,17 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
         adc: sensing.adc,
         step_ns: sensing.step_ns,
     };
-    check_relations(r, &axis);
     Some(axis)
 }
 
-/// What the fields must be to each other.
-fn check_relations(r: &mut Reader, axis: &AxisParams) {
-    let cylinder = &axis.cylinder;
-    relations::check_break_away(r, cylinder.friction.coulomb_n, cylinder.friction.static_n);
-    let start_pa = [
-        cylinder.initial_pressure_a_pa,
-        cylinder.initial_pressure_b_pa,
-    ];
-    relations::check_start(r, "start", start_pa, axis.supply.set_pressure_pa);
-    relations::check_start_stroke(r, "start", axis.initial_stroke_m, cylinder.stroke_m);
-    let step_s = axis.step_ns as f64 * 1e-9;
-    relations::check_supply(r, &axis.supply, &axis.gas, step_s);
-    let moved = Moved {
-        cylinder,
+fn moved(axis: &AxisParams) -> Moved<'_> {
+    Moved {
+        cylinder: &axis.cylinder,
         gas: &axis.gas,
         supply: &axis.supply,
         mass_kg: axis.moving_mass_kg,
-        mass_fields: &["moving.mass"],
         load_n: axis.load_n.abs(),
-        step_s,
-    };
-    moved.check(r);
-    if r.is_clean() {
-        relations::check_plant(r, Axis::new(axis).map(drop));
+        step_s: axis.step_ns as f64 * 1e-9,
     }
 }
 

@@ -30,8 +30,32 @@ pub fn plain_text(error: &dyn Diagnostic) -> String {
     }
 }
 
+/// Most digits of a number that are shown as they stand.
+const DIGITS: usize = 40;
+
+/// Whatever a file says, for a message: of a number with very many digits the first and their count.
+fn shown(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        let digits = &rest[at..];
+        let count = digits
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(digits.len());
+        out += &rest[..at];
+        match count > DIGITS {
+            true => out += &format!("{}…[{count} digits]", &digits[..8]),
+            false => out += &digits[..count],
+        }
+        rest = &digits[count..];
+    }
+    out += rest;
+    out
+}
+
 /// A message without the middle that is too much.
 fn shortened(message: String) -> String {
+    let message = shown(&message);
     let count = message.chars().count();
     if count <= LONGEST_MESSAGE {
         return message;

@@ -21,6 +21,7 @@ mod commissioned;
 mod drawing;
 mod error;
 pub mod faults;
+mod gait;
 pub mod keys;
 mod law;
 mod node;
@@ -43,15 +44,17 @@ pub use bars::{Bar, Measure};
 pub use command::command;
 pub use drawing::Drawing;
 pub use error::{ConfigError, Problem, plain_text};
+pub use gait::GaitParams;
 pub use law::LawChoice;
 pub use node::NodeParams;
 pub use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
+pub use relations::{RELATIONS, Relation, SENSOR_TRACK, STEPS_AT_REST};
 pub use relief::Relief;
 pub use robot::{
-    BusParams, GaitParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
+    BusParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
 pub use scenario::{EventAction, LegChoice, Motion, Scenario, ScenarioEvent, TARGETS, TargetSet};
 pub use suggest::closest;

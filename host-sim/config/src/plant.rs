@@ -20,7 +20,7 @@ use self::sections::{
     SoftGroundSection, SpatialParams, StartSection, WheelContactSection,
 };
 use super::reader::Reader;
-use super::relations::{self, Moved};
+use super::relations::Moved;
 
 /// Names of the plant's sections besides those of one cylinder.
 pub(super) const SECTIONS: [&str; 9] = [
@@ -113,48 +113,19 @@ pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
         adc: sensing.adc,
         step_ns: sensing.step_ns,
     };
-    check_relations(r, &plant);
     Some((plant, spatial))
 }
 
-/// What the fields must be to each other.
-fn check_relations(r: &mut Reader, plant: &PlantParams) {
-    let friction = &plant.cylinders[0].friction;
-    relations::check_break_away(r, friction.coulomb_n, friction.static_n);
-    relations::check_gravity(r, plant.body.gravity_m_s2);
-    for (name, body) in LINKS.iter().zip(&plant.body.leg_bodies) {
-        let field = format!("link.{name}.inertia");
-        relations::check_inertias(r, &[&field], body.inertia_kg_m2);
-    }
-    for (name, cylinder) in ["yaw", "horizontal", "vertical"]
-        .iter()
-        .zip(&plant.cylinders)
-    {
-        let start_pa = [
-            cylinder.initial_pressure_a_pa,
-            cylinder.initial_pressure_b_pa,
-        ];
-        let section = format!("start.{name}");
-        relations::check_start(r, &section, start_pa, plant.supply.set_pressure_pa);
-    }
-    for (i, name) in ["yaw", "horizontal", "vertical"].iter().enumerate() {
-        let (start_m, stroke_m) = (plant.initial_stroke_m[i], plant.cylinders[i].stroke_m);
-        relations::check_start_stroke(r, &format!("start.{name}"), start_m, stroke_m);
-    }
-    relations::check_contacts(r, &plant.contacts);
-    let step_s = plant.step_ns as f64 * 1e-9;
-    relations::check_supply(r, &plant.supply, &plant.gas, step_s);
-    // The vertical cylinder moves the least: its rod.
-    let moved = Moved {
+/// The cylinder that moves the least, the vertical one, with its rod.
+pub(super) fn moved(plant: &PlantParams) -> Moved<'_> {
+    Moved {
         cylinder: &plant.cylinders[2],
         gas: &plant.gas,
         supply: &plant.supply,
         mass_kg: plant.body.leg_bodies[5].mass_kg,
-        mass_fields: &["link.vertical_rod.mass"],
         load_n: 0.0,
-        step_s,
-    };
-    moved.check(r);
+        step_s: plant.step_ns as f64 * 1e-9,
+    }
 }
 
 fn motor_params(s: &MotorSection) -> MotorParams {

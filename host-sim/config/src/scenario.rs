@@ -10,7 +10,7 @@ use super::command;
 use super::error::ConfigError;
 use super::keys;
 use super::params::{FieldSpec, ParameterInfo};
-use super::quantity::Dimension;
+use super::quantity::{Dimension, pretty};
 use super::reader::{Entry, Reader};
 use super::terrain::{self, Files, Ground};
 use crate::faults::FaultSpec;
@@ -338,6 +338,21 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
         "time of the event, within the duration of the scenario",
     );
     let at_s = r.required(entry, &at);
+    if let (Some(at_s), Some(end_s)) = (at_s, duration_s)
+        && at_s >= end_s
+    {
+        r.problem(
+            entry.get("at").map(|(key, item)| item.span().unwrap_or(key)),
+            format!(
+                "`{}.at` = {} s is out of range: allowed 0 s to below {} s, the end of the scenario",
+                entry.path,
+                pretty(at_s),
+                pretty(end_s)
+            ),
+            "does nothing",
+            Some("an event acts before the end: bring it forward, or raise `duration`".into()),
+        );
+    }
     let actions = [
         ("kill-master", ActionKind::KillMaster),
         ("e-stop", ActionKind::EStop),

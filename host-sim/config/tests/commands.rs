@@ -386,3 +386,38 @@ fn arguments_arrive_in_the_units_of_the_master() {
     };
     assert_eq!(read(write).ok(), Some(wanted));
 }
+
+/// What would do nothing, and numbers as other countries write them.
+#[test]
+fn an_event_at_the_end_and_a_decimal_comma_are_refused() {
+    let head =
+        "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nseed = 1\ntargets = \"none\"\n";
+    let told = |duration: &str, at: &str| {
+        let text = format!(
+            "{head}duration = \"{duration}\"\n[motion]\nkind = \"stand\"\n\
+             [[events]]\nat = \"{at}\"\naction = \"e-stop\"\n"
+        );
+        Scenario::parse("my.toml", &text).map_err(|error| report(&error))
+    };
+    assert!(told("2 s", "1.999 s").is_ok());
+    for at in ["2 s", "2000 ms"] {
+        let text = told("2 s", at).expect_err("does nothing");
+        assert_all(
+            &text,
+            &[
+                "my.toml:10:",
+                "`events[0].at` = 2 s",
+                "0 s to below 2 s",
+                "duration",
+            ],
+        );
+    }
+    let text = told("2,5 s", "1 s").expect_err("a comma");
+    assert_all(&text, &["my.toml:6:", "`duration`", "decimal point"]);
+    let text = told("2 S", "1 s").expect_err("another case");
+    assert_all(&text, &["my.toml:6:", "`duration`", "did you mean \"s\""]);
+    let digits = "9".repeat(300);
+    let text = told(&digits, "1 s").expect_err("too long");
+    assert_all(&text, &["my.toml:6:", "`duration`"]);
+    assert!(text.len() < 300, "{text}");
+}

@@ -187,6 +187,32 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
         (
             on(
                 "supply.droop",
+                "normal = { mean = 0.3, sd = 0.01, min = 0.5, max = 0.6, unit = \"bar\" }",
+            ),
+            vec![
+                "factor.x.normal",
+                "no probability",
+                "min lies 20 ",
+                "allowed are 8",
+            ],
+        ),
+        (
+            on(
+                "supply.droop",
+                "lognormal = { median = 0.3, sigma = 0.1, max = 0.1, unit = \"bar\" }",
+            ),
+            vec!["factor.x.lognormal", "no probability", "max lies 10.99 "],
+        ),
+        (
+            format!(
+                "[factor.{}]\nparameter = \"robot.supply.droop\"\ngrid = [1.0]\nunit = \"bar\"\n",
+                "x".repeat(65)
+            ),
+            vec!["factor.xxx", "is not a name", "1 to 64"],
+        ),
+        (
+            on(
+                "supply.droop",
                 "choice = { values = [1.0, 2.0], weights = [1.0], unit = \"bar\" }",
             ),
             vec!["factor.x.choice.weights", "2 numbers above 0"],

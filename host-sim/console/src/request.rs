@@ -4,9 +4,11 @@
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
+use wheeleg_config::closest;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::argument::{Argument, ArgumentKind, Value};
-use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given};
+use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given, TABLE};
+use wheeleg_protocol::param::params_at;
 use wheeleg_telemetry::channels;
 
 use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
@@ -278,10 +280,19 @@ fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
     if let Some(info) = HOST_TABLE.iter().find(|row| row.name == name) {
         return host(info, args).map(Order::Host);
     }
+    let robots = TABLE.iter().map(|row| row.name);
+    let names = robots.chain(HOST_TABLE.iter().map(|row| row.name));
+    let near = meant(name, names);
     Err(BadRequest {
         reason: Reason::BadCommand,
-        text: format!("there is no command {name:?}; /api/v1/commands lists them"),
+        text: format!("there is no command {name:?}{near}; /api/v1/commands lists them"),
     })
+}
+
+/// The name that is most likely meant, as a question.
+fn meant<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let near = closest(word, names);
+    near.map_or(String::new(), |near| format!(", did you mean `{near}`?"))
 }
 
 fn bad_argument(text: impl ToString) -> BadRequest {
@@ -323,25 +334,60 @@ fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> 
             true => "it takes none".to_owned(),
             false => format!("it takes: {}", names.join(", ")),
         };
-        wrong.push(format!("{} takes no {name:?}; {takes}", info.name));
+        let near = meant(name, names);
+        wrong.push(format!("{} takes no {name:?}{near}; {takes}", info.name));
     }
     for argument in info.arguments {
         let (name, range) = (argument.name, argument.range());
         match args.get(name) {
             None => wrong.push(format!("`{name}` is missing; allowed: {range}")),
-            Some(json) => match argument.kind.admits(value(argument, json)) {
-                Some(true) => {}
-                Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}")),
-                None => {
-                    let kind = argument.kind.name();
-                    wrong.push(format!(
-                        "`{name}` is {json}, not a {kind}; allowed: {range}"
-                    ));
+            Some(json) => {
+                let how = advice(argument, json, args);
+                match argument.kind.admits(value(argument, json)) {
+                    Some(true) => {}
+                    Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}{how}")),
+                    None => {
+                        let kind = argument.kind.name();
+                        wrong.push(format!(
+                            "`{name}` is {json}, not a {kind}; allowed: {range}{how}"
+                        ));
+                    }
                 }
-            },
+            }
         }
     }
     wrong
+}
+
+/// How a text is written that was meant as a number, a word or a parameter of a board.
+fn advice(argument: &Argument, json: &Json, args: &Map<String, Json>) -> String {
+    let Some(text) = json.as_str() else {
+        return String::new();
+    };
+    match argument.kind {
+        ArgumentKind::Choice(words) => meant(text, words.iter().copied()),
+        ArgumentKind::Parameter => {
+            let board = args.get("board").and_then(Json::as_u64);
+            let table = board.and_then(|board| u8::try_from(board).ok());
+            let table = table.map_or(&[][..], params_at);
+            let near = closest(text, table.iter().map(|row| row.name));
+            let row = table.iter().find(|row| Some(row.name) == near);
+            row.map_or(String::new(), |row| {
+                format!(
+                    ", by its number: `{}` of this board is {}",
+                    row.name, row.id
+                )
+            })
+        }
+        _ => {
+            let is_part = |c: char| c.is_ascii_digit() || "+-.".contains(c);
+            let number = text.split(|c| !is_part(c)).next().unwrap_or_default();
+            match number.parse::<f64>() {
+                Ok(_) => format!(", without a unit: {number}"),
+                Err(_) => String::new(),
+            }
+        }
+    }
 }
 
 /// The value of an argument; one of another kind where the JSON is of another kind.
@@ -387,7 +433,11 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         .keys()
         .find(|name| info.arguments.iter().all(|a| a.name != *name))
     {
-        return Err(bad_argument(format!("{} takes no {name:?}", info.name)));
+        let near = meant(name, info.arguments.iter().map(|a| a.name));
+        return Err(bad_argument(format!(
+            "{} takes no {name:?}{near}",
+            info.name
+        )));
     }
     let given = |name: &str| {
         let missing = || bad_argument(format!("{} needs `{name}`", info.name));
@@ -536,6 +586,30 @@ mod tests {
                 got.name() == reason && text.contains(word),
                 "{cmd} {args}: {got} {text}"
             );
+        }
+        for (cmd, args, advice) in [
+            ("jointreference", "{}", "did you mean `JointReference`?"),
+            ("WheelRefrence", "{}", "did you mean `WheelReference`?"),
+            ("pause", "{}", "did you mean `Pause`?"),
+            (
+                "JointReference",
+                r#"{"joint":1,"strok":1}"#,
+                "did you mean `stroke`?",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":1,"stroke":"120mm"}"#,
+                "without a unit: 120",
+            ),
+            (
+                "ReadParameter",
+                r#"{"board":1,"parameter":"settle_band"}"#,
+                "`settle_band` of this board is 268",
+            ),
+            ("Speed", r#"{"sped":1}"#, "did you mean `speed`?"),
+        ] {
+            let (_, text) = refused(cmd, args, 500);
+            assert!(text.contains(advice), "{cmd} {args}: {text}");
         }
         for valid in [0, 1001] {
             let (_, text) = refused("Arm", "{}", valid);

@@ -52,15 +52,12 @@ pub enum ReportError {
     },
 
     /// A picture was asked for in a format that this program cannot write.
-    #[error("cannot write `{}`: this program was built without PNG", path.display())]
+    #[error("`--png`: this program was built without PNG")]
     #[diagnostic(
         code(wheeleg::png),
-        help("build it with `--features png`; every figure is also there as SVG")
+        help("leave it out: every figure is written as SVG; or build with `--features png`")
     )]
-    NoPng {
-        /// The file.
-        path: PathBuf,
-    },
+    NoPng,
 
     /// The report template failed.
     #[error("cannot render the report: {0}")]

@@ -12,13 +12,30 @@ use wheeleg_units::PositionMm;
 
 use super::world::World;
 use crate::SimError;
-use wheeleg_config::{LegChoice, Motion, Scenario, ScenarioEvent, StartUpParams};
+use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent};
 use wheeleg_telemetry::event::{Answer, Cause};
 use wheeleg_telemetry::messages::reject;
 use wheeleg_telemetry::{Event as Recorded, EventKind, LinkSample, Recorder};
 
-/// What to do about a robot that does not get ready, where no board is to blame.
-const HELP: &str = "check supply pressure, board gains and start pose in the robot file";
+/// What to do about a robot that does not get ready, where no board is to blame: its file, and the
+/// values there that decide whether its air moves it in time.
+fn remedy(robot: &RobotConfig) -> String {
+    let plant = &robot.plant;
+    format!(
+        "correct the robot {}: with {:.1} kg in all (`body.chassis_mass`, `link.*.mass`), \
+         `supply.set_pressure` = {:.2} bar, `cylinder.bore` = {:.1} mm, `friction.static` = {:.1} N, \
+         `sensor.adc.bits` = {} and its `[node.*]` sections the joints do not come to rest within \
+         `homing.tolerance` = {:.1} mm in `homing.timeout` = {:.1} s",
+        robot.file,
+        plant.body.total_mass_kg(),
+        plant.supply.set_pressure_pa * 1e-5,
+        plant.cylinders[0].bore_m * 1e3,
+        plant.cylinders[0].friction.static_n,
+        plant.adc.bits,
+        robot.homing.tolerance_m * 1e3,
+        robot.homing.timeout_s,
+    )
+}
 
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +69,8 @@ pub(super) struct Operator {
     start_up: Vec<(u64, Cause)>,
     next_event: usize,
     flood_refused: bool,
+    /// What to do where it does not get ready.
+    remedy: String,
 }
 
 /// Side of a leg as the master names it.
@@ -64,17 +83,18 @@ pub(super) fn side(leg: LegChoice) -> Side {
 
 impl Operator {
     /// An operator at a robot that is just being switched on.
-    pub(super) fn new(scenario: &Scenario, start_up: &StartUpParams) -> Self {
+    pub(super) fn new(scenario: &Scenario, robot: &RobotConfig) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         Self {
             motion: scenario.motion,
             events: scenario.events.clone(),
-            rest_ns: ns(start_up.rest_s),
-            limit_ns: ns(start_up.limit_s),
+            rest_ns: ns(robot.start_up.rest_s),
+            limit_ns: ns(robot.start_up.limit_s),
             stage: Stage::Enumerating,
             start_up: Vec::new(),
             next_event: 0,
             flood_refused: false,
+            remedy: remedy(robot),
         }
     }
 
@@ -100,7 +120,7 @@ impl Operator {
                     };
                 }
                 Event::HomingFailed { .. } | Event::Hold(_) | Event::Refused { .. } => {
-                    return Err(self.not_ready(now_ns, HELP));
+                    return Err(self.not_ready(now_ns, &self.remedy));
                 }
                 Event::SchemaMismatch { .. } => {
                     let help = "build and flash this board from the sources of this program; \
@@ -128,7 +148,7 @@ impl Operator {
                 (Command::Stand, Stage::Homing)
             }
             Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
-            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, HELP)),
+            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, &self.remedy)),
             _ => return Ok(false),
         };
         world

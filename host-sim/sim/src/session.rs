@@ -94,7 +94,7 @@ impl Session {
         }
         Ok(Self {
             world,
-            operator: Operator::new(scenario, &robot.start_up),
+            operator: Operator::new(scenario, robot),
             observer: Observer::default(),
             schedule: Schedule::new(&scenario.faults),
             active: ActiveFaults::default(),

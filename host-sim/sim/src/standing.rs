@@ -19,14 +19,14 @@ fn stands(params: &PlantParams, slope_deg: u32) -> bool {
 }
 
 /// The refusal, with the steepest plane on which this robot stands in this pose.
-pub(crate) fn refused(params: &PlantParams, error: &dyn std::fmt::Display) -> SimError {
+pub(crate) fn refused(file: &str, params: &PlantParams, error: &dyn std::fmt::Display) -> SimError {
     let stood = (0..=STEEPEST_DEG).take_while(|deg| stands(params, *deg));
     let help = match stood.last() {
         Some(deg) => format!(
             "correct the scenario's [[terrain]]: nose uphill this robot stands on up to {deg}°, and \
              wheels and feet must find no rock, edge or hole below them"
         ),
-        None => "correct the robot: it stands in its start pose on no ground".to_owned(),
+        None => format!("correct the robot {file}: it stands in its start pose on no ground"),
     };
     SimError::simulation(error.to_string(), help)
 }
@@ -41,7 +41,7 @@ mod tests {
     fn the_steepest_plane_is_that_of_this_robot() {
         let mut robot = builtin::robot("wheeleg").expect("built in").plant;
         let steepest = |params: &PlantParams| {
-            let SimError::Simulation { help, .. } = refused(params, &"it falls") else {
+            let SimError::Simulation { help, .. } = refused("my.toml", params, &"it falls") else {
                 panic!("a simulation error");
             };
             let (before, _) = help.split_once('°').expect("a slope");

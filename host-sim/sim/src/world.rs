@@ -159,14 +159,14 @@ impl World {
             SimError::simulation(
                 format!("the {part} refuses its parameters: {e}"),
                 format!(
-                    "correct the robot `{}`; `wheeleg params` lists it",
-                    robot.name
+                    "correct the robot {}; `wheeleg params` lists it",
+                    robot.file
                 ),
             )
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
-            PlantError::NotStanding => standing::refused(plant.params(), &e),
+            PlantError::NotStanding => standing::refused(&robot.file, plant.params(), &e),
             other => refused("plant", &other),
         })?;
         let mut boards = Vec::new();

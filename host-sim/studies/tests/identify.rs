@@ -303,3 +303,36 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
     assert!(count < 20 || (0.90..=0.99).contains(&share), "{share}");
     assert!(20 * close >= 19 * count, "{close} of {count}");
 }
+
+/// A table of a million rows is read, and judged, in time that grows as the rows do.
+#[test]
+fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
+    use std::fmt::Write as _;
+    const SMALL: usize = 75_000;
+    const LARGE: usize = 8 * SMALL;
+    let axis = config().axis;
+    let seconds = |rows: usize| {
+        let mut text = String::from("time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us\n");
+        for k in 0..rows {
+            let time_s = k as f64 * 1e-3;
+            let _ = writeln!(text, "{time_s:.3},{},{},0,0,0", 40 + k % 100, k % 1000);
+        }
+        let begun = std::time::Instant::now();
+        let lab = Lab::parse("large.csv", &text, &axis);
+        (begun.elapsed().as_secs_f64(), lab)
+    };
+    let (small_s, small) = seconds(SMALL);
+    let (large_s, large) = seconds(LARGE);
+    assert_eq!(small.expect("sound").samples.len(), SMALL);
+    assert_eq!(large.expect("sound").samples.len(), LARGE);
+    // 8 times as many: 64 times as long if each looked at all others.
+    assert!(large_s < 24.0 * small_s, "{small_s} s, then {large_s} s");
+    let (million_s, million) = seconds(1_000_000);
+    let said = million.expect_err("17 minutes").to_string();
+    assert!(said.contains("large.csv is longer than 600 s"), "{said}");
+    assert!(
+        million_s < 40.0 * small_s,
+        "{small_s} s, then {million_s} s"
+    );
+    println!("{SMALL} in {small_s:.2} s, {LARGE} in {large_s:.2} s, 1000000 in {million_s:.2} s");
+}

@@ -13,7 +13,7 @@ pub(super) fn driven() -> Vec<Driven> {
     let wrong = Scenario::parse("my.toml", "nme = \"x\"").expect_err("wrong");
     let text = || "it".to_owned();
     let list: Vec<(&'static str, FmuError, Vec<&'static str>)> = vec![
-        ("FmuError::Config", FmuError::from(wrong), vec![]),
+        ("FmuError::Config", FmuError::from(wrong), vec!["my.toml"]),
         (
             "FmuError::Plant",
             FmuError::from(PlantError::EdgeQueueFull(2)),
@@ -21,8 +21,8 @@ pub(super) fn driven() -> Vec<Driven> {
         ),
         (
             "FmuError::Axis",
-            FmuError::from(AxisSimError::Board(text())),
-            vec![],
+            FmuError::from(AxisSimError::Board("the board refuses it".to_owned())),
+            vec!["the board"],
         ),
         (
             "FmuError::Resources",
@@ -101,7 +101,11 @@ pub(super) fn driven() -> Vec<Driven> {
             },
             vec!["2 s", "1.5 s"],
         ),
-        ("FmuError::State", FmuError::State(text()), vec![]),
+        (
+            "FmuError::State",
+            FmuError::State("of another unit".to_owned()),
+            vec!["another unit"],
+        ),
         (
             "FmuError::Absent",
             FmuError::Absent("events"),

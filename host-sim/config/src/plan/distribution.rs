@@ -4,7 +4,7 @@
 //! `max`, and what is left then has probability 1.
 
 use super::value::{Value, list};
-use crate::quantity::pretty;
+use crate::quantity::{brief, pretty};
 use crate::reader::{Entry, Reader};
 
 /// A value with its probability.
@@ -202,6 +202,23 @@ fn fields(key: &str) -> &'static [&'static str] {
     }
 }
 
+/// Standard deviations beyond which a bell has nothing to cut out: 6e-16 of its probability.
+const FAR: f64 = 8.0;
+
+/// A window far from the bell that it is cut from, by its ends in standard deviations.
+fn empty(low: f64, high: f64) -> Option<String> {
+    let (end, beyond) = match (low > FAR, high < -FAR) {
+        (true, _) => ("min", low),
+        (_, true) => ("max", high),
+        _ => return None,
+    };
+    Some(format!(
+        "from min to max it has no probability: {end} lies {} standard deviations from the middle, \
+         allowed are {FAR}",
+        brief(beyond.abs())
+    ))
+}
+
 /// Why numbers are no distribution.
 fn contradiction(d: &Distribution) -> Option<String> {
     let above = |name: &str, value: f64| {
@@ -213,7 +230,9 @@ fn contradiction(d: &Distribution) -> Option<String> {
     match *d {
         Distribution::Uniform { min, max } => order(min, max),
         Distribution::LogUniform { min, max } => above("min", min).or(order(min, max)),
-        Distribution::Normal { sd, min, max, .. } => above("sd", sd).or(order(min, max)),
+        Distribution::Normal { mean, sd, min, max } => above("sd", sd)
+            .or(order(min, max))
+            .or_else(|| empty((min - mean) / sd, (max - mean) / sd)),
         Distribution::LogNormal {
             median,
             sigma,
@@ -222,7 +241,8 @@ fn contradiction(d: &Distribution) -> Option<String> {
         } => above("median", median)
             .or(above("sigma", sigma))
             .or((min < 0.0).then(|| format!("min = {} must be 0 or above", pretty(min))))
-            .or(order(min, max)),
+            .or(order(min, max))
+            .or_else(|| empty((min / median).ln() / sigma, (max / median).ln() / sigma)),
         Distribution::Triangular { min, mode, max } => {
             order(min, max).or((!(min..=max).contains(&mode)).then(|| {
                 format!(

@@ -2,7 +2,7 @@
 
 use super::distribution::{self, Distribution};
 use super::value::{Value, list};
-use crate::reader::{Entry, Reader};
+use crate::reader::{Entry, NAME_LENGTH, Reader};
 
 /// What a factor sets.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -84,12 +84,14 @@ pub(super) fn read_all(r: &mut Reader) -> Option<Vec<Factor>> {
     let mut ok = true;
     for (name, span) in names {
         let plain = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
-        if name.is_empty() || !name.chars().all(plain) {
+        if !(1..=NAME_LENGTH).contains(&name.len()) || !name.chars().all(plain) {
+            let shown: String = name.chars().take(NAME_LENGTH).collect();
+            let more = if shown.len() < name.len() { "…" } else { "" };
             r.problem(
                 Some(span),
                 format!(
-                    "`factor.{name}` is not a name: allowed are the characters A-Z, a-z, 0-9, \
-                     `_` and `-`"
+                    "`factor.{shown}{more}` is not a name: allowed are 1 to {NAME_LENGTH} of the \
+                     characters A-Z, a-z, 0-9, `_` and `-`"
                 ),
                 "not a name",
                 Some("a column of the table is named after it".into()),

@@ -2,7 +2,7 @@
 //! valves, and the sensor that reads its stroke.
 
 use wheeleg_plant::chamber::GasModel;
-use wheeleg_plant::cylinder::{CylinderParams, ROD_MOST};
+use wheeleg_plant::cylinder::CylinderParams;
 use wheeleg_plant::endstop::EndStopParams;
 use wheeleg_plant::flow::{GasParams, Iso6358};
 use wheeleg_plant::friction::FrictionParams;
@@ -14,7 +14,6 @@ use super::sections::{
     AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
     LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection, ValveSection,
 };
-use crate::quantity::pretty;
 use crate::reader::Reader;
 
 /// Names of the sections that [`Pneumatics`] and [`Sensing`] read.
@@ -49,18 +48,14 @@ impl Pneumatics {
         let supply = r.section::<SupplySection>("supply");
         // A robot without the contact at the source has no such section.
         let source_switch = r.optional_section::<SwitchSection>("source_switch");
-        check_contacts(r, supply.as_ref(), source_switch.as_ref());
         let regulator = r.section::<FlowSection>("regulator");
         let dump_valve = r.section::<ValveSection>("dump_valve");
         let fill_valve = r.section::<ValveSection>("fill_valve");
         let vent_valve = r.section::<ValveSection>("vent_valve");
         let line = r.section::<LineSection>("line");
         let cylinder = r.section::<CylinderSection>("cylinder");
-        check_rod(r, cylinder.as_ref());
         let friction = r.section::<FrictionSection>("friction");
         let end_stop = r.section::<EndStopSection>("end_stop");
-        check_pressures(r, gas.as_ref(), supply.as_ref());
-        check_cushion(r, cylinder.as_ref(), end_stop.as_ref());
         Some(Self {
             gas: gas_params(&gas?),
             supply: supply_params(&supply?, source_switch?.as_ref(), &regulator?, &dump_valve?),
@@ -113,107 +108,6 @@ impl Sensing {
             step_ns: (numerics?.step * 1e9).round() as u64,
         })
     }
-}
-
-/// A contact opens no higher than it closes, and the one at the source closes at what the
-/// source has.
-fn check_contacts(
-    r: &mut Reader,
-    supply: Option<&SupplySection>,
-    source_switch: Option<&Option<SwitchSection>>,
-) {
-    const OPENS: &str = "a contact opens at a lower pressure than it closes";
-    const NEVER: &str = "a contact that never closes: the robot would take its supply for lost";
-    if let Some(s) = supply {
-        let most = ("supply.switch_on", s.switch_on);
-        at_most(
-            r,
-            ["supply", "switch_off"],
-            (s.switch_off, "Pa"),
-            most,
-            OPENS,
-        );
-    }
-    let Some(Some(switch)) = source_switch else {
-        return;
-    };
-    let most = ("source_switch.on", switch.on);
-    at_most(r, ["source_switch", "off"], (switch.off, "Pa"), most, OPENS);
-    if let Some(s) = supply {
-        let most = ("supply.source_pressure", s.source_pressure);
-        at_most(r, ["source_switch", "on"], (switch.on, "Pa"), most, NEVER);
-    }
-}
-
-/// Pressures fall from the source over the regulator to the surroundings, and the contact closes at
-/// what the regulator holds.
-fn check_pressures(r: &mut Reader, gas: Option<&GasSection>, supply: Option<&SupplySection>) {
-    const REGULATOR: &str = "a regulator lowers the pressure of its source, and raises none";
-    const NEVER: &str = "a contact that never closes: the supply would be taken for lost";
-    const WEAK: &str = "a supply below the surroundings moves nothing";
-    let Some(s) = supply else { return };
-    let source = ("supply.source_pressure", s.source_pressure);
-    let set = ("supply.set_pressure", s.set_pressure);
-    for (key, value) in [
-        ("set_pressure", s.set_pressure),
-        ("initial_pressure", s.initial_pressure),
-    ] {
-        at_most(r, ["supply", key], (value, "Pa"), source, REGULATOR);
-    }
-    at_most(r, ["supply", "switch_on"], (s.switch_on, "Pa"), set, NEVER);
-    if let Some(gas) = gas {
-        let ambient = (gas.ambient_pressure, "Pa");
-        at_most(r, ["gas", "ambient_pressure"], ambient, set, WEAK);
-    }
-}
-
-/// A cushion is a part of the stroke.
-fn check_cushion(
-    r: &mut Reader,
-    cylinder: Option<&CylinderSection>,
-    end_stop: Option<&EndStopSection>,
-) {
-    const WHY: &str = "a piston that begins in both cushions is braked everywhere";
-    if let (Some(c), Some(stop)) = (cylinder, end_stop) {
-        let most = ("cylinder.stroke", c.stroke * 1e3);
-        let length = (stop.cushion_length * 1e3, "mm");
-        at_most(r, ["end_stop", "cushion_length"], length, most, WHY);
-    }
-}
-
-/// A rod leaves a chamber beside it.
-fn check_rod(r: &mut Reader, cylinder: Option<&CylinderSection>) {
-    const WHY: &str = "the air of chamber B acts on what the rod leaves of the piston";
-    if let Some(c) = cylinder {
-        let name = format!("{ROD_MOST} × cylinder.bore");
-        let most = (&*name, ROD_MOST * c.bore * 1e3);
-        at_most(r, ["cylinder", "rod"], (c.rod * 1e3, "mm"), most, WHY);
-    }
-}
-
-/// Holds a value of a section against that of another field, in a unit.
-fn at_most(
-    r: &mut Reader,
-    [section, key]: [&str; 2],
-    (value, unit): (f64, &str),
-    (limit, most): (&str, f64),
-    why: &str,
-) {
-    // To the rounding of conversions.
-    if value <= most * (1.0 + 1e-9) {
-        return;
-    }
-    let field = r.table(section).and_then(|table| table.get(key));
-    r.problem(
-        field.and_then(|(key, item)| item.span().or(Some(key))),
-        format!(
-            "`{section}.{key}` = {} {unit} is out of range: allowed up to {} {unit}, which is `{limit}`",
-            pretty(value),
-            pretty(most)
-        ),
-        "out of range",
-        Some(why.to_owned()),
-    );
 }
 
 fn iso(c: f64, b: f64, m: f64, linear: f64) -> Iso6358 {

@@ -16,6 +16,7 @@ use super::suggest::closest;
 
 pub(crate) use entry::Entry;
 use entry::{Field, fields};
+pub(crate) use plain::NAME_LENGTH;
 pub(crate) use quantities::range;
 
 /// A parsed file and the problems found so far.
@@ -113,7 +114,8 @@ impl Reader {
             });
             shown.push(format!("`{path}`{value}{line}"));
         }
-        let first = fields.first().and_then(|path| self.span_of(path));
+        // A board's parameter may be left at its default.
+        let first = fields.iter().find_map(|path| self.span_of(path));
         let (last, others) = match shown.split_last() {
             Some((last, others)) if !others.is_empty() => (last.clone(), others.join(", ")),
             _ => (String::new(), shown.concat()),
@@ -140,6 +142,11 @@ impl Reader {
         Some((factor, info.unit.clone()))
     }
 
+    /// What was read so far, as written.
+    pub(crate) fn parameters(&self) -> &[ParameterInfo] {
+        &self.parameters
+    }
+
     /// Whether nothing is wrong so far.
     pub(crate) fn is_clean(&self) -> bool {
         self.problems.is_empty()
@@ -156,11 +163,6 @@ impl Reader {
         let item = self.item(table)?.as_table_like()?;
         let key = item.key(key)?;
         key.span().or_else(|| self.item(path)?.span())
-    }
-
-    /// Line of a position in the file, from 1.
-    pub(crate) fn line_of(&self, span: &Range<usize>) -> usize {
-        self.lines.of_byte(span.start)
     }
 
     fn item(&self, path: &str) -> Option<&Item> {

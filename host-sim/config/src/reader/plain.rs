@@ -6,7 +6,7 @@ use super::{Entry, Reader};
 use crate::suggest::closest;
 
 /// Longest name, in characters.
-const NAME_LENGTH: usize = 64;
+pub(crate) const NAME_LENGTH: usize = 64;
 
 /// Largest whole number that TOML can write.
 const LARGEST_OF_TOML: u64 = i64::MAX as u64;

@@ -301,12 +301,14 @@ impl Reader {
             "`{path}`{value} is in \"{unit}\"; accepted: {}",
             spec.dimension.unit_names()
         );
-        self.problem(
-            span,
-            message,
-            "wrong unit",
-            Some(format!("{path}: {}", spec.doc)),
-        );
+        let mut units = spec.dimension.units().iter().map(|(name, _)| name);
+        let help = match units.find(|name| name.eq_ignore_ascii_case(unit)) {
+            // Of a number such as 0,2 the end reads as a unit.
+            _ if unit.starts_with(',') => "numbers have a decimal point: 0.2, not 0,2".to_owned(),
+            Some(meant) => format!("did you mean \"{meant}\"? {path}: {}", spec.doc),
+            None => format!("{path}: {}", spec.doc),
+        };
+        self.problem(span, message, "wrong unit", Some(help));
         None
     }
 

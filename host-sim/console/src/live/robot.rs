@@ -357,10 +357,13 @@ impl Loop {
                 self.pace.pause(true, now);
             }
             HostCommand::Resume => self.pace.pause(false, now),
-            HostCommand::Step(cycles) => {
-                self.pace.pause(true, now);
-                self.steps = cycles;
+            HostCommand::Step(_) if !self.pace.status().paused => {
+                return Answer::Simulation(Box::new(SimError::simulation(
+                    "the clock is not paused, and steps by itself",
+                    "pause it first: `wheeleg ctl pause`",
+                )));
             }
+            HostCommand::Step(cycles) => self.steps = cycles,
             HostCommand::Speed(speed) => {
                 if self.is_held() && speed > SPEED_OF_CONTROL {
                     return Answer::TooFast;

@@ -265,12 +265,14 @@ fn a_thousand_commands_from_before_a_reconnection_are_each_refused() {
 fn a_paused_robot_takes_a_stop_and_nothing_else() {
     let rig = TestRig::new();
     let mut driver = rig.driver("driver");
+    let args = json!({ "cycles": 3 });
+    // A clock that goes steps by itself.
+    assert_eq!(refusal(&mut driver, "Step", &args), "simulation");
     done(&mut driver, "Pause");
     let paused = rig.until("paused", |state| state["pace"]["paused"] == true);
     assert_eq!(refusal(&mut driver, "Stand", &json!({})), "paused");
     let n = driver.send(json!({ "op": "stop" })).expect("sent");
     assert_eq!(driver.outcome(n), Outcome::Done);
-    let args = json!({ "cycles": 3 });
     let outcome = driver.carry_out("Step", &args, 500).expect("sent");
     assert_eq!(outcome, Outcome::Done);
     let stepped = rig.until("stopped", |state| state["emergency_stop"] == true);

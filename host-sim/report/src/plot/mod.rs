@@ -151,18 +151,29 @@ impl Figure {
     /// Writes the figure as PNG, at twice the size.
     ///
     /// # Errors
-    /// [`ReportError::NoPng`] in a program that was built without the feature `png`;
-    /// [`ReportError::Plot`] if the file cannot be written.
+    /// As [`ensure_png`]; [`ReportError::Plot`] if the file cannot be written.
     pub fn png(&self, path: &Path) -> Result<(), ReportError> {
+        ensure_png()?;
         #[cfg(feature = "png")]
-        return png::write(&self.svg(), path).map_err(|reason| ReportError::Plot {
+        png::write(&self.svg(), path).map_err(|reason| ReportError::Plot {
             figure: self.title.clone(),
             reason,
-        });
+        })?;
         #[cfg(not(feature = "png"))]
-        Err(ReportError::NoPng {
-            path: path.to_owned(),
-        })
+        let _ = path;
+        Ok(())
+    }
+}
+
+/// Refuses PNG in a program that cannot write it, before what would be drawn is computed.
+///
+/// # Errors
+/// [`ReportError::NoPng`] in a program that was built without the feature `png`.
+pub const fn ensure_png() -> Result<(), ReportError> {
+    if cfg!(feature = "png") {
+        Ok(())
+    } else {
+        Err(ReportError::NoPng)
     }
 }
 
@@ -357,6 +368,6 @@ mod tests {
         let error = figure().png(Path::new("a.png")).expect_err("not built in");
         let help = miette::Diagnostic::help(&error).expect("help").to_string();
         assert!(help.contains("--features png"), "{help}");
-        assert!(error.to_string().contains("`a.png`"), "{error}");
+        assert!(error.to_string().contains("`--png`"), "{error}");
     }
 }

@@ -5,6 +5,7 @@
 //! usual laws are stated beside each; the predictive law's own are in
 //! [`wheeleg_control::axis::AxisModel::new`].
 
+use wheeleg_config::{SENSOR_TRACK, STEPS_AT_REST};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
 use wheeleg_node::sensor::SensorConfig;
@@ -143,9 +144,10 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         valve_off: micros(c.fill_valve.t_off_s.max(c.vent_valve.t_off_s)),
         margin: micros(0.1 * c.fill_valve.t_on_s.max(1e-3)),
         line_delay: micros(c.line_delay_s),
-        // Two and a half steps of the converter: below it, rest is noise. And no less than
-        // an eighth of what the smallest pulse does: below it, rest is luck.
-        band: mm((2.5 * lsb_m).max(0.13 * free_step_m(axis)).max(2e-5)),
+        // No less than an eighth of what the smallest pulse does, too: below it, rest is luck.
+        band: mm((STEPS_AT_REST * lsb_m)
+            .max(0.13 * free_step_m(axis))
+            .max(2e-5)),
         release: PositionMm::ZERO,
         precharged: false,
         learns_mass: true,
@@ -288,8 +290,8 @@ fn sensor(axis: &AxisParams) -> SensorConfig {
     SensorConfig {
         zero: code(p.offset_m / p.electrical_stroke_m),
         full_scale: mm(p.electrical_stroke_m / p.gain),
-        code_min: code(0.01),
-        code_max: code(0.99),
+        code_min: code(SENSOR_TRACK[0]),
+        code_max: code(SENSOR_TRACK[1]),
         travel_min: mm(-BEYOND_STOP.1 - BEYOND_STOP.0 * stroke_m),
         travel_max: mm((1.0 + BEYOND_STOP.0) * stroke_m + BEYOND_STOP.1),
         step_max: PositionMm::from_int(10),

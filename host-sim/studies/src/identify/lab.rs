@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use wheeleg_config::builtin;
+use wheeleg_config::{builtin, pretty};
 use wheeleg_plant::axis::{AxisParams, TICK_US};
 
 use crate::StudyError;
@@ -15,6 +15,8 @@ const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
 const PRESSURES: [&str; 2] = ["pressure_a_bar", "pressure_b_bar"];
 /// Longest measurement, s.
 const LONGEST_S: f64 = 600.0;
+/// Largest time that a row may have, s: a clock that counts from 1970 has 2e9.
+const LATEST_S: f64 = 1e10;
 /// Longest time between two rows, ms.
 const PERIOD_MAX_MS: f64 = 100.0;
 /// Fewest rows.
@@ -44,6 +46,17 @@ pub struct Lab {
     pub samples: Vec<Sample>,
 }
 
+/// Longest text of a file that is quoted, characters.
+const QUOTED: usize = 40;
+
+/// What stands in a file, as long as anybody reads it.
+fn shown(text: &str) -> String {
+    match text.char_indices().nth(QUOTED) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 /// A place of the file in an error.
 struct At<'a> {
     file: &'a str,
@@ -69,7 +82,8 @@ impl At<'_> {
         if value >= min && value <= max {
             Ok(value)
         } else {
-            Err(self.wrong(column, &format!("{value} is outside {min} to {max}"), help))
+            let what = format!("{} is outside {min} to {max}", pretty(value));
+            Err(self.wrong(column, &what, help))
         }
     }
 }
@@ -134,7 +148,10 @@ impl Columns {
         let mut others = columns.names.iter().enumerate();
         match others.find(|(i, _)| !known.contains(i)) {
             Some((_, name)) => Err(StudyError::refused(
-                format!("{file}, line 1: the column `{name}` is not known, or stands there twice"),
+                format!(
+                    "{file}, line 1: the column `{}` is not known, or stands there twice",
+                    shown(name)
+                ),
                 help,
             )),
             None => Ok(columns),
@@ -168,17 +185,11 @@ impl Lab {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let bad = |e: &csv::Error| {
-            StudyError::refused(
-                format!("{file}: {e}"),
-                "each line has a value for each column",
-            )
-        };
-        let names = reader.headers().map_err(|e| bad(&e))?;
+        let names = reader.headers().map_err(|e| bad_row(file, &[], &e))?;
         let columns = Columns::of(file, names.iter().map(str::to_owned).collect())?;
         let mut rows = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(|e| bad(&e))?;
+            let record = record.map_err(|e| bad_row(file, &columns.names, &e))?;
             let line = record.position().map_or(0, csv::Position::line);
             rows.push((line, row(&At { file, line }, &columns, &record, axis)?));
         }
@@ -194,6 +205,26 @@ impl Lab {
         units(file, &rows, axis)?;
         ticks(file, &columns, &rows)
     }
+}
+
+/// A line that is no row of the table.
+fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
+    const HELP: &str = "each line has a value for each column, parted by commas";
+    if let csv::ErrorKind::UnequalLengths { pos, len, .. } = error.kind() {
+        let line = pos.as_ref().map_or(0, csv::Position::line);
+        let of = format!("{len} values, and the table has {} columns", columns.len());
+        return match columns.get(*len as usize) {
+            Some(missing) => {
+                At { file, line }.wrong(missing, &format!("no value: the row has {of}"), HELP)
+            }
+            None => StudyError::refused(format!("{file}, line {line}: the row has {of}"), HELP),
+        };
+    }
+    let line = error.position().map_or(1, csv::Position::line);
+    StudyError::refused(
+        format!("{file}, line {line}: it is no row of a CSV table"),
+        HELP,
+    )
 }
 
 /// A row as it stands.
@@ -212,22 +243,25 @@ fn row(
     record: &csv::StringRecord,
     axis: &AxisParams,
 ) -> Result<Row, StudyError> {
-    let number = |column: usize| {
+    let number = |column: usize, [min, max]: [f64; 2]| {
         let (name, text) = (&columns.names[column], record.get(column).unwrap_or(""));
         let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
         value.ok_or_else(|| {
-            at.wrong(
-                name,
-                &format!("\"{text}\" is no number"),
-                "a number with a decimal point",
-            )
+            let what = match text {
+                "" => "there is no value".to_owned(),
+                text => format!("\"{}\" is no number", shown(text)),
+            };
+            let help = format!("a number with a decimal point, from {min} to {max}");
+            at.wrong(name, &what, &help)
         })
+    };
+    let ranged = |column: usize, range: [f64; 2], help: &str| {
+        at.within(&columns.names[column], number(column, range)?, range, help)
     };
     let stroke_mm = axis.cylinder.stroke_m * 1e3;
     let most_mm = stroke_mm * (1.0 + BEYOND);
-    let position_mm = at.within(
-        "position_mm",
-        number(columns.position)?,
+    let position_mm = ranged(
+        columns.position,
         [-BEYOND * stroke_mm, most_mm],
         "positions are strokes in mm, 0 where the rod is in; the axis file has the cylinder's stroke",
     )?;
@@ -245,9 +279,10 @@ fn row(
         } else {
             "a state is 0 or 1"
         };
-        let value = at.within(name, number(column)?, [0.0, most], help)?;
+        let value = ranged(column, [0.0, most], help)?;
         if value.fract() != 0.0 {
-            return Err(at.wrong(name, &format!("{value} is no whole number"), help));
+            let what = format!("{} is no whole number", pretty(value));
+            return Err(at.wrong(name, &what, help));
         }
         *on = if columns.on_times {
             value as u16
@@ -255,25 +290,24 @@ fn row(
             value as u16 * TICK_US
         };
     }
-    let pressure = |column: usize| {
-        let help = "pressures are absolute, in bar";
-        at.within(&columns.names[column], number(column)?, [0.1, 20.0], help)
-    };
+    let pressure = |column: usize| ranged(column, [0.1, 20.0], "pressures are absolute, in bar");
     let pressure_pa = match columns.pressures {
         Some([a, b]) => Some([pressure(a)? * 1e5, pressure(b)? * 1e5]),
         None => None,
     };
     let load_n = match columns.load {
-        Some(column) => Some(at.within(
-            "load_n",
-            number(column)?,
-            [-1e4, 1e4],
-            "a force in N, positive extends",
-        )?),
+        Some(column) => {
+            let help = "a force in N, positive extends";
+            Some(ranged(column, [-1e4, 1e4], help)?)
+        }
         None => None,
     };
     Ok(Row {
-        time_s: number(columns.time)?,
+        time_s: ranged(
+            columns.time,
+            [-LATEST_S, LATEST_S],
+            "times are in seconds, from any begin",
+        )?,
         position_m: position_mm * 1e-3,
         on_us,
         pressure_pa,
@@ -318,16 +352,20 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
     let most = if columns.on_times { 1.0 } else { PERIOD_MAX_MS };
     let step = period_ms.round();
     if !(1.0..=most).contains(&step) || (period_ms - step).abs() > 0.05 {
-        let what = format!("{period_ms:.3} ms after the first row; allowed: whole ms, 1 to {most}");
+        let what = format!(
+            "{} ms after the first row; allowed: whole ms, 1 to {most}",
+            pretty(period_ms)
+        );
         return Err(at(rows[1].0).wrong("time_s", &what, help));
     }
     for (k, (line, row)) in rows.iter().enumerate() {
         let due_ms = k as f64 * step;
         if (ms(row) - due_ms).abs() > 0.3 * step {
             let what = format!(
-                "{} is {:.3} ms after the begin, and should be {due_ms} ms",
-                row.time_s,
-                ms(row)
+                "{} s is {} ms after the begin, and should be {} ms",
+                pretty(row.time_s),
+                pretty(ms(row)),
+                pretty(due_ms)
             );
             return Err(at(*line).wrong("time_s", &what, help));
         }

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_report::output::Folder;
-use wheeleg_report::plot::Figure;
+use wheeleg_report::plot::{Figure, ensure_png};
 use wheeleg_report::{page, subfolder};
 
 pub use progress::STACK;
@@ -131,8 +131,12 @@ impl Job {
     /// `previous`, `previous-2`, …
     ///
     /// # Errors
-    /// [`StudyError::Report`] if the folder is in use or cannot be written.
+    /// [`StudyError::Report`] if the folder is in use or cannot be written, or if PNG is asked for of a
+    /// program without it.
     pub fn begin(name: &str, settings: &Settings) -> Result<Self, StudyError> {
+        if settings.png {
+            ensure_png()?;
+        }
         settings.stop.begin();
         Ok(Self {
             folder: Folder::prepare(&settings.out)?,

@@ -28,7 +28,7 @@ fn wrong(file: &str, p: &AxisParams) -> Vec<(String, String)> {
             format!("{file}: `{field}` = {value} is out of range for this axis: allowed {allowed}");
         wrong.push((what, why));
     };
-    let (c, pot) = (&p.cylinder, &p.potentiometer);
+    let c = &p.cylinder;
     let gauge_pa = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
     let left_n = force_left_n(p);
     if left_n <= 0.0 {
@@ -67,32 +67,6 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
             "a joint board measures a piston a margin beyond its stops, too: up to its `sensor_max`".into(),
         );
     }
-    // Where the wiper stands with the rod out.
-    let reach_m = pot.offset_m + c.stroke_m * pot.gain;
-    if reach_m > 0.99 * pot.electrical_stroke_m {
-        refuse(
-            "sensor.potentiometer.electrical_stroke",
-            format!("{:.1} mm", pot.electrical_stroke_m * 1e3),
-            format!("at least {:.1} mm", reach_m / 0.99 * 1e3),
-            "the wiper must stay within 99 % of the track over the whole cylinder.stroke, or the board takes it for a broken wire".into(),
-        );
-    }
-    if pot.offset_m < 0.01 * pot.electrical_stroke_m {
-        refuse(
-            "sensor.potentiometer.offset",
-            format!("{:.1} mm", pot.offset_m * 1e3),
-            format!("at least {:.1} mm", 0.01 * pot.electrical_stroke_m * 1e3),
-            "the wiper must stay above 1 % of the track with the rod in, or the board takes it for a short circuit".into(),
-        );
-    }
-    if p.initial_stroke_m > c.stroke_m {
-        refuse(
-            "start.stroke",
-            format!("{:.1} mm", p.initial_stroke_m * 1e3),
-            format!("0 to {:.1} mm", c.stroke_m * 1e3),
-            "the piston must start within cylinder.stroke".into(),
-        );
-    }
     wrong
 }
 
@@ -123,18 +97,8 @@ mod tests {
             text.contains("`friction.static`") && text.contains("less than 158.3 N"),
             "{text}"
         );
-        let text = message(|p| p.potentiometer.electrical_stroke_m = 0.18);
-        assert!(
-            text.contains("electrical_stroke") && text.contains("at least 191.9 mm"),
-            "{text}"
-        );
-        // A standard stroke is one that a board can be told, if the sensor is long enough.
-        let long = |stroke_m: f64| {
-            message(|p| {
-                p.cylinder.stroke_m = stroke_m;
-                p.potentiometer.electrical_stroke_m = stroke_m + 0.03;
-            })
-        };
+        // A standard stroke is one that a board can be told.
+        let long = |stroke_m: f64| message(|p| p.cylinder.stroke_m = stroke_m);
         assert_eq!(long(0.5), "");
         let text = long(0.51);
         assert!(
@@ -142,19 +106,9 @@ mod tests {
             "{text}"
         );
         // All at once.
-        let text = message(|p| p.cylinder.stroke_m = 0.6);
+        let text = message(|p| (p.cylinder.stroke_m, p.load_n) = (0.6, 120.0));
         assert!(
-            text.contains("`cylinder.stroke`") && text.contains("electrical_stroke"),
-            "{text}"
-        );
-        let text = message(|p| p.potentiometer.offset_m = 0.001);
-        assert!(
-            text.contains("offset") && text.contains("at least 2.0 mm"),
-            "{text}"
-        );
-        let text = message(|p| p.initial_stroke_m = 0.2);
-        assert!(
-            text.contains("`start.stroke`") && text.contains("0 to 180.0 mm"),
+            text.contains("`cylinder.stroke`") && text.contains("`moving.load`"),
             "{text}"
         );
     }

@@ -217,8 +217,9 @@ fn combinations(comparison: &Comparison) -> String {
 }
 
 fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
+    let settings = settings(&args.out, args.drawing.png)?;
     let single = compare::play(id, axes)?;
-    let finished = single.write(&settings(&args.out, args.drawing.png)?)?;
+    let finished = single.write(&settings)?;
     let text = |finished: &Finished<Vec<PathBuf>>| {
         let mut out = finished.summary.clone();
         for figure in &finished.result {

@@ -37,6 +37,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand};
 
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
+use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
@@ -180,6 +181,9 @@ struct Drawing {
 
 /// Where a study's results go; from here on signals stop it.
 fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
+    if png {
+        ensure_png()?;
+    }
     Ok(Settings {
         out: out.to_owned(),
         png,

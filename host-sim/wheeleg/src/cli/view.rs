@@ -22,11 +22,17 @@ pub(super) struct ViewArgs {
         long,
         value_name = "S",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = seconds
     )]
     from: f64,
     /// Its end [default: that of the log].
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "S",
+        allow_negative_numbers = true,
+        value_parser = seconds
+    )]
     to: Option<f64>,
     /// Another signal to draw, such as /joint/3.force_net_n; may be given several times.
     /// `wheeleg channels` lists them.
@@ -38,6 +44,12 @@ pub(super) struct ViewArgs {
     /// The page [default: beside the first log, log.html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+}
+
+/// A time of a log.
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|s| s.is_finite());
+    number.ok_or_else(|| "allowed are seconds with a decimal point, such as 0.1".to_owned())
 }
 
 /// Makes the page and says where it is.
