@@ -112,8 +112,19 @@ fn driven() -> Vec<Driven> {
 /// Values as a program prints them for itself.
 const DEBUG: [&str; 8] = ["Some(", "None", "Ok(", "Err(", " { ", "::", "..=", "Error"];
 
+/// Robots are run for some of them, which takes a stack as the program has it.
+fn on_its_stack(test: fn()) {
+    let thread = std::thread::Builder::new().stack_size(16 << 20);
+    let ended = thread.spawn(test).expect("a thread").join();
+    ended.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+}
+
 #[test]
 fn every_error_has_a_code_its_subject_and_a_remedy_in_words() {
+    on_its_stack(every_error_is_told);
+}
+
+fn every_error_is_told() {
     for (name, error, words) in driven() {
         let text = error.to_string();
         assert!(error.code().is_some(), "{name}: no code");
@@ -170,6 +181,10 @@ const ELSEWHERE: [(&str, &str); 4] = [
 /// passes an error on.
 #[test]
 fn no_error_is_left_out() {
+    on_its_stack(the_lists_are_whole);
+}
+
+fn the_lists_are_whole() {
     let (mut diagnostics, mut reasons) = (BTreeSet::new(), BTreeSet::new());
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut folders: Vec<PathBuf> = ["host-sim", "firmware", "protocol"]

@@ -161,7 +161,7 @@ fn robots(folder: &Path, all: &mut Vec<Driven>) {
     let mut late = robot();
     late.start_up.limit_s = 0.05;
     let late = failure(&stand, &late, &folder.join("late"));
-    let words = vec!["did not get ready in 0.0", "finding the boards"];
+    let words = vec!["did not get ready in 0.0", "(stage: arming)"];
     all.push(("SimError::NotReady", Box::new(late), words));
     let fallen = || {
         let mut robot = robot();
