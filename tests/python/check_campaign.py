@@ -1,12 +1,32 @@
-"""Opens the table of a campaign with DuckDB and asks it the questions of campaign.sql.
+"""Opens the table of a shipped campaign with DuckDB and asks it the plan's questions.
 
-Usage: check_campaign.py CASES.parquet CAMPAIGN.sql ROWS
+Usage: check_campaign.py CASES.parquet QUESTIONS.sql ROWS
 """
 
 import json
 import sys
 
 import duckdb
+
+
+def check_spread(rows, failed, robots, supplies, pairs, worst) -> None:
+    assert sum(row[1] for row in robots) == rows, robots
+    assert sum(row[2] for row in supplies) == rows, supplies
+    assert sum(row[2] for row in pairs) == rows // 2, pairs
+    assert failed == rows - sum(row[2] for row in robots), robots
+    assert len(worst) == min(5, failed), worst
+
+
+def check_steep(rows, failed, climbed, ends) -> None:
+    assert len(climbed) == len({row[:3] for row in climbed}) > 1, climbed
+    for *_, always, ever in climbed:
+        assert always is None or ever >= always, climbed
+    # A slope of 4 degrees of rock is climbed, one of 21 degrees of ash is not.
+    assert all(row[3] == 4 for row in climbed if row[0] == "rock"), climbed
+    assert all(row[4] != 21 for row in climbed if row[0] == "loose-ash"), climbed
+    assert sum(row[2] for row in ends) == failed > 0, ends
+    for _, _, lost, *reasons in ends:
+        assert sum(reasons) >= lost, ends
 
 
 def main() -> int:
@@ -32,13 +52,12 @@ def main() -> int:
     with open(sql, encoding="utf-8") as file:
         statements = duckdb.extract_statements(file.read())
     answers = [connection.execute(statement).fetchall() for statement in statements]
-    robots, supplies, pairs, worst = answers
-    assert sum(row[1] for row in robots) == rows, robots
-    assert sum(row[2] for row in supplies) == rows, supplies
-    assert sum(row[2] for row in pairs) == rows // 2, pairs
-    failed = rows - sum(row[2] for row in robots)
-    assert len(worst) == min(5, failed), worst
-    print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {robots}")
+    failed = connection.execute(
+        "SELECT count(*) FROM read_parquet(?) WHERE NOT coalesce(passed, false)", [table]
+    ).fetchone()[0]
+    check = {"three-step-spread": check_spread, "how-steep": check_steep}[plan["name"]]
+    check(rows, failed, *answers)
+    print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {answers[0]}")
     return 0
 
 

@@ -3,17 +3,46 @@
 mod slurm;
 
 use std::fs;
+use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 
 use crate::process::{cargo, command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
-/// Samples of the shipped plan in the suite's check of its SQL, a case in each of two cells.
-const SAMPLES: u32 = 5;
+/// A shipped plan, its questions in SQL, how it is cut short for the suite, and the rows that are left.
+struct Shipped {
+    plan: &'static str,
+    sql: &'static str,
+    cuts: &'static [(&'static str, &'static str)],
+    rows: u32,
+}
 
-/// The shipped plan, cut short, its table and its SQL in DuckDB.
+const SHIPPED: [Shipped; 2] = [
+    Shipped {
+        plan: "three-step-spread",
+        sql: "campaign",
+        cuts: &[("samples = 100", "samples = 5")],
+        rows: 10,
+    },
+    Shipped {
+        plan: "how-steep",
+        sql: "how-steep",
+        cuts: &[
+            ("replicates = 5", "replicates = 1"),
+            ("[4, 6, 8, 10, 12, 15, 18, 21]", "[4, 21]"),
+            (
+                r#"["rock", "firm-sand", "volcanic-sand", "dry-sand", "loose-ash"]"#,
+                r#"["rock", "loose-ash"]"#,
+            ),
+            ("[15, 60]", "[60]"),
+        ],
+        rows: 8,
+    },
+];
+
+/// The shipped plans, cut short, their tables and their SQL in DuckDB.
 pub(crate) fn steps(report: &mut Report) {
     report.step("campaign: the shipped SQL in DuckDB", || {
         let folder = target_dir().join("xtask").join("campaign");
@@ -22,32 +51,44 @@ pub(crate) fn steps(report: &mut Report) {
         }
         fs::create_dir_all(&folder)?;
         rust::build(&["--bin", "wheeleg"])?;
-        let wheeleg = target_dir().join("release").join("wheeleg");
-        let plan = fs::read_to_string(root().join("host-sim/campaigns/three-step-spread.toml"))
-            .context("the shipped plan")?;
-        let short = folder.join("plan.toml");
-        fs::write(
-            &short,
-            plan.replace("samples = 100", &format!("samples = {SAMPLES}")),
-        )?;
-        let (parts, table) = (folder.join("parts"), folder.join("cases.parquet"));
-        run(command(&wheeleg)
-            .args(["campaign", "run"])
-            .arg(&short)
-            .arg("--out")
-            .arg(&parts))?;
-        run(command(&wheeleg)
-            .args(["campaign", "merge"])
-            .arg(&parts)
-            .arg("--out")
-            .arg(&table))?;
-        run(command(tools::python()?)
-            .arg("tests/python/check_campaign.py")
-            .arg(&table)
-            .arg("host-sim/campaigns/campaign.sql")
-            .arg((2 * SAMPLES).to_string()))?;
+        for shipped in &SHIPPED {
+            ask(shipped, &folder)?;
+        }
         Ok(())
     });
+}
+
+fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
+    let wheeleg = target_dir().join("release").join("wheeleg");
+    let campaigns = root().join("host-sim/campaigns");
+    let mut plan = fs::read_to_string(campaigns.join(format!("{}.toml", shipped.plan)))
+        .context("the shipped plan")?;
+    for (whole, short) in shipped.cuts {
+        if !plan.contains(whole) {
+            return Err(anyhow!("{} has no `{whole}`", shipped.plan).into());
+        }
+        plan = plan.replace(whole, short);
+    }
+    let short = folder.join(format!("{}.toml", shipped.plan));
+    fs::write(&short, plan)?;
+    let parts = folder.join(shipped.plan);
+    let table = folder.join(format!("{}.parquet", shipped.plan));
+    run(command(&wheeleg)
+        .args(["campaign", "run"])
+        .arg(&short)
+        .arg("--out")
+        .arg(&parts))?;
+    run(command(&wheeleg)
+        .args(["campaign", "merge"])
+        .arg(&parts)
+        .arg("--out")
+        .arg(&table))?;
+    run(command(tools::python()?)
+        .arg("tests/python/check_campaign.py")
+        .arg(&table)
+        .arg(campaigns.join(format!("{}.sql", shipped.sql)))
+        .arg(shipped.rows.to_string()))?;
+    Ok(())
 }
 
 /// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash. Then

@@ -32,11 +32,11 @@ pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
     "walk", "sand-flat", "sand-slope-10", "sand-slope-20", "dry-sand-slope-20", "rocks-20", "rocks-30",
     "rock-30-single", "rock-30-boulder", "rock-slope", "turn", "spin", "wall-30", "pit", "sand-to-rock",
     "frozen-layer-1", "sand-slope-10-legs-idle", "sand-slope-20-legs-idle", "rock-30-single-legs-idle",
-    "slope-10", "rock-field", "height-map",
+    "slope-10", "climb", "rock-field", "height-map",
 );
 
 /// Plans of campaigns: name, file name for messages, text.
-pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread");
+pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread", "how-steep");
 
 /// Data files of scenarios: name, content.
 pub const DATA: &[(&str, &[u8])] = &[(
