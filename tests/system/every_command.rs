@@ -235,14 +235,15 @@ impl Inputs {
 }
 
 /// Commands that neither write nor compute for long, and why they are not on the list.
-const BRIEF: [(&str, &str); 23] = [
+const BRIEF: [(&str, &str); 24] = [
     ("list", "prints"),
     ("params", "prints"),
     ("faults list", "prints"),
+    ("faults rows", "prints"),
     ("channels", "prints"),
     ("commands", "prints"),
     ("commission", "asks boards for a moment, and prints"),
-    ("check", "compares within a second, and prints"),
+    ("check vectors", "compares within a second, and prints"),
     ("interface", "prints"),
     ("campaign submit", "prints, or hands over to a scheduler"),
     ("campaign status", "prints"),
@@ -318,7 +319,9 @@ fn no_command_is_left_out() {
     let mut wrong = Vec::new();
     for (name, help) in &found {
         let brief = BRIEF.iter().any(|(brief, _)| brief == name);
+        // The folder of `campaign submit` is written by the shards that it hands over.
         let writes = ["--out", "--recordings"].iter().any(|o| help.contains(o));
+        let writes = writes && name != "campaign submit";
         if is_tried(name) == brief || (writes && brief) {
             wrong.push(name);
         }

@@ -152,9 +152,9 @@ fn the_longest_standard_stroke_is_tuned() {
         let said = String::from_utf8_lossy(&told.stderr);
         for word in [
             "`cylinder.stroke` = 600",
-            "up to 499.9 mm",
+            "up to 500.88 mm",
             "`sensor.potentiometer.electrical_stroke` = 512",
-            "allowed from 613.1 mm",
+            "allowed from 612.2 mm",
         ] {
             assert!(said.contains(word), "{command:?}, {word}: {said}");
         }
@@ -162,6 +162,7 @@ fn the_longest_standard_stroke_is_tuned() {
     }
     let mut long = rodless(600.0);
     long.push(("sensor.potentiometer.electrical_stroke", 640.0, "mm"));
+    long.push(("sensor.potentiometer.offset", 7.0, "mm"));
     let path = axis(folder.path(), HEAVY, &long);
     let told = wheeleg(commands[0], &path);
     assert_eq!(told.status.code(), Some(2));
