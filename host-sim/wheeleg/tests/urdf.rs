@@ -244,7 +244,7 @@ fn a_bad_robot_is_an_answer() {
         (
             file.to_str().expect("UTF-8"),
             changed.as_str(),
-            "they make no leg",
+            "`body.crank` = 0.05 m",
         ),
         (file.to_str().expect("UTF-8"), "name = 3", "not usable"),
         ("wheeleg-2033", "", "did you mean `wheeleg-2003`"),
