@@ -311,15 +311,21 @@ fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
     const SMALL: usize = 75_000;
     const LARGE: usize = 8 * SMALL;
     let axis = config().axis;
+    // The quickest of three: other programs make a reading longer, never shorter.
     let seconds = |rows: usize| {
         let mut text = String::from("time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us\n");
         for k in 0..rows {
             let time_s = k as f64 * 1e-3;
             let _ = writeln!(text, "{time_s:.3},{},{},0,0,0", 40 + k % 100, k % 1000);
         }
-        let begun = std::time::Instant::now();
-        let lab = Lab::parse("large.csv", &text, &axis);
-        (begun.elapsed().as_secs_f64(), lab)
+        let read = || {
+            let begun = std::time::Instant::now();
+            let lab = Lab::parse("large.csv", &text, &axis);
+            (begun.elapsed().as_secs_f64(), lab)
+        };
+        let tries = [read(), read(), read()];
+        let quickest = tries.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        quickest.expect("three")
     };
     let (small_s, small) = seconds(SMALL);
     let (large_s, large) = seconds(LARGE);

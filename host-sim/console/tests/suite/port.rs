@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 use wheeleg_config::builtin;
@@ -95,7 +96,16 @@ fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
     }
     done(&mut driver, "TakeControl");
     driver.keep_control(true);
-    done(&mut driver, "Arm");
+    // A board that a busy computer kept from answering is lost for a moment.
+    let begin = Instant::now();
+    loop {
+        match driver.carry_out("Arm", &json!({}), 1000).expect("sent") {
+            Outcome::Done => break,
+            Outcome::Refused { reason, .. } => assert_eq!(reason, "board_missing"),
+            other => panic!("{other:?}"),
+        }
+        assert!(begin.elapsed() < Duration::from_secs(20), "not armed");
+    }
     let all = json!({ "op": "subscribe", "channels": ["/joint/3"], "hz": "all" });
     let n = driver.send(all).expect("sent");
     assert_eq!(driver.outcome(n), Outcome::Done);
