@@ -135,7 +135,8 @@ def hidden_page(page, robot):
 
 def server_again(program, home, console, page, browser):
     """The server ends and is there again, under the same address and keys."""
-    listen = console.address.removeprefix("http://")
+    # At the name that it is told the relay listens.
+    listen = "127.0.0.1:" + console.address.rsplit(":", 1)[1]
     console.end()
     page.wait_for_selector(".banner:not(.alarm):not([hidden])", timeout=5000)
     expect("reload" in page.inner_text(".banner:not(.alarm)"), "a server that is gone is not told")

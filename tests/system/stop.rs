@@ -441,6 +441,29 @@ fn a_second_run_in_a_folder_is_refused_by_name_of_the_lock_and_the_first_loses_n
     assert!(next.status.success());
 }
 
+/// What is at the place of the lock and is none is not written to.
+#[test]
+fn a_lock_that_is_a_link_or_somebody_elses_file_is_refused() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let precious = folder.path().join("precious");
+    fs::write(&precious, "of somebody").expect("written");
+    for is_link in [true, false] {
+        let out = folder.path().join(format!("link-{is_link}"));
+        fs::create_dir(&out).expect("made");
+        let lock = out.join(".lock");
+        if is_link {
+            std::os::unix::fs::symlink(&precious, &lock).expect("linked");
+        } else {
+            fs::copy(&precious, &lock).expect("copied");
+        }
+        let refused = end(start(&out, &["run", "stand"], Stdio::piped));
+        assert_eq!(refused.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(said.contains(".lock"), "{said}");
+        assert_eq!(fs::read_to_string(&lock).expect("there"), "of somebody");
+    }
+}
+
 /// Standard output is no folder.
 #[cfg(target_os = "linux")]
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 
-use crate::process::{command, run, target_dir};
+use crate::process::{command, output, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::{rust, tools};
 
@@ -82,15 +82,17 @@ pub(crate) fn client(report: &mut Report) {
     });
 }
 
-/// Boards that are a process of their own, led over a pseudo-terminal.
-pub(crate) fn port(report: &mut Report) {
-    report.step("console of boards at a line", || {
-        rust::build(&["--bin", "wheeleg"])?;
-        run(command(tools::python()?)
+/// Boards that are a process of their own, led over a pseudo-terminal. On a computer that is busy with something else they
+/// miss cycles, as they should, and nothing is compared.
+pub(crate) fn port() -> StepResult<String> {
+    rust::build(&["--bin", "wheeleg"])?;
+    let told = output(
+        command(tools::python()?)
             .arg("tests/python/check_port.py")
-            .arg(target_dir().join("release").join("wheeleg")))?;
-        Ok(())
-    });
+            .arg(target_dir().join("release").join("wheeleg")),
+    )?;
+    let last = told.lines().last().unwrap_or_default();
+    Ok(last.to_owned())
 }
 
 /// A robot looked at by a client of Foxglove's protocol, from its published text alone.

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::process::{cargo, figures, output, run, target_dir};
 use crate::report::{Report, StepResult};
-use crate::{campaign, fuzz, mutants, pil, record, rust, tools};
+use crate::{browser, campaign, fuzz, mutants, pil, record, rust, tools};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 19] = [
+const CHECKS: [Check; 20] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -111,6 +111,12 @@ const CHECKS: [Check; 19] = [
         "three steps on eight emulated boards, times real time, while nobody else is at work",
         3,
         pil::speed,
+    ),
+    Check(
+        "port",
+        "three steps, a killed server and boards that are gone, over a pseudo-terminal, while nobody else is at work",
+        5,
+        browser::port,
     ),
     Check(
         "aarch64",

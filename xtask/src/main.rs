@@ -169,7 +169,6 @@ fn test(report: &mut Report) {
     browser::steps(report, run.as_deref());
     browser::client(report);
     browser::viewer(report);
-    browser::port(report);
     rigid_body::steps(report);
     plant::steps(report);
     campaign::steps(report);

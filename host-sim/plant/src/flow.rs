@@ -155,8 +155,9 @@ impl Iso6358 {
         let k2 = (c1 / c2) * (c1 / c2);
         let beta2 = (1.0 - b1) * (1.0 - b1);
         let denominator = beta2 + k2;
-        let r = (k2 * b1 + (k2 * k2 * b1 * b1 - denominator * k2 * (b1 * b1 - beta2)).sqrt())
-            / denominator;
+        // Below 0, k2 β² (β² + k2 − b1²): the upstream path chokes first, by far.
+        let discriminant = k2 * k2 * b1 * b1 - denominator * k2 * (b1 * b1 - beta2);
+        let r = (k2 * b1 + discriminant.max(0.0).sqrt()) / denominator;
         let c = if r <= b1 { c1 } else { c2 * r };
         let b = 1.0 - c * c * ((1.0 - b1) / (c1 * c1) + (1.0 - b2) / (c2 * c2));
         Self {
@@ -363,8 +364,11 @@ mod tests {
     fn series_choked_flow_agrees_with_two_paths_solved_numerically() {
         let gas = air();
         let t = gas.reference_temperature_k.sqrt();
-        for (c1, c2) in [(1.0, 1.0), (1.0, 3.0), (3.0, 1.0), (1.0, 0.2)] {
-            let a = Iso6358::new(c1 * 1e-8, 0.3);
+        let ratios = [(1.0, 1.0), (1.0, 3.0), (3.0, 1.0), (1.0, 0.2), (1.0, 100.0)];
+        // Upstream of a wide path one that chokes late does so first.
+        let all = [0.0, 0.3, 0.55, 0.9].map(|b1| ratios.map(|(c1, c2)| (b1, c1, c2)));
+        for (b1, c1, c2) in all.into_iter().flatten() {
+            let a = Iso6358::new(c1 * 1e-8, b1);
             let b = Iso6358::new(c2 * 1e-8, 0.25);
             let (ra, rb) = (Restrictor::new(&a, &gas), Restrictor::new(&b, &gas));
             let pair = Restrictor::new(&a.in_series(&b), &gas);
@@ -381,7 +385,7 @@ mod tests {
             let ours = pair.mass_flow_kg_s(7e5, t, 1e3, t);
             assert!(
                 (ours / exact - 1.0).abs() < 1e-6,
-                "{c1} {c2}: {ours} {exact}"
+                "{b1} {c1} {c2}: {ours} {exact}"
             );
         }
     }

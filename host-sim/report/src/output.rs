@@ -116,10 +116,22 @@ fn remove_empty(folders: &[PathBuf]) {
     }
 }
 
+/// Begin of what stands in a lock.
+const HOLDER: &str = "process ";
+
 /// Opens the lock file and locks it; who holds it stands in it, for the message to others.
 fn lock(path: &Path) -> Result<File, ReportError> {
     let failed = |e: std::io::Error| ReportError::output("lock", path, e);
+    let foreign = |what: &str| {
+        failed(std::io::Error::other(format!(
+            "{what}: move it away, or choose another folder"
+        )))
+    };
     let open = || {
+        // What a link leads to belongs to somebody else.
+        if path.is_symlink() {
+            return Err(foreign("it is a link"));
+        }
         let mut options = OpenOptions::new();
         options.create(true).truncate(false).read(true).write(true);
         options.open(path).map_err(failed)
@@ -139,10 +151,19 @@ fn lock(path: &Path) -> Result<File, ReportError> {
         }
         file = open()?;
     }
+    let mut text = Vec::new();
+    let longest = HOLDER.len() as u64 + 21;
+    std::io::Read::by_ref(&mut file)
+        .take(longest)
+        .read_to_end(&mut text)
+        .map_err(failed)?;
+    if !text.is_empty() && !text.starts_with(HOLDER.as_bytes()) {
+        return Err(foreign("it is no lock of this program"));
+    }
     // Written in any case: the time of the file is the start of the run.
     file.set_len(0).map_err(failed)?;
     file.rewind().map_err(failed)?;
-    writeln!(file, "process {}", std::process::id()).map_err(failed)?;
+    writeln!(file, "{HOLDER}{}", std::process::id()).map_err(failed)?;
     Ok(file)
 }
 

@@ -10,7 +10,7 @@ use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
 use wheeleg_node::sensor::SensorConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_protocol::param::JointParam;
+use wheeleg_protocol::param::{JointParam, ParamInfo};
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
 use super::commission::value;
@@ -273,12 +273,13 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
 /// Beyond its stops a piston is measured to this share of its stroke, and this much more \[m\].
 const BEYOND_STOP: (f64, f64) = (0.02, 0.005);
 
-/// The longest stroke that a board can be told \[m\]: its range of travel is that of
-/// `sensor_max`.
+/// The longest stroke that a board can be told \[m\]: that of `stroke_max`, and what lies within
+/// `sensor_max` with the way beyond the stops.
 #[must_use]
 pub fn longest_stroke_m() -> f64 {
-    let row = JointParam::SensorMax.info();
-    (value(row, row.max) * 1e-3 - BEYOND_STOP.1) / (1.0 + BEYOND_STOP.0)
+    let most = |row: &ParamInfo| value(row, row.max) * 1e-3;
+    let measured = (most(JointParam::SensorMax.info()) - BEYOND_STOP.1) / (1.0 + BEYOND_STOP.0);
+    measured.min(most(JointParam::StrokeMax.info()))
 }
 
 /// Calibration of the axis's position sensor, as commissioning would find it.
