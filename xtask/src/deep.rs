@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 20] = [
+const CHECKS: [Check; 21] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -111,6 +111,12 @@ const CHECKS: [Check; 20] = [
         "three steps on eight emulated boards, times real time, while nobody else is at work",
         3,
         pil::speed,
+    ),
+    Check(
+        "lines",
+        "the console's page whose line, server or view is gone, while nobody else is at work",
+        5,
+        browser::lines,
     ),
     Check(
         "port",
