@@ -9,10 +9,13 @@ mod moved;
 mod standing;
 mod table;
 
+use std::cell::LazyCell;
+
 use wheeleg_plant::{PlantError, PlantParams};
 
 pub use laws::{SENSOR_TRACK, STEPS_AT_REST};
 pub(crate) use moved::Moved;
+use standing::AtRest;
 pub use table::RELATIONS;
 
 use crate::params::ParameterInfo;
@@ -49,7 +52,9 @@ enum Rule {
     /// Something else of the fields, or of the cylinder that they make.
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
     /// Something of the whole robot, where nothing else is wrong.
-    Whole(fn(&Facts<'_>, &PlantParams) -> Option<Broken>),
+    Whole(fn(&PlantParams) -> Option<Broken>),
+    /// The same of the robot at rest in its start pose.
+    AtRest(fn(&AtRest) -> Option<Broken>),
 }
 
 /// A relation that does not hold.
@@ -100,7 +105,8 @@ impl Facts<'_> {
 }
 
 impl Relation {
-    fn check(&self, facts: &Facts<'_>, whole: Option<&PlantParams>) -> Option<Broken> {
+    /// Of the relations of fields those that do not hold.
+    fn check(&self, facts: &Facts<'_>) -> Option<Broken> {
         let first = self.fields[0];
         let value = |i: usize| facts.si(self.fields[i]);
         let allowed = |word: &str, limit: f64, of: &str| Broken {
@@ -138,7 +144,7 @@ impl Relation {
                 (value(0)? <= sum).then(|| allowed("above", sum, &of))
             }
             Rule::Law(law) => law(facts, self),
-            Rule::Whole(law) => law(facts, whole?),
+            Rule::Whole(_) | Rule::AtRest(_) => None,
         }
     }
 
@@ -156,31 +162,37 @@ impl Relation {
 /// Reports every relation that does not hold: of the listed values, of the cylinder with what it
 /// moves, and of the robot, if it is one.
 pub(crate) fn check(r: &mut Reader, moved: Option<&Moved<'_>>, robot: Option<&PlantParams>) {
-    let of_fields = |relation: &&Relation| !matches!(relation.rule, Rule::Whole(_));
     let facts = Facts {
         parameters: r.parameters(),
         moved,
     };
     let found: Vec<(&Relation, Broken)> = RELATIONS
         .iter()
-        .filter(of_fields)
-        .filter_map(|relation| Some((relation, relation.check(&facts, None)?)))
+        .filter_map(|relation| Some((relation, relation.check(&facts)?)))
         .collect();
     for (relation, broken) in &found {
         relation.report(r, broken);
     }
-    for relation in RELATIONS.iter().filter(|relation| !of_fields(relation)) {
-        // What the others name, this would name less well.
-        if !r.is_clean() {
-            return;
-        }
-        let facts = Facts {
-            parameters: r.parameters(),
-            moved,
+    // What the others name, these would name less well: the first alone is told.
+    let Some(robot) = robot.filter(|_| r.is_clean()) else {
+        return;
+    };
+    let facts = Facts {
+        parameters: r.parameters(),
+        moved,
+    };
+    // A rest is looked for once, and only where a leg closes.
+    let at_rest = LazyCell::new(|| AtRest::new(&facts, robot));
+    let found = RELATIONS.iter().find_map(|relation| {
+        let broken = match relation.rule {
+            Rule::Whole(law) => law(robot),
+            Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
+            _ => None,
         };
-        if let Some(broken) = relation.check(&facts, robot) {
-            relation.report(r, &broken);
-        }
+        Some((relation, broken?))
+    });
+    if let Some((relation, broken)) = found {
+        relation.report(r, &broken);
     }
 }
 

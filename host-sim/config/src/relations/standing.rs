@@ -9,7 +9,7 @@ use super::{Broken, Facts};
 use crate::quantity::brief;
 
 /// A leg closes its loop, where it starts and over the whole stroke of its yaw cylinder.
-pub(super) fn closes(_: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
+pub(super) fn closes(robot: &PlantParams) -> Option<Broken> {
     let start_m = robot.initial_stroke_m[0];
     let open = |yaw_m: f64| {
         let mut turned = robot.clone();
@@ -29,28 +29,35 @@ pub(super) fn closes(_: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
     })
 }
 
-/// The robot in the pose in which the gait begins, as a run sets it down: one leg drawn back, the other
-/// held.
-fn set_down(f: &Facts<'_>, robot: &PlantParams) -> Option<PlantParams> {
-    let [yaw, stroke, s5, s6] =
-        ["yaw_s2", "stroke", "held_leg_s5", "held_leg_s6"].map(|key| f.si(&format!("gait.{key}")));
-    let (yaw_m, stroke_m, s5_m, s6_m) = (yaw?, stroke?, s5?, s6?);
-    let mut posed = robot.clone();
-    posed.initial_stroke_m = [yaw_m, 0.0, stroke_m, yaw_m, s5_m, s6_m];
-    Some(posed)
+/// The robot at rest on level ground in the pose in which the gait begins, as a run sets it down: one
+/// leg drawn back, the other held.
+pub(super) struct AtRest {
+    robot: PlantParams,
+    plant: Plant,
+    state: Result<PlantState, PlantError>,
 }
 
-/// The robot at rest on level ground; `None` where the plant cannot be built.
-fn at_rest(robot: &PlantParams) -> Option<(Plant, Result<PlantState, PlantError>)> {
-    let plant = Plant::new(robot).ok()?;
-    let state = plant.initial_state(0);
-    Some((plant, state))
+impl AtRest {
+    /// `None` where the plant cannot be built, or a field of the pose is missing.
+    pub(super) fn new(f: &Facts<'_>, robot: &PlantParams) -> Option<Self> {
+        let [yaw, stroke, s5, s6] = ["yaw_s2", "stroke", "held_leg_s5", "held_leg_s6"]
+            .map(|key| f.si(&format!("gait.{key}")));
+        let (yaw_m, stroke_m, s5_m, s6_m) = (yaw?, stroke?, s5?, s6?);
+        let mut robot = robot.clone();
+        robot.initial_stroke_m = [yaw_m, 0.0, stroke_m, yaw_m, s5_m, s6_m];
+        let plant = Plant::new(&robot).ok()?;
+        let state = plant.initial_state(0);
+        Some(Self {
+            robot,
+            plant,
+            state,
+        })
+    }
 }
 
 /// The robot stands where it starts.
-pub(super) fn stands(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
-    let robot = &set_down(f, robot)?;
-    let (_, Err(PlantError::NotStanding)) = at_rest(robot)? else {
+pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
+    let Err(PlantError::NotStanding) = state else {
         return None;
     };
     let lengths_m = std::array::from_fn(|leg| {
@@ -84,11 +91,14 @@ pub(super) fn stands(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
 }
 
 /// Pistons under full pressure hold what a robot at rest needs of them.
-pub(super) fn carried(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
-    let robot = &set_down(f, robot)?;
-    let (plant, state) = at_rest(robot)?;
-    let mechanics = &plant.assembly.mechanics;
-    let needed_n = mechanics.holding_forces_n(&state.ok()?.core.motion).ok()?;
+pub(super) fn carried(at_rest: &AtRest) -> Option<Broken> {
+    let AtRest {
+        robot,
+        plant,
+        state,
+    } = at_rest;
+    let motion = &state.as_ref().ok()?.core.motion;
+    let needed_n = plant.assembly.mechanics.holding_forces_n(motion).ok()?;
     let (full_pa, empty_pa) = (robot.supply.set_pressure_pa, robot.gas.ambient_pressure_pa);
     let names = ["yaw", "horizontal", "vertical"].into_iter().cycle();
     for ((cylinder, needed_n), name) in plant.assembly.cylinders.iter().zip(needed_n).zip(names) {

@@ -134,6 +134,6 @@ pub const RELATIONS: &[Relation] = &[
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
     // The whole robot.
     relation("closed leg", &["body.crank", "body.p4", "body.stroke_zero", "start.yaw.stroke", "cylinder.stroke", "body.min_cos_theta3"], "they make no leg", Rule::Whole(standing::closes)),
-    relation("standing", &["body.chassis_com", "body.chassis_mass", "body.o4", "body.foot_pad", "body.wheel_radius", "body.stroke_zero", "gait.stroke", "gait.held_leg_s5", "gait.held_leg_s6", "body.gravity", "contact.stiffness", "wheel_contact.stiffness"], "the robot does not stand on its wheels and feet in its start pose, on level ground", Rule::Whole(standing::stands)),
-    relation("carried by its air", &["supply.set_pressure", "cylinder.bore", "cylinder.rod", "body.chassis_mass", "body.chassis_com", "body.gravity"], "the cylinders cannot carry the robot", Rule::Whole(standing::carried)),
+    relation("standing", &["body.chassis_com", "body.chassis_mass", "body.o4", "body.foot_pad", "body.wheel_radius", "body.stroke_zero", "gait.stroke", "gait.held_leg_s5", "gait.held_leg_s6", "body.gravity", "contact.stiffness", "wheel_contact.stiffness"], "the robot does not stand on its wheels and feet in its start pose, on level ground", Rule::AtRest(standing::stands)),
+    relation("carried by its air", &["supply.set_pressure", "cylinder.bore", "cylinder.rod", "body.chassis_mass", "body.chassis_com", "body.gravity"], "the cylinders cannot carry the robot", Rule::AtRest(standing::carried)),
 ];
