@@ -56,7 +56,7 @@ def main() -> int:
     failed = connection.execute(
         "SELECT count(*) FROM read_parquet(?) WHERE NOT coalesce(passed, false)", [table]
     ).fetchone()[0]
-    check = {"campaign": check_spread, "how-steep": check_steep}[Path(sql).stem]
+    check = {"three-step-spread": check_spread, "how-steep": check_steep}[Path(sql).stem]
     check(rows, failed, *answers)
     print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {answers[0]}")
     return 0

@@ -73,8 +73,7 @@ fn console(check: &str) -> StepResult<Command> {
 
 /// A page whose line, server or view is gone: what is late in it is told by clocks on the wall.
 pub(crate) fn lines() -> StepResult<String> {
-    let told = output(&mut console("tests/python/check_console_lines.py")?)?;
-    Ok(told.lines().last().unwrap_or_default().to_owned())
+    last_line(&mut console("tests/python/check_console_lines.py")?)
 }
 
 /// A robot driven by a program of its own, with the client that we give away.
@@ -92,13 +91,17 @@ pub(crate) fn client(report: &mut Report) {
 /// miss cycles, as they should, and nothing is compared.
 pub(crate) fn port() -> StepResult<String> {
     rust::build(&["--bin", "wheeleg"])?;
-    let told = output(
+    last_line(
         command(tools::python()?)
             .arg("tests/python/check_port.py")
             .arg(target_dir().join("release").join("wheeleg")),
-    )?;
-    let last = told.lines().last().unwrap_or_default();
-    Ok(last.to_owned())
+    )
+}
+
+/// What a check says of itself at its end.
+fn last_line(check: &mut Command) -> StepResult<String> {
+    let told = output(check)?;
+    Ok(told.lines().last().unwrap_or_default().to_owned())
 }
 
 /// A robot looked at by a client of Foxglove's protocol, from its published text alone.

@@ -11,10 +11,9 @@ use crate::process::{cargo, command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
-/// A shipped plan, its questions in SQL, how it is cut short for the suite, and the rows that are left.
+/// A shipped plan, with its questions in SQL beside it: how it is cut short for the suite, and the rows that are left.
 struct Shipped {
     plan: &'static str,
-    sql: &'static str,
     cuts: &'static [(&'static str, &'static str)],
     rows: u32,
 }
@@ -22,13 +21,11 @@ struct Shipped {
 const SHIPPED: [Shipped; 2] = [
     Shipped {
         plan: "three-step-spread",
-        sql: "campaign",
         cuts: &[("samples = 100", "samples = 5")],
         rows: 10,
     },
     Shipped {
         plan: "how-steep",
-        sql: "how-steep",
         cuts: &[
             ("replicates = 5", "replicates = 1"),
             ("[4, 6, 8, 10, 12, 15, 18, 21]", "[4, 21]"),
@@ -86,7 +83,7 @@ fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
     run(command(tools::python()?)
         .arg("tests/python/check_campaign.py")
         .arg(&table)
-        .arg(campaigns.join(format!("{}.sql", shipped.sql)))
+        .arg(campaigns.join(format!("{}.sql", shipped.plan)))
         .arg(shipped.rows.to_string()))?;
     Ok(())
 }

@@ -308,9 +308,18 @@ mod tests {
         AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
     }
 
-    /// A chamber of `length_mm` whose valves are open for these shares of each period, and a piston that stands.
-    fn followed(model: &AxisModel, mut chamber: Chamber, open: [u16; 2], periods: u32) -> Chamber {
-        let length = model.length_a(90 << 16);
+    /// What follows of a chamber in so many periods, with valves open for these times in each of them.
+    fn followed(
+        model: &AxisModel,
+        mut chamber: Chamber,
+        motion: &ChamberMotion,
+        open: [u16; 2],
+        periods: u32,
+    ) -> Chamber {
+        let sent = Sent {
+            plan: [0; 2],
+            external: open,
+        };
         for number in 0..periods {
             let begin = number * 4000;
             let period = Period {
@@ -318,18 +327,18 @@ mod tests {
                 next: begin + 4000,
                 moment: begin + 2500,
             };
-            let motion = ChamberMotion {
-                flow: model.flow_a,
-                lengths: [length; 2],
-                speeds: [0; 2],
-            };
-            let sent = Sent {
-                plan: [0; 2],
-                external: open,
-            };
-            chamber.update(model, &period, &motion, sent);
+            chamber.update(model, &period, motion, sent);
         }
         chamber
+    }
+
+    /// A piston that stands in mid-stroke.
+    fn at_rest(model: &AxisModel) -> ChamberMotion {
+        ChamberMotion {
+            flow: model.flow_a,
+            lengths: [model.length_a(90 << 16); 2],
+            speeds: [0; 2],
+        }
     }
 
     /// Wherever the pressure was, filling ends at the supply and venting at the atmosphere; the bounds hold it
@@ -343,7 +352,7 @@ mod tests {
                 let mut chamber = Chamber::new(start, unknown);
                 let mut width = model.supply - model.ambient;
                 for _ in 0..400 {
-                    chamber = followed(&model, chamber, open, 1);
+                    chamber = followed(&model, chamber, &at_rest(&model), open, 1);
                     let [low, high] = chamber.bounds;
                     assert!(low <= chamber.pressure + 256 && chamber.pressure <= high + 256);
                     assert!(low <= high && high - low <= width);
@@ -360,7 +369,7 @@ mod tests {
     fn a_chamber_that_is_shut_keeps_its_pressure_and_its_bounds() {
         let model = model();
         let start = Chamber::new(model.mean, [model.ambient, model.supply]);
-        let chamber = followed(&model, start, [0, 0], 50);
+        let chamber = followed(&model, start, &at_rest(&model), [0, 0], 50);
         assert_eq!(
             (chamber.pressure, chamber.bounds),
             (start.pressure, start.bounds)
@@ -370,22 +379,13 @@ mod tests {
     /// Bounds, and the pressure, of a chamber that is shut while the piston makes it shorter at this speed for 2 s.
     fn compressed(speed_mm_s: i32) -> Chamber {
         let model = model();
-        let mut chamber = Chamber::new(model.mean, [model.ambient, model.supply]);
-        for number in 0..500 {
-            let begin = number * 4000;
-            let period = Period {
-                begin,
-                next: begin + 4000,
-                moment: begin + 2500,
-            };
-            let motion = ChamberMotion {
-                flow: model.flow_a,
-                lengths: [90 << 16; 2],
-                speeds: [speed_mm_s << 16; 2],
-            };
-            chamber.update(&model, &period, &motion, Sent::default());
-        }
-        chamber
+        let chamber = Chamber::new(model.mean, [model.ambient, model.supply]);
+        let motion = ChamberMotion {
+            flow: model.flow_a,
+            lengths: [90 << 16; 2],
+            speeds: [speed_mm_s << 16; 2],
+        };
+        followed(&model, chamber, &motion, [0; 2], 500)
     }
 
     /// 2.1 MPa: the power of that at the fastest speed of the format is below 2^28, as those of the valves.

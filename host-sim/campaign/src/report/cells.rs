@@ -1,6 +1,6 @@
 //! Rows by the cell of the grid that they are in.
 
-use wheeleg_config::plan::{Plan, Value, Values};
+use wheeleg_config::plan::{Factor, Plan, Value, Values};
 
 use crate::table::{Data, Table};
 
@@ -15,11 +15,21 @@ pub(super) struct Cell {
     pub(super) rows: Vec<usize>,
 }
 
-/// Names of the factors that have a list.
+/// The factors that have a list, with it.
+pub(super) fn listed(plan: &Plan) -> impl Iterator<Item = (&Factor, &[Value])> {
+    plan.factors
+        .iter()
+        .filter_map(|factor| match &factor.values {
+            Values::Grid(values) => Some((factor, values.as_slice())),
+            Values::Drawn(_) => None,
+        })
+}
+
+/// Their names.
 pub(super) fn grid(plan: &Plan) -> Vec<String> {
-    let factors = plan.factors.iter();
-    let listed = factors.filter(|factor| matches!(factor.values, Values::Grid(_)));
-    listed.map(|factor| factor.name.clone()).collect()
+    listed(plan)
+        .map(|(factor, _)| factor.name.clone())
+        .collect()
 }
 
 /// The value that a row has of a factor.

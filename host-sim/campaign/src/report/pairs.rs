@@ -112,12 +112,10 @@ pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignEr
 /// Each value of a paired factor against its first, where all else is the same.
 pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired> {
     let table = &merged.table;
-    let grid = cells::grid(plan);
     let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
     let mut found = Vec::new();
-    for (place, name) in grid.iter().enumerate() {
-        let factor = plan.factors.iter().find(|factor| factor.name == *name);
-        if !factor.is_some_and(|factor| factor.paired) {
+    for (place, (factor, _)) in cells::listed(plan).enumerate() {
+        if !factor.paired {
             continue;
         }
         let values: Vec<_> = cells
@@ -149,7 +147,7 @@ pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired
                 let pairs = after.rows.iter();
                 rows.extend(pairs.filter_map(|row| Some((*known.get(&key(row))?, *row))));
             }
-            let what = format!("{name} {other} against {first}");
+            let what = format!("{} {other} against {first}", factor.name);
             found.push(paired(what, merged, merged, &rows));
         }
     }

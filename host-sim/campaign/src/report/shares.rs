@@ -1,10 +1,10 @@
 //! The share of cases that meet all required targets, over a factor with a list of numbers.
 
-use wheeleg_config::plan::{Factor, Plan, Value, Values};
+use wheeleg_config::plan::{Factor, Plan, Value};
 use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
 
 use super::Merged;
-use super::cells::Cell;
+use super::cells::{self, Cell};
 
 /// Values of a factor from which on a curve says more than a table.
 const CURVE: usize = 3;
@@ -13,8 +13,8 @@ const HEIGHT: u32 = 110;
 
 /// A curve for each combination of the other listed factors, a panel for each value of the one of
 /// them that has most values. None of a plan without such a list, or with more curves than there are colours.
-pub(super) fn figure(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Option<Figure> {
-    let listed: Vec<(&Factor, &[Value])> = plan.factors.iter().filter_map(list).collect();
+pub(super) fn figure(merged: &Merged, plan: &Plan, all: &[Cell]) -> Option<Figure> {
+    let listed: Vec<(&Factor, &[Value])> = cells::listed(plan).collect();
     let most = |fits: &dyn Fn(usize) -> bool| {
         let places = (0..listed.len()).filter(|place| fits(*place));
         // The first of those that have as many.
@@ -29,7 +29,7 @@ pub(super) fn figure(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Option<Fig
     let passed = merged.table.flags("passed");
     let (mut panels, mut curves) = (Vec::<Value>::new(), Vec::<String>::new());
     let mut points = Vec::new();
-    for cell in cells {
+    for cell in all {
         let Some(Value::Number(at)) = cell.values.get(x) else {
             continue;
         };
@@ -77,13 +77,6 @@ pub(super) fn figure(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Option<Fig
         caption: "Share of all cases of a cell; the table above has its interval.".to_owned(),
         panels: drawn,
     })
-}
-
-fn list(factor: &Factor) -> Option<(&Factor, &[Value])> {
-    match &factor.values {
-        Values::Grid(values) => Some((factor, values)),
-        Values::Drawn(_) => None,
-    }
 }
 
 /// The place of a value in a list, which gets it if it has not got it.

@@ -64,7 +64,7 @@ friction at {:.2} bar gauge; raise supply.set_pressure or cylinder.bore, or take
             "cylinder.stroke",
             format!("{:.1} mm", c.stroke_m * 1e3),
             format!("up to {:.1} mm", longest_m * 1e3),
-            "a joint board measures a piston a margin beyond its stops, too: up to its `sensor_max`".into(),
+            "a joint board takes a stroke up to its `stroke_max` and measures a margin beyond its stops, up to its `sensor_max`".into(),
         );
     }
     wrong
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(long(0.5), "");
         let text = long(0.51);
         assert!(
-            text.contains("`cylinder.stroke` = 510.0 mm") && text.contains("up to 509.8 mm"),
+            text.contains("`cylinder.stroke` = 510.0 mm") && text.contains("up to 500.0 mm"),
             "{text}"
         );
         // All at once.

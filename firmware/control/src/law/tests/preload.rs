@@ -2,22 +2,33 @@
 
 use super::*;
 
+/// A move to `reference` mm is announced, `after` ticks from now.
+fn announced(reference: i16, after: u32, now: JointInput) -> JointInput {
+    JointInput {
+        announced: Some(Announced {
+            reference: PositionMm::from_int(reference),
+            after: Ticks(after),
+        }),
+        ..now
+    }
+}
+
+/// A law that has seen its piston stand at `position` mm for so many ticks, with valves open for these times.
+fn held(model: &AxisModel, ticks: u16, position: i16, on: [u16; 4]) -> Predictive {
+    let mut law = Predictive::new(model);
+    for _ in 0..ticks {
+        law.observe(model, PositionMm::from_int(position));
+        law.external_on_times(&on);
+    }
+    law
+}
+
 /// An announced move is awaited by the edge of slipping, and forgotten with its end.
 #[test]
 fn an_announced_move_vents_the_counter_chamber() {
     let model = model();
-    let mut law = Predictive::new(&model);
-    for _ in 0..400 {
-        law.observe(&model, PositionMm::from_int(90));
-        law.external_on_times(&[1000, 0, 1000, 0]);
-    }
-    let announced = JointInput {
-        announced: Some(Announced {
-            reference: PositionMm::from_int(150),
-            after: Ticks(200),
-        }),
-        ..input(90, 90)
-    };
+    let mut law = held(&model, 400, 90, [1000, 0, 1000, 0]);
+    let announced = announced(150, 200, input(90, 90));
     let mut vented = 0;
     for _ in 0..200 {
         vented += u32::from(law.drive(&model, &announced).on[3]);
@@ -34,19 +45,9 @@ fn an_announced_move_vents_the_counter_chamber() {
 #[test]
 fn a_preload_that_is_there_sends_no_pulse() {
     let model = model();
-    let announced = JointInput {
-        announced: Some(Announced {
-            reference: PositionMm::from_int(150),
-            after: Ticks(200),
-        }),
-        ..input(90, 90)
-    };
+    let announced = announced(150, 200, input(90, 90));
     let pulses = |wander: i32| {
-        let mut law = Predictive::new(&model);
-        for _ in 0..400 {
-            law.observe(&model, PositionMm::from_int(90));
-            law.external_on_times(&[1000, 0, 1000, 0]);
-        }
+        let mut law = held(&model, 400, 90, [1000, 0, 1000, 0]);
         for _ in 0..1000 {
             law.drive(&model, &announced);
         }
@@ -69,19 +70,9 @@ fn a_preload_that_is_there_sends_no_pulse() {
 #[test]
 fn a_preload_is_there_once_the_counter_chamber_has_vented() {
     let model = model();
-    let announced = JointInput {
-        announced: Some(Announced {
-            reference: PositionMm::from_int(18),
-            after: Ticks(800),
-        }),
-        ..input(180, 183)
-    };
+    let announced = announced(18, 800, input(180, 183));
     for load in [-30_000, -15_000, 0, 15_000, 30_000] {
-        let mut law = Predictive::new(&model);
-        for _ in 0..800 {
-            law.observe(&model, PositionMm::from_int(180));
-            law.external_on_times(&[1000, 0, 0, 1000]);
-        }
+        let mut law = held(&model, 800, 180, [1000, 0, 0, 1000]);
         law.observer.motion.load = load;
         for _ in 0..800 {
             law.drive(&model, &announced);
@@ -105,13 +96,7 @@ fn a_preload_acts_until_an_eighth_of_the_friction_is_missing() {
     let awaited = |missing: i32| {
         let (model, mut law) = at_a_stop(900, 0, 5);
         law.standstill.seat(true);
-        let announced = JointInput {
-            announced: Some(Announced {
-                reference: PositionMm::from_int(150),
-                after: Ticks(200),
-            }),
-            ..input(90, 90)
-        };
+        let announced = announced(150, 200, input(90, 90));
         let made = model.pressure_force(law.observer.expected());
         law.preload.acts = true;
         law.observer.motion.load = 5_000 - missing - made;
@@ -128,13 +113,7 @@ fn the_force_of_a_preload_is_half_the_friction() {
         let (model, mut law) = at_a_stop(900, 0, if reference_mm > 90 { -40 } else { 40 });
         law.standstill.seat(true);
         law.observer.motion.load = load;
-        let announced = JointInput {
-            announced: Some(Announced {
-                reference: PositionMm::from_int(reference_mm),
-                after: Ticks(200),
-            }),
-            ..input(90, 90)
-        };
+        let announced = announced(reference_mm, 200, input(90, 90));
         law.preload(&model, &announced, true)
     };
     assert_eq!(awaited(150, 0), Some(Awaited::Force(5_000)));
@@ -150,13 +129,7 @@ fn a_preload_ends_when_the_piston_has_moved_by_two_bands() {
         let mut law = Predictive::new(&model);
         law.observer.start_at(90 << 16);
         law.standstill.seat(true);
-        let announced = JointInput {
-            announced: Some(Announced {
-                reference: PositionMm::from_int(150),
-                after: Ticks(200),
-            }),
-            ..input(90, 90)
-        };
+        let announced = announced(150, 200, input(90, 90));
         assert!(law.preload(&model, &announced, true).is_some());
         law.observer.motion.stroke += (moved_hundredths << 16) / 100;
         law.preload(&model, &announced, true).is_some()
