@@ -135,7 +135,6 @@ def hidden_page(page, robot):
 
 def server_again(program, home, console, page, browser):
     """The server ends and is there again, under the same address and keys."""
-    # At the name that it is told the relay listens.
     listen = "127.0.0.1:" + console.address.rsplit(":", 1)[1]
     console.end()
     page.wait_for_selector(".banner:not(.alarm):not([hidden])", timeout=5000)
@@ -188,8 +187,9 @@ def main(program, folder, _axe=None):
         home = Path(home)
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         console = Console(program, home, "127.0.0.1:0", "--name", NEAR)
-        listen = console.address.removeprefix("http://")
-        port = int(listen.rsplit(":", 1)[1])
+        # The address that the server prints is the relay's: who watches comes past it.
+        port = int(console.address.rsplit(":", 1)[1])
+        listen = f"127.0.0.1:{port}"
         try:
             with Relay((NEAR, port), ("127.0.0.1", port)) as relay, Robot(listen, console.keys["view"], role="view") as robot:
                 page = opened(browser, console, f"#k={console.keys['control']}", address=f"http://{NEAR}:{port}")

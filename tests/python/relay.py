@@ -1,6 +1,7 @@
 """A line between a client and a server that can go dead, or be late."""
 
 import asyncio
+import contextlib
 import threading
 import time
 
@@ -22,8 +23,15 @@ class Relay:
         return self
 
     def __exit__(self, *_):
+        asyncio.run_coroutine_threadsafe(self._end(), self.loop).result(5)
         self.loop.call_soon_threadsafe(self.loop.stop)
         self.thread.join(5)
+
+    async def _end(self):
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _client(self, reader, writer):
         try:
@@ -31,7 +39,9 @@ class Relay:
         except OSError:
             writer.close()
             return
-        await asyncio.gather(self._pump(reader, to_server, False), self._pump(from_server, writer, True))
+        # The library's own callback would call the end of the check an error.
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.gather(self._pump(reader, to_server, False), self._pump(from_server, writer, True))
 
     async def _pump(self, reader, writer, late):
         waiting = asyncio.Queue()
