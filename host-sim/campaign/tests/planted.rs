@@ -217,6 +217,15 @@ fn a_killed_process_loses_no_more_than_it_has_not_saved() {
     assert_eq!((state.rows, state.partial), (2000, 0));
     assert_eq!((state.begun, state.unsaved), (0, 0));
     let left = std::fs::read_dir(folder.path().join("parts")).expect("there");
-    assert_eq!(left.count(), 2, "the part and who made it");
+    let left = left.map(|entry| {
+        entry
+            .expect("entry")
+            .file_name()
+            .to_string_lossy()
+            .into_owned()
+    });
+    // A file that was being written when its process was killed has a name that nobody reads.
+    let left: Vec<String> = left.filter(|name| !name.starts_with('.')).collect();
+    assert_eq!(left.len(), 2, "the part and who made it: {left:?}");
     println!("planted: of {KILLS} killed processes none lost more than {most_lost} cases: ok");
 }
