@@ -5,7 +5,7 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::process::{command, figures, root, run, target_dir};
 use crate::report::{Report, StepResult};
@@ -86,6 +86,7 @@ fn installed() -> StepResult<PathBuf> {
         .arg(&wheels)
         .env("CARGO", cargo))?;
     let wheel = only_file(&wheels)?;
+    for_any_linux(&wheel)?;
     let venv = folder.join("venv");
     run(command(&suite).args(["-m", "venv"]).arg(&venv))?;
     let python = tools::python_in(&venv);
@@ -105,6 +106,20 @@ fn installed() -> StepResult<PathBuf> {
     // What the wheel says it needs must be there, in a version that it accepts.
     run(command(&python).args(["-m", "pip", "check", "--disable-pip-version-check"]))?;
     Ok(python)
+}
+
+/// One wheel for every Python from 3.10 on, and for every Linux whose C library is not older than the
+/// tag says. A tag without a version would be for this computer alone.
+fn for_any_linux(wheel: &Path) -> Result<()> {
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    let tags = ["-cp310-abi3-", "manylinux_2_"];
+    ensure!(
+        !cfg!(target_os = "linux") || tags.iter().all(|tag| name.contains(tag)),
+        "the wheel is {name}: it should bear {}",
+        tags.join(" and ")
+    );
+    println!("    wheel: {name}");
+    Ok(())
 }
 
 fn only_file(folder: &Path) -> Result<PathBuf> {

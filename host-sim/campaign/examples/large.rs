@@ -59,6 +59,7 @@ fn main() {
         stop: Stop::default(),
         program: None,
         json: false,
+        save_every: wheeleg_campaign::SAVE_EVERY,
     };
     let begun = Instant::now();
     let large = plan(500_000);

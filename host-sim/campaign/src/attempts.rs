@@ -92,6 +92,11 @@ impl Attempts {
         self.known.get(&case).copied().unwrap_or_default()
     }
 
+    /// What was known of every case that was begun.
+    pub(crate) fn all(&self) -> impl Iterator<Item = (u64, Known)> + '_ {
+        self.known.iter().map(|(case, known)| (*case, *known))
+    }
+
     /// Adds a line.
     pub(crate) fn note(&self, case: u64, event: Event) -> Result<(), CampaignError> {
         let line = Line {

@@ -79,7 +79,7 @@ impl<'a> Cases<'a> {
         &self.columns
     }
 
-    /// Simulated time of the first case, s.
+    /// Time of the first case's scenario, s, without its start-up.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         let setup = self.case(0).setup;

@@ -39,6 +39,9 @@ pub struct Column {
     pub min: Option<f64>,
     /// Upper limit of a target.
     pub max: Option<f64>,
+    /// Whether it is a target that a case must meet to pass.
+    #[serde(default)]
+    pub required: bool,
 }
 
 impl Column {
@@ -50,6 +53,21 @@ impl Column {
             meaning: meaning.to_owned(),
             min: None,
             max: None,
+            required: false,
+        }
+    }
+
+    /// The limits of a target in words, after a comma; empty where it has none.
+    pub(crate) fn limits(&self) -> String {
+        let unit = match self.unit.as_str() {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        match (self.min, self.max) {
+            (Some(min), Some(max)) => format!(", allowed {min} to {max}{unit}"),
+            (Some(min), None) => format!(", allowed from {min}{unit}"),
+            (None, Some(max)) => format!(", allowed up to {max}{unit}"),
+            (None, None) => String::new(),
         }
     }
 }
@@ -127,6 +145,11 @@ impl Columns {
             let case = resolver.resolve(&values)?;
             for target in Analyser::new(&case.scenario, &case.robot).finish().targets {
                 if targets.contains(&target.id) {
+                    // Of several scenarios one may ask for what another only tells.
+                    let known = all.iter_mut().find(|column| column.name == target.id);
+                    if let Some(known) = known {
+                        known.required |= target.required;
+                    }
                     continue;
                 }
                 let verdict = format!("{}.pass", target.id);
@@ -134,6 +157,7 @@ impl Columns {
                 all.push(Column {
                     min: target.min,
                     max: target.max,
+                    required: target.required,
                     ..Column::new(&target.id, Kind::Number, target.unit, &target.description)
                 });
                 all.push(Column::new(&verdict, Kind::Flag, "", &meaning));

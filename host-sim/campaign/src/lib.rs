@@ -20,6 +20,7 @@
 
 mod attempts;
 mod cases;
+mod causes;
 mod columns;
 mod compute;
 mod draw;
@@ -44,6 +45,7 @@ mod table;
 mod work;
 
 pub use cases::{Case, Cases, Place};
+pub use causes::{Cause, Causes};
 pub use columns::{Column, Columns, Kind};
 pub use compute::Simulate;
 pub use draw::Draws;
@@ -51,11 +53,11 @@ pub use draw::quantile::quantile;
 pub use error::CampaignError;
 pub use identity::CaseId;
 pub use isolate::isolated;
-pub use merge::{Merged, merge};
+pub use merge::{Merged, merge, merge_partial};
 pub use program::program;
 pub use replay::{Replayed, replay};
 pub use row::{Figure, Row, Status};
-pub use run::{Options, Ran, run};
+pub use run::{Options, Ran, SAVE_EVERY, run};
 pub use shard::Shard;
 pub use simulate::{Outcome, simulate};
 pub use status::{State, status};

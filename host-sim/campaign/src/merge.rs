@@ -1,5 +1,6 @@
 //! One table of all parts.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -8,7 +9,8 @@ use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Stop;
 
 use crate::columns::{Columns, FACT};
-use crate::part::{PLAN, PROGRAM};
+use crate::part::{self, PLAN, PROGRAM};
+use crate::row::{self, Row};
 use crate::store::Store;
 use crate::table::{Data, GROUP_ROWS, Table, TableWriter};
 use crate::{CampaignError, Cases, host};
@@ -18,6 +20,8 @@ use crate::{CampaignError, Cases, host};
 pub struct Merged {
     /// Rows.
     pub rows: u64,
+    /// Cases of the plan without one: 0 unless they were allowed to be missing.
+    pub missing: u64,
     /// BLAKE3 over case, status, log hash and the bits of all figures, in the order of the plan,
     /// hexadecimal. Programs that compute the same have the same, however the work was shared.
     pub hash: String,
@@ -36,6 +40,28 @@ const NAMED: usize = 12;
 pub fn merge(
     folders: &[PathBuf],
     out: &Path,
+    stop: &Stop,
+) -> Result<Option<Merged>, CampaignError> {
+    table_of(folders, out, false, stop)
+}
+
+/// The same of the cases that have a row, those of blocks that are not finished among them: of a
+/// pilot, or while others are at work.
+///
+/// # Errors
+/// As [`merge`]; [`CampaignError::Incomplete`] only if no case has a row.
+pub fn merge_partial(
+    folders: &[PathBuf],
+    out: &Path,
+    stop: &Stop,
+) -> Result<Option<Merged>, CampaignError> {
+    table_of(folders, out, true, stop)
+}
+
+fn table_of(
+    folders: &[PathBuf],
+    out: &Path,
+    partial: bool,
     stop: &Stop,
 ) -> Result<Option<Merged>, CampaignError> {
     let stores: Vec<Store> = folders
@@ -73,7 +99,7 @@ pub fn merge(
     // From here on there is something to take away.
     stop.begin();
     let facts = [plan_text.as_str(), &first.plan().program];
-    let written = write([&temporary, out], &stores, &columns, facts, stop);
+    let written = write([&temporary, out], &stores, &columns, facts, (partial, stop));
     let result = written.and_then(|merged| {
         if merged.is_some() && !is_same(&temporary, out) {
             make_room(out)?;
@@ -167,13 +193,31 @@ impl Holes {
     }
 }
 
+/// The rows that there are of a block that is not finished, in the order of the plan.
+fn unfinished(block: u64, stores: &[Store], columns: &Columns) -> Option<(PathBuf, Table)> {
+    let mut rows = BTreeMap::new();
+    for store in stores {
+        for path in store.partials(block) {
+            // What cannot be read is set aside when the block is computed.
+            let Ok((found, _)) = part::read(&path, &store.plan().hash) else {
+                continue;
+            };
+            let cases = store.cases_of(block);
+            let found = found.into_iter().filter(|row| cases.contains(&row.index));
+            rows.extend(found.map(|row| (row.index, row)));
+        }
+    }
+    let rows: Vec<Row> = rows.into_values().collect();
+    (!rows.is_empty()).then(|| (stores[0].part(block), row::table(columns, &rows)))
+}
+
 /// Writes the table of all blocks to `to`, each part read once; messages name `out`, which it becomes.
 fn write(
     [to, out]: [&Path; 2],
     stores: &[Store],
     columns: &Columns,
     [plan_text, program]: [&str; 2],
-    stop: &Stop,
+    (partial, stop): (bool, &Stop),
 ) -> Result<Option<Merged>, CampaignError> {
     let failed = |e: std::io::Error| CampaignError::output("write", out, e);
     let full = |e: parquet::errors::ParquetError| failed(std::io::Error::other(e.to_string()));
@@ -190,10 +234,15 @@ fn write(
         if stop.is_asked() {
             return Ok(None);
         }
-        let Some((path, table)) = holes.find(block, stores) else {
+        let found = holes.find(block, stores);
+        let found = match found {
+            None if partial => unfinished(block, stores, columns),
+            found => found,
+        };
+        let Some((path, table)) = found else {
             continue;
         };
-        if !holes.blocks.is_empty() {
+        if !partial && !holes.blocks.is_empty() {
             // Nothing comes of the table: what else is missing is looked for alone.
             continue;
         }
@@ -208,7 +257,7 @@ fn write(
             group = Table::empty(columns.all.clone());
         }
     }
-    if !holes.blocks.is_empty() {
+    if !holes.blocks.is_empty() && (!partial || rows == 0) {
         return Err(holes.told(&stores[0]));
     }
     if group.rows() > 0 {
@@ -219,6 +268,7 @@ fn write(
     file.sync_all().map_err(failed)?;
     Ok(Some(Merged {
         rows,
+        missing: stores[0].plan().cases - rows,
         hash: hasher.finalize().to_hex().to_string(),
     }))
 }

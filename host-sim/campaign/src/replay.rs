@@ -164,7 +164,7 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             for block in blocks {
                 match part::read(&store.part(block), &store.plan().hash) {
                     Ok((found, _)) => rows.extend(found),
-                    Err(_) => rows.extend(store.kept_rows(block)?),
+                    Err(_) => rows.extend(store.kept_rows(block)?.0),
                 }
             }
             Ok(rows)

@@ -7,7 +7,7 @@ use crate::identity::CaseId;
 use crate::table::{Data, Table};
 
 /// How a case ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// It ran to its end.
     Ok,
@@ -30,6 +30,11 @@ impl Status {
         Self::Crashed,
         Self::Limit,
     ];
+
+    /// That of a name in a table.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
 
     /// As the table has it.
     #[must_use]

@@ -1,15 +1,18 @@
 //! How far a campaign is, from its files alone.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::CampaignError;
+use crate::attempts::Attempts;
+use crate::causes::Causes;
 use crate::part;
 use crate::row::Status;
 use crate::shard::Shard;
 use crate::store::Store;
 
 /// What a folder holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct State {
     /// Cases of the plan, or of the shard.
     pub cases: u64,
@@ -17,8 +20,14 @@ pub struct State {
     pub rows: u64,
     /// Of these, in files of blocks that are not finished.
     pub partial: u64,
+    /// Cases without a row that a process has begun: it is at them, or was ended in them.
+    pub begun: u64,
+    /// Cases whose row is in no file: of a process that has not saved it yet, or was killed before.
+    pub unsaved: u64,
     /// Rows that missed a required target or have no result.
     pub failed: u64,
+    /// Why they did.
+    pub causes: Causes,
     /// Rows by [`Status::ALL`].
     pub by_status: [u64; 5],
     /// Blocks without a part.
@@ -36,7 +45,10 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
         cases: 0,
         rows: 0,
         partial: 0,
+        begun: 0,
+        unsaved: 0,
         failed: 0,
+        causes: Causes::default(),
         by_status: [0; 5],
         missing: Vec::new(),
         bad: Vec::new(),
@@ -57,24 +69,36 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
                     .collect()
             }
         };
-        let mut seen = std::collections::BTreeSet::new();
-        for table in tables {
+        let unfinished = state.missing.last() == Some(&block);
+        let mut seen = BTreeSet::new();
+        for table in &tables {
+            let why = state.causes.see(table);
             let indices = table.wholes("index").iter();
             let rows = indices
                 .zip(table.texts("status"))
                 .zip(table.flags("passed"));
-            for ((index, status), passed) in rows {
+            for (at, ((index, status), passed)) in rows.enumerate() {
                 if !seen.insert(*index) {
                     continue;
                 }
                 state.rows += 1;
-                state.partial += u64::from(state.missing.last() == Some(&block));
+                state.partial += u64::from(unfinished);
                 state.failed += u64::from(*passed != Some(true));
-                let known = Status::ALL
-                    .iter()
-                    .position(|s| Some(s.name()) == status.as_deref());
+                state.causes.add_seen(&why, at);
+                let known = status.as_deref().and_then(Status::named);
                 if let Some(known) = known {
-                    state.by_status[known] += 1;
+                    state.by_status[known as usize] += 1;
+                }
+            }
+        }
+        if unfinished {
+            let attempts = Attempts::read(store.attempts(block));
+            let open = attempts.all();
+            for (_, known) in open.filter(|(case, _)| !seen.contains(&i64::try_from(*case).ok())) {
+                if known.open > 0 {
+                    state.begun += 1;
+                } else {
+                    state.unsaved += 1;
                 }
             }
         }

@@ -5,7 +5,7 @@
 //! | `plan.json` | plan with all texts that it stands on, its hash, block size, program |
 //! | `parts/000123.parquet` | rows of block 123; equal bytes from any executor |
 //! | `parts/000123.run.parquet` | who computed them, and in what time |
-//! | `parts/000123.NAME.partial.parquet` | rows of a process that was stopped |
+//! | `parts/000123.NAME.partial.parquet` | rows of a block that is at work, or whose process was stopped or killed |
 //! | `attempts/000123.jsonl` | cases that were begun and ended |
 //! | `aside/` | parts that could not be read or are foreign |
 //! | `logs/CASE.mcap` | logs that the plan keeps |
@@ -46,17 +46,28 @@ pub struct PlanFile {
     pub sources: Sources,
 }
 
-/// Work of one block, s, where the plan does not say how many cases it has.
+/// Work of one block, s, where the plan does not say how many cases it has. Not measured: two
+/// computers must come to the same blocks.
 const BLOCK_S: f64 = 60.0;
 /// Simulated seconds in one of work, about.
 const SPEED: f64 = 20.0;
+/// Simulated time of a start-up, s, about (1.4 of `wheeleg-2003`, 2.7 of `wheeleg`, measured 2026-11-26): it comes
+/// before the time of a scenario.
+const START_UP_S: f64 = 2.5;
+
+/// Work of one case, s, about: that of a scenario of so many seconds, and of its start-up.
+pub(crate) fn work_s(duration_s: f64) -> f64 {
+    (START_UP_S + duration_s) / SPEED
+}
 
 impl PlanFile {
-    /// That of a plan, for this program. `duration_s`: simulated time of a case.
+    /// That of a plan, for this program. `duration_s`: time of a case's scenario, without its
+    /// start-up.
     #[must_use]
     pub fn of(plan: &Plan, duration_s: f64) -> Self {
-        let least = (BLOCK_S * SPEED / duration_s.max(0.1)).clamp(1.0, 4096.0) as u64;
-        let block = plan.block.unwrap_or_else(|| least.next_power_of_two());
+        let cases = (BLOCK_S / work_s(duration_s)).max(1.0) as u64;
+        // The power of two that is not above it.
+        let block = plan.block.unwrap_or_else(|| 1 << cases.ilog2());
         Self {
             format: FORMAT,
             program: program(),
@@ -326,13 +337,16 @@ impl Store {
         self.folder.join(name)
     }
 
-    /// Rows of the files of a block that was not finished; those that cannot be read are set
-    /// aside.
-    pub(crate) fn kept_rows(&self, block: u64) -> Result<Vec<Row>, CampaignError> {
-        let mut rows = Vec::new();
+    /// Rows of the files of a block that was not finished, and those files; what cannot be read
+    /// is set aside.
+    pub(crate) fn kept_rows(&self, block: u64) -> Result<(Vec<Row>, Vec<PathBuf>), CampaignError> {
+        let (mut rows, mut files) = (Vec::new(), Vec::new());
         for path in self.partials(block) {
             match part::read(&path, &self.plan.hash) {
-                Ok((found, _)) => rows.extend(found),
+                Ok((found, _)) => {
+                    rows.extend(found);
+                    files.push(path);
+                }
                 Err(NotAPart::Missing) => {}
                 Err(NotAPart::Torn(_) | NotAPart::Foreign(_)) => {
                     self.set_aside(&path)?;
@@ -341,7 +355,7 @@ impl Store {
         }
         let cases = self.cases_of(block);
         rows.retain(|row| cases.contains(&row.index));
-        Ok(rows)
+        Ok((rows, files))
     }
 }
 

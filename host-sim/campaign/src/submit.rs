@@ -6,14 +6,13 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::store::work_s;
 use crate::{CampaignError, Store};
 
 /// Shortest work of a task, s: less is mostly start-up, and overwhelms a site.
 const LEAST_TASK_S: f64 = 30.0;
 /// So few tasks overwhelm nobody, however short they are.
 const FEW: u64 = 8;
-/// Simulated seconds in one of work, about.
-const SPEED: f64 = 20.0;
 
 /// What a cluster is to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,7 +41,7 @@ impl Submission {
         shards: u64,
         duration_s: f64,
     ) -> Result<Self, CampaignError> {
-        let work_s = store.plan().cases as f64 * duration_s / SPEED;
+        let work_s = store.plan().cases as f64 * work_s(duration_s);
         let most = ((work_s / LEAST_TASK_S) as u64)
             .max(FEW)
             .min(store.blocks());

@@ -399,6 +399,7 @@ mod tests {
                 meaning: (*text).to_owned(),
                 min: None,
                 max: Some(1.5),
+                required: true,
             })
             .collect();
         let row = |text: &str| Data::Text(vec![Some(text.to_owned()), None]);

@@ -1,9 +1,9 @@
 //! Works off the blocks of a shard: a queue of cases, and a part as soon as its block is done.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 use wheeleg_studies::study::{STACK, Stop};
 
@@ -28,6 +28,18 @@ struct Block {
     rows: Mutex<BTreeMap<u64, Row>>,
     efforts: Mutex<Vec<Effort>>,
     attempts: Attempts,
+    saved: Mutex<Saved>,
+}
+
+/// What of a block is on the disk before it is finished.
+struct Saved {
+    /// Since when it is.
+    since: Instant,
+    /// The files that hold it: this process' own, and those that it has taken up. Another process
+    /// may be at the same block; its files are left to it.
+    files: Vec<PathBuf>,
+    /// Whether the part is there: then nothing is to be saved any more.
+    finished: bool,
 }
 
 /// What is to be done, and what was.
@@ -46,6 +58,8 @@ pub(crate) struct Work<'a> {
     pub(crate) stop: &'a Stop,
     /// Only cases below this index.
     pub(crate) first: u64,
+    /// Time after which the rows of a block that is not finished are saved.
+    pub(crate) save_every: Duration,
     /// Program for cases that may end the process.
     pub(crate) program: Option<&'a Path>,
     /// Told of cases that have a row already.
@@ -165,7 +179,8 @@ impl Work<'_> {
         let wanted = self.store.cases_of(number);
         let wanted: Vec<u64> = wanted.filter(|index| *index < self.first).collect();
         let mut rows = BTreeMap::new();
-        for row in self.store.kept_rows(number)? {
+        let (kept, files) = self.store.kept_rows(number)?;
+        for row in kept {
             rows.insert(row.index, row);
         }
         let found = rows.keys().filter(|index| **index < self.first).count();
@@ -178,6 +193,11 @@ impl Work<'_> {
             rows: Mutex::new(rows),
             efforts: Mutex::new(Vec::new()),
             attempts: Attempts::read(self.store.attempts(number)),
+            saved: Mutex::new(Saved {
+                since: Instant::now(),
+                files,
+                finished: false,
+            }),
         };
         Ok(Some((block, left)))
     }
@@ -202,6 +222,8 @@ impl Work<'_> {
         };
         if done {
             self.finish(block)?;
+        } else {
+            self.save_if_due(block)?;
         }
         Ok(done)
     }
@@ -246,10 +268,11 @@ impl Work<'_> {
     /// Writes the part of a block that has all its rows; of a pilot, what there is.
     fn finish(&self, block: &Block) -> Result<(), CampaignError> {
         let cases = self.store.cases_of(block.number);
+        let mut saved = held(&block.saved);
         let rows = held(&block.rows);
         if (rows.len() as u64) < cases.end - cases.start {
             drop(rows);
-            return self.leave(block);
+            return self.save(block, &mut saved);
         }
         let rows: Vec<Row> = rows.values().cloned().collect();
         let partials = self.store.partials(block.number);
@@ -266,21 +289,44 @@ impl Work<'_> {
             let _ = std::fs::remove_file(path);
         }
         block.attempts.remove();
+        saved.finished = true;
         Ok(())
+    }
+
+    /// Saves the rows of a block from time to time: a process that is killed loses no more than
+    /// that.
+    fn save_if_due(&self, block: &Block) -> Result<(), CampaignError> {
+        let mut saved = match block.saved.try_lock() {
+            Ok(saved) => saved,
+            Err(TryLockError::Poisoned(e)) => e.into_inner(),
+            // Another thread is at it.
+            Err(TryLockError::WouldBlock) => return Ok(()),
+        };
+        if saved.since.elapsed() < self.save_every {
+            return Ok(());
+        }
+        self.save(block, &mut saved)
     }
 
     /// Keeps the rows of a block that is not finished.
     fn leave(&self, block: &Block) -> Result<(), CampaignError> {
+        self.save(block, &mut held(&block.saved))
+    }
+
+    /// Writes the rows that there are, and takes away the files that held some of them before.
+    fn save(&self, block: &Block, saved: &mut Saved) -> Result<(), CampaignError> {
         let rows: Vec<Row> = held(&block.rows).values().cloned().collect();
-        if rows.is_empty() || held(&block.efforts).is_empty() {
+        let none = rows.is_empty() || held(&block.efforts).is_empty();
+        if saved.finished || none {
             return Ok(());
         }
-        let before = self.store.partials(block.number);
+        let file = self.store.new_partial(block.number);
         let bytes = part::bytes(self.cases.columns(), &self.store.plan().hash, &rows);
-        write_whole(&self.store.new_partial(block.number), &bytes)?;
-        for path in before {
+        write_whole(&file, &bytes)?;
+        for path in std::mem::replace(&mut saved.files, vec![file]) {
             let _ = std::fs::remove_file(path);
         }
+        saved.since = Instant::now();
         Ok(())
     }
 }

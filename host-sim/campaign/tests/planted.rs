@@ -1,9 +1,11 @@
-//! A case that ends the process: a program of its own, which is started again and again.
+//! A case that ends the process, and a process that is killed: a program of its own, which is
+//! started again and again.
 //!
 //! Without a harness, because the program under test is this one.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use wheeleg_campaign::{
     Case, Cases, Options, Outcome, PlanFile, Shard, Status, Store, isolated, run, status,
@@ -14,6 +16,16 @@ use wheeleg_studies::study::Stop;
 const PLAN: &str = "name = \"planted\"\nroot = 1\nsamples = 12\nblock = 4\n[base]\n\
      scenario = \"stand\"\n[factor.droop]\nparameter = \"robot.supply.droop\"\n\
      uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
+
+/// One block that takes longer than anybody waits, of cases of a few ms.
+const LONG: &str = "name = \"long\"\nroot = 1\nsamples = 2000\nblock = 4096\n[base]\n\
+     scenario = \"stand\"\n";
+/// Time that a case of it takes, and after which its rows are saved.
+const CASE: Duration = Duration::from_millis(5);
+const SAVE_EVERY: Duration = Duration::from_millis(200);
+/// Processes that are killed, and their threads.
+const KILLS: u64 = 6;
+const THREADS: usize = 2;
 
 /// The case that ends its process, and one that did so once alone: its process was killed.
 const CRASHES: u64 = 6;
@@ -28,37 +40,69 @@ fn simulate(case: &Case, folder: &Path) -> Option<Outcome> {
         std::fs::write(marker, "").expect("written");
         std::process::abort();
     }
-    Some(Outcome {
+    Some(passed(case))
+}
+
+fn passed(case: &Case) -> Outcome {
+    Outcome {
         status: Status::Ok,
         error: None,
         log_hash: Some(format!("{:064x}", case.seed)),
         simulated_s: Some(1.0),
         passed: Some(true),
         targets: Vec::new(),
-    })
+    }
 }
 
-fn plan() -> Plan {
+fn plan_of(text: &str) -> Plan {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.toml");
-    std::fs::write(&path, PLAN).expect("written");
+    std::fs::write(&path, text).expect("written");
     Plan::of(Sources::load(&path.to_string_lossy()).expect("read")).expect("a plan")
 }
 
 /// The campaign, as the program under test runs it.
 fn work(folder: &Path) {
-    let plan = plan();
-    let cases = Cases::new(&plan).expect("a plan");
-    let store = Store::create(folder, PlanFile::of(&plan, 1.0)).expect("a folder");
-    let options = Options {
+    let own = Options {
+        program: std::env::current_exe().ok(),
+        ..options(1)
+    };
+    run_in(folder, &plan_of(PLAN), &own, &|case| simulate(case, folder));
+}
+
+/// The long block, until it is killed.
+fn work_long(folder: &Path) {
+    let saving = Options {
+        save_every: SAVE_EVERY,
+        ..options(THREADS)
+    };
+    run_in(folder, &plan_of(LONG), &saving, &|case| {
+        std::thread::sleep(CASE);
+        Some(passed(case))
+    });
+}
+
+fn options(threads: usize) -> Options {
+    Options {
         shard: Shard::ALL,
-        threads: 1,
+        threads,
         first: None,
         stop: Stop::default(),
-        program: std::env::current_exe().ok(),
+        program: None,
         json: false,
-    };
-    run(&store, &cases, &options, &|case| simulate(case, folder)).expect("it runs");
+        save_every: wheeleg_campaign::SAVE_EVERY,
+    }
+}
+
+fn run_in(
+    folder: &Path,
+    plan: &Plan,
+    options: &Options,
+    simulate: &(dyn Fn(&Case) -> Option<Outcome> + Sync),
+) {
+    let cases = Cases::new(plan).expect("a plan");
+    let store = Store::create(folder, PlanFile::of(plan, 1.0)).expect("a folder");
+    run(&store, &cases, options, simulate).expect("it runs");
 }
 
 fn main() {
@@ -66,13 +110,17 @@ fn main() {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
         ["work", folder] => work(Path::new(folder)),
+        ["work-long", folder] => work_long(Path::new(folder)),
         ["campaign", "case", folder, index, "--row", file] => {
             let store = Store::open(Path::new(folder)).expect("a folder");
             let index = index.parse().expect("a place");
             let of = |case: &Case| simulate(case, Path::new(folder));
             assert!(isolated(&store, index, Path::new(file), &of).expect("a row"));
         }
-        _ => test(),
+        _ => {
+            test();
+            a_killed_process_loses_no_more_than_it_has_not_saved();
+        }
     }
 }
 
@@ -116,4 +164,68 @@ fn test() {
         assert!(error.ends_with("signal 6"), "{error}");
     }
     println!("planted: a case that ends the process is a row, after {ended} runs: ok");
+}
+
+/// A process that is killed loses at most what it has computed since it saved last: so long as the
+/// interval, the cases that were under way, and the time of a save. Without saves it would lose its
+/// whole block.
+fn a_killed_process_loses_no_more_than_it_has_not_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = std::env::current_exe().expect("this program");
+    let start = || {
+        Command::new(&program)
+            .arg("work-long")
+            .arg(folder.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("started")
+    };
+    let open = || Store::open(folder.path()).expect("a folder");
+    let (mut before, mut most_lost) = (0, 0);
+    for kill in 0..KILLS {
+        let mut child = start();
+        // At another time of the interval each, and not before something is saved.
+        let begun = Instant::now();
+        let saved = || status(&open(), Shard::ALL).map_or(0, |state| state.rows);
+        while !folder.path().join("plan.json").exists() || saved() == before {
+            assert!(
+                begun.elapsed() < Duration::from_secs(60),
+                "nothing is saved"
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(SAVE_EVERY * u32::try_from(kill).expect("few") / 5);
+        let computing = begun.elapsed();
+        child.kill().expect("killed");
+        child.wait().expect("ended");
+        let state = status(&open(), Shard::ALL).expect("readable");
+        assert_eq!(state.missing, [0], "the block is not finished");
+        assert_eq!(state.rows, state.partial);
+        let lost = state.unsaved + state.begun;
+        let interval = 2 * SAVE_EVERY;
+        let allowed = interval.as_millis() / CASE.as_millis() * THREADS as u128;
+        assert!(
+            u128::from(lost) <= allowed + THREADS as u128,
+            "{lost} of {} lost after {computing:?}",
+            state.rows + lost
+        );
+        assert!(state.rows > before, "{} after {before}", state.rows);
+        (before, most_lost) = (state.rows, most_lost.max(lost));
+    }
+    assert!(start().wait().expect("ended").success());
+    let state = status(&open(), Shard::ALL).expect("readable");
+    assert_eq!((state.rows, state.partial), (2000, 0));
+    assert_eq!((state.begun, state.unsaved), (0, 0));
+    let left = std::fs::read_dir(folder.path().join("parts")).expect("there");
+    let left = left.map(|entry| {
+        entry
+            .expect("entry")
+            .file_name()
+            .to_string_lossy()
+            .into_owned()
+    });
+    // A file that was being written when its process was killed has a name that nobody reads.
+    let left: Vec<String> = left.filter(|name| !name.starts_with('.')).collect();
+    assert_eq!(left.len(), 2, "the part and who made it: {left:?}");
+    println!("planted: of {KILLS} killed processes none lost more than {most_lost} cases: ok");
 }

@@ -130,14 +130,17 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
                 "supply.droop",
                 "normal = { mean = 0.3, sd = 0.1, unit = \"bar\" }",
             ),
-            vec!["factor.x", "without a lower end", "0.001 to 10 bar"],
+            vec!["`factor.x`: its distribution has no lower end: allowed 0.001 to 10 bar"],
         ),
         (
             on(
                 "friction.coulomb",
                 "scale = true\nlognormal = { median = 1.0, sigma = 0.3 }",
             ),
-            vec!["factor.x", "without an upper end", "0 to 500 N"],
+            vec![
+                "`factor.x`: its distribution has no upper end, and the file's value times it leaves \
+                 the range: allowed 0 to 500 N",
+            ],
         ),
         (
             on("supply.droop", "grid = [1.0]\nunit = \"mm\""),
@@ -252,6 +255,52 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
     }
 }
 
+/// Line and column of the mark: a path is marked where it is written, a value where it is.
+#[test]
+fn the_mark_stands_under_what_is_wrong() {
+    for (factor, line, column, told) in [
+        (
+            "parameter = \"robot.supply.drop\"\ngrid = [1.0]\nunit = \"bar\"",
+            7,
+            13,
+            "no such parameter",
+        ),
+        (
+            "parameter = [\"robot.supply.droop\", \"robot.supply.drop\"]\ngrid = [1.0]\nunit = \"bar\"",
+            7,
+            36,
+            "no such parameter",
+        ),
+        (
+            "parameter = \"robot.cylinder.timing_spread\"\ngrid = [1.5]",
+            7,
+            13,
+            "is a list of",
+        ),
+        (
+            "parameter = \"scenario.motion.side\"\ngrid = [\"left\"]",
+            7,
+            13,
+            "has no name there",
+        ),
+        (
+            "parameter = \"robot.supply.droop\"\nnormal = { mean = 0.3, sd = 0.1, unit = \"bar\" }",
+            8,
+            10,
+            "has no lower end",
+        ),
+    ] {
+        let text = format!("{HEAD}[factor.x]\n{factor}\n");
+        let error = Plan::of(sources(&text)).expect_err(factor);
+        let shown = wheeleg_config::plain_text(&error);
+        let place = format!("plan.toml:{line}:{column}]");
+        assert!(
+            shown.contains(&place) && shown.contains(told),
+            "{place} {told} in\n{shown}"
+        );
+    }
+}
+
 #[test]
 fn all_bad_factors_are_told_at_once() {
     let found = refused(
@@ -358,7 +407,7 @@ fn a_plan_may_stand_on_a_height_map() {
     // A wrong one is told as in a run: with the scenario's file, line and field.
     let wrong = with_map("0,x\n").and_then(Plan::of).expect_err("no number");
     let said = format!("{:?}", miette::Report::new(wrong));
-    for part in ["mine.toml:", "`terrain[0].file`", "row 1, column 2"] {
+    for part in ["mine.toml:", "`terrain[0].file`", "line 1, column 2"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     let gone = Sources {

@@ -265,7 +265,7 @@ fn a_map_lies_beside_the_scenario() {
 }
 
 #[test]
-fn a_wrong_map_is_told_with_row_and_column() {
+fn a_wrong_map_is_told_with_line_and_column() {
     let refused = |content: &[u8], file: &str, more: &str, parts: &[&str]| {
         let report = report(
             &with_map(content, file, more)
@@ -277,20 +277,20 @@ fn a_wrong_map_is_told_with_row_and_column() {
         }
     };
     refused(
-        b"1,2\n3,oops\n4\n",
+        b"# heights, m\n1,2\n\n3,oops\n4\n",
         "map.csv",
         "",
         &[
-            "scenario.toml:13: `terrain[0].file` = \"map.csv\": row 2, column 2: \"oops\" is not a finite number",
-            "row 3 has 1 values, the first row 2",
+            "scenario.toml:13: `terrain[0].file` = \"map.csv\": line 4, column 2: \"oops\" is not a finite number",
+            "line 5 has 1 values, line 2 has 2",
         ],
     );
     refused(
-        b"0,0,0\n0,0,5\n",
+        b"# heights, m\n0,0,0\n# the last row\n0,0,5\n",
         "map.csv",
         "",
         &[
-            "row 1, column 3: the height changes by 5 m",
+            "line 2, column 3: the height changes by 5 m from here to its neighbour at line 4, column 3",
             "84.3",
             "allowed are 75",
         ],
@@ -302,10 +302,10 @@ fn a_wrong_map_is_told_with_row_and_column() {
         &["2 columns and 1 rows; allowed are 2 to 4096"],
     );
     refused(
-        b"1,2\n3,4\n",
+        b"\n1,2\n3,4\n",
         "map.csv",
         "offset = \"9999 m\"\n",
-        &["row 1, column 2: the height is 10001 m; allowed -10000 to 10000 m"],
+        &["line 2, column 2: the height is 10001 m; allowed -10000 to 10000 m"],
     );
     refused(b"", "map.csv", "", &["it holds no numbers"]);
     refused(b"", "gone.csv", "", &["gone.csv", "No such file"]);
@@ -317,6 +317,16 @@ fn a_wrong_map_is_told_with_row_and_column() {
         "\n[[terrain]]\nkind = \"heightmap\"\nfile = \"map.csv\"\ncell = \"1 m\"\norigin = { value = [0, 0], unit = \"m\" }\n",
         &["`terrain[1]`: a terrain has one heightmap at most"],
     );
+}
+
+/// A place is two numbers, and the help says so.
+#[test]
+fn the_help_for_a_pair_shows_a_pair() {
+    let head = "[[terrain]]\nkind = \"heightmap\"\nfile = \"map.csv\"\ncell = \"1 m\"\n";
+    let pair = "write `origin = { value = […, …], unit = \"m\" }`";
+    refused(head, &["`origin` is missing in [terrain[0]]", pair]);
+    let one = format!("{head}origin = {{ unit = \"m\" }}\n");
+    refused(&one, &["`terrain[0].origin` has no value", pair]);
 }
 
 #[test]

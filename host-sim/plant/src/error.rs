@@ -79,6 +79,18 @@ pub enum PlantError {
         "the robot does not stand on its wheels and feet at the start place, x = 0 and y = 0, heading along x"
     )]
     NotStanding,
+    /// At rest in its start pose the robot lies on its chassis, and no wheel bears anything.
+    #[error(
+        "at the start place, x = 0 and y = 0, heading along x, the robot lies on its chassis, which \
+         bears {} N; its wheels bear nothing, its feet {} N",
+        shown(*.chassis_n), shown(*.feet_n)
+    )]
+    OnChassis {
+        /// Normal force on the chassis \[N\].
+        chassis_n: f64,
+        /// On both feet \[N\].
+        feet_n: f64,
+    },
     /// The mechanics could not be evaluated (closed loop cannot close, singular inertia).
     #[error("mechanics: {0}")]
     Mechanics(String),

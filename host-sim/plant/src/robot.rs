@@ -260,7 +260,7 @@ impl Plant {
     ///
     /// # Errors
     /// [`PlantError::NotStanding`] if the robot cannot stand in that pose on the ground at the
-    /// world's origin.
+    /// world's origin, [`PlantError::OnChassis`] if it lies there on its chassis.
     pub fn initial_state(&self, seed: u64) -> Result<PlantState, PlantError> {
         let assembly = &self.assembly;
         let mechanics = &assembly.mechanics;

@@ -23,8 +23,9 @@ pub(crate) fn refused(file: &str, params: &PlantParams, error: &dyn std::fmt::Di
     let stood = (0..=STEEPEST_DEG).take_while(|deg| stands(params, *deg));
     let help = match stood.last() {
         Some(deg) => format!(
-            "correct the scenario's [[terrain]]: nose uphill this robot stands on up to {deg}°, and \
-             wheels and feet must find no rock, edge or hole below them"
+            "correct the scenario's [[terrain]] (`slope` of a plane; heights and `origin` of a map): \
+             nose uphill this robot stands on up to {deg}°, and wheels and feet must find no rock, \
+             edge or hole below them"
         ),
         None => format!("correct the robot {file}: it stands in its start pose on no ground"),
     };

@@ -166,7 +166,9 @@ impl World {
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
-            PlantError::NotStanding => standing::refused(&robot.file, plant.params(), &e),
+            PlantError::NotStanding | PlantError::OnChassis { .. } => {
+                standing::refused(&robot.file, plant.params(), &e)
+            }
             other => refused("plant", &other),
         })?;
         let mut boards = Vec::new();

@@ -7,6 +7,7 @@ use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
 use wheeleg_studies::identify::lab::Lab;
+use wheeleg_studies::identify::map::Mapped;
 use wheeleg_studies::identify::told::{covers, untold};
 use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
 use wheeleg_studies::study::{Progress, Settings};
@@ -99,7 +100,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
     let config = config();
     let truth = truth(3);
     let text = measured(&applied(&config.axis, &truth), 1, 4800, rich, true);
-    let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+    let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let progress = Progress::silent();
     let Fitted {
         fit,
@@ -132,7 +133,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
 fn what_the_valves_never_did_cannot_be_told() {
     let config = config();
     let text = measured(&config.axis, 1, 600, |_| OUT, false);
-    let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+    let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let Fitted {
         fit,
         told,
@@ -159,6 +160,7 @@ fn study(text: &str, folder: &std::path::Path) -> Result<String, String> {
     let options = Options {
         lab: &lab,
         axis: "bench-vq110u",
+        map: &[],
         hold_out: 0.3,
         seed: 1,
     };
@@ -192,12 +194,87 @@ fn the_study_writes_an_axis_that_meets_what_it_has_not_seen_and_notices_a_leak()
     assert_eq!(summary["explained"], false, "{summary}");
 }
 
+/// A table with names, units and columns of its own, of which one tells two valves, is the same
+/// measurement; what is wrong in it is told by its own names.
+#[test]
+fn a_table_of_a_users_own_is_read_by_its_map() {
+    let config = config();
+    // Two valves of a chamber are never on together here, so that one is what the other is not.
+    let sound = "time_s,position_mm,fill_a,vent_a,fill_b,vent_b,pressure_a_bar,pressure_b_bar\n";
+    let own = "n,t (ms),x [m],V1,V2,pA,pB\n";
+    let (mut plain, mut mine) = (sound.to_owned(), own.to_owned());
+    for k in 0..300_u32 {
+        let (t_s, at_mm) = (0.005 * f64::from(k), f64::from(k % 200));
+        let (a, b) = (u32::from(k % 20 < 10), u32::from(k % 30 < 15));
+        let [bar_a, bar_b] = [f64::from(1 + k % 5), f64::from(1 + k % 6)];
+        plain += &format!(
+            "{t_s},{at_mm},{a},{},{b},{},{bar_a},{bar_b}\n",
+            1 - a,
+            1 - b
+        );
+        let [kpa_a, kpa_b] = [bar_a, bar_b].map(|bar| (bar - 1.0) * 100.0);
+        mine += &format!(
+            "{k},{},{},{a},{b},{kpa_a},{kpa_b}\n",
+            1e3 * t_s,
+            at_mm * 1e-3
+        );
+    }
+    let map = [
+        "time_s=t (ms)*0.001",
+        "position_mm=x [m]*1000",
+        "fill_a=V1",
+        "vent_a=V1*-1+1",
+        "fill_b=V2",
+        "vent_b=V2*-1+1",
+        "pressure_a_bar=pA*0.01+1",
+        "pressure_b_bar=pB*0.01+1",
+    ];
+    let mapped = |lines: &[&str]| -> Vec<Mapped> {
+        let lines = lines.iter();
+        lines.map(|text| text.parse().expect("a map")).collect()
+    };
+    let expected = Lab::parse("lab.csv", &plain, &config.axis, &[]).expect("a measurement");
+    let read = Lab::parse("mine.csv", &mine, &config.axis, &mapped(&map)).expect("the same");
+    assert_eq!(read.on_us, expected.on_us);
+    assert_eq!(read.samples.len(), expected.samples.len());
+    for (read, expected) in read.samples.iter().zip(&expected.samples) {
+        assert_eq!(read.tick, expected.tick);
+        assert!((read.position_m - expected.position_m).abs() < 1e-12);
+        let [a, b] = [read, expected].map(|sample| sample.pressure_pa.expect("measured"));
+        assert!(
+            (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-6,
+            "{a:?} {b:?}"
+        );
+    }
+    let told = |text: &str, lines: &[&str]| {
+        let wrong = Lab::parse("mine.csv", text, &config.axis, &mapped(lines));
+        wheeleg_config::plain_text(&wrong.expect_err("refused"))
+    };
+    let long = mine.replacen("\n7,35,0.007,", "\n7,35,7,", 1);
+    for (text, lines, words) in [
+        (
+            &mine,
+            &["position_mm=x"][..],
+            &["no column `x`", "`position_mm`", "x [m]"][..],
+        ),
+        (&mine, &["fill_a=V1", "fill_a=V2"], &["twice", "`fill_a`"]),
+        (&mine, &map[..2], &["no column `fill_a`"]),
+        (&long, &map, &["line 9, column `x [m]`: 7000 is outside"]),
+    ] {
+        let told = told(text, lines);
+        assert!(
+            words.iter().all(|word| told.contains(word)),
+            "{words:?} in {told}"
+        );
+    }
+}
+
 #[test]
 fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
     let config = config();
     let sound = measured(&config.axis, 1, 300, |_| OUT, true);
     let told = |text: &str| {
-        let wrong = Lab::parse("lab.csv", text, &config.axis);
+        let wrong = Lab::parse("lab.csv", text, &config.axis, &[]);
         wrong.err().map_or_else(String::new, |e| e.to_string())
     };
     assert_eq!(told(&sound), "");
@@ -283,7 +360,7 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
     for seed in 0..count {
         let truth = truth(1000 + seed);
         let text = measured(&applied(&config.axis, &truth), seed, 4800, rich, true);
-        let lab = Lab::parse("lab.csv", &text, &config.axis).expect("a measurement");
+        let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
         let Fitted { fit, told, .. } =
             fitted(&problem(&config, &lab), seed, &Progress::silent()).expect("a fit");
         let which = (0..COUNT).filter(|i| told[*i].told);
@@ -320,7 +397,7 @@ fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
         }
         let read = || {
             let begun = std::time::Instant::now();
-            let lab = Lab::parse("large.csv", &text, &axis);
+            let lab = Lab::parse("large.csv", &text, &axis, &[]);
             (begun.elapsed().as_secs_f64(), lab)
         };
         let tries = [read(), read(), read()];

@@ -316,7 +316,47 @@ fn strict_runs_end_with_1_where_a_case_failed() {
         );
         assert_eq!(run.status.code(), Some(code), "{}", text(&run.stderr));
         assert_eq!(parts(&out).len(), 1, "the rows are kept");
+        if code == 0 {
+            let told = text(&run.stdout);
+            assert!(
+                told.contains("failed  2 of the 2") && told.contains(" not measured: "),
+                "it says of what: {told}"
+            );
+        }
     }
+}
+
+/// A pilot names the command that makes a table of it, and that is one that the report takes.
+#[test]
+fn a_pilot_has_a_table_and_a_page() {
+    let home = folder();
+    let plan = plan(home.path(), 4);
+    let out = home.path().join("out");
+    let mut pilot = wheeleg();
+    let told = succeeded(
+        pilot
+            .arg("run")
+            .arg(&plan)
+            .arg("--out")
+            .arg(&out)
+            .args(["--first", "3"]),
+    );
+    let next = told
+        .lines()
+        .find_map(|line| line.strip_prefix("next    wheeleg campaign "));
+    let next: Vec<&str> = next.expect("what comes next").split(' ').collect();
+    assert!(next.contains(&"--partial"), "{next:?}");
+    let told = succeeded(wheeleg().args(&next));
+    assert!(told.contains("rows    3\nmissing 5 cases"), "{told}");
+    let table = next.last().expect("the table");
+    let told = succeeded(wheeleg().args(["report", table]));
+    assert!(told.contains("rows    3"), "{told}");
+    let page = fs::read_to_string(out.join("cases.html")).expect("a page");
+    assert!(page.contains("3 of 8 cases") && page.contains("a level floor of rock"));
+    let state = output(wheeleg().arg("status").arg(&out).arg("--json"));
+    let state: serde_json::Value = serde_json::from_slice(&state.stdout).expect("JSON");
+    assert_eq!((&state["rows"], &state["partial"]), (&3.into(), &3.into()));
+    assert!(state["causes"][0]["cases"].as_u64() > Some(0), "{state}");
 }
 
 #[test]

@@ -252,7 +252,7 @@ fn axes(all: &mut Vec<Driven>) {
         Box::new(json),
         vec!["v.json", "line 1"],
     ));
-    let lab = || Lab::parse("lab.csv", "a,b\n", &axis()).expect_err("no measurement");
+    let lab = || Lab::parse("lab.csv", "a,b\n", &axis(), &[]).expect_err("no measurement");
     let words = || vec!["lab.csv, line 1", "fill_a"];
     all.push(("StudyError::Refused", Box::new(lab()), words()));
     let of_campaign = CampaignError::from(lab());

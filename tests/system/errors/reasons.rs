@@ -83,6 +83,12 @@ fn plant(all: &mut Vec<Reason>) {
     add("PlantError::EdgeQueueFull", full, vec!["valve 2"]);
     let fallen = PlantError::NotStanding;
     add("PlantError::NotStanding", fallen, vec!["stand"]);
+    let lying = PlantError::OnChassis {
+        chassis_n: 61.5,
+        feet_n: 20.25,
+    };
+    let words = vec!["lies on its chassis", "61.5 N", "20.25 N"];
+    add("PlantError::OnChassis", lying, words);
     let mechanics = PlantError::Mechanics("a leg cannot close".to_owned());
     let words = vec!["a leg cannot close"];
     add("PlantError::Mechanics", mechanics, words);

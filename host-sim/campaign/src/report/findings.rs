@@ -3,18 +3,17 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use wheeleg_config::plan::Value;
+use wheeleg_config::plan::Plan;
 use wheeleg_report::stats;
 
 use super::Merged;
 use super::cells::{self, Cell};
 use super::pairs::{self, Paired};
-use crate::CampaignError;
+use super::worst::{Worst, worst};
 use crate::columns::Column;
 use crate::row::Status;
+use crate::{CampaignError, Cases};
 
-/// Cases that are listed as the worst.
-const WORST: usize = 20;
 /// Kinds of errors that are listed.
 const ERRORS: usize = 20;
 /// Quantiles that are told of every target.
@@ -81,17 +80,13 @@ pub struct OfTarget {
     pub cells: Vec<InCell>,
 }
 
-/// A case with what was missed in it.
+/// What a scenario stands on, as its file has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Worst {
-    /// Identity.
-    pub case: String,
-    /// How it ended.
-    pub status: String,
-    /// Values of the factors.
-    pub factors: Vec<String>,
-    /// Targets outside of their limits, and by how much of the limit's width or value.
-    pub missed: Vec<String>,
+pub struct OfScenario {
+    /// Its name.
+    pub scenario: String,
+    /// Its parts with their materials; none of a level floor of rock.
+    pub parts: Vec<String>,
 }
 
 /// What a table says.
@@ -111,7 +106,9 @@ pub struct Findings {
     pub targets: Vec<OfTarget>,
     /// Errors by kind, the most frequent first.
     pub errors: Vec<(String, u64)>,
-    /// The worst cases, the worst first.
+    /// What the scenarios stand on.
+    pub grounds: Vec<OfScenario>,
+    /// The worst cases, the worst first; those that passed come last, the nearest to a limit first.
     pub worst: Vec<Worst>,
     /// Values of paired factors against the first value of each.
     pub paired: Vec<Paired>,
@@ -155,9 +152,40 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
         targets: targets.collect(),
         drawn,
         errors: errors(merged),
+        grounds: grounds(&plan, merged, &cells)?,
         worst: worst(merged),
         paired: pairs::within(merged, &plan, &cells),
     })
+}
+
+/// Grounds that are listed.
+const GROUNDS: usize = 20;
+
+/// The ground of the first case of each cell, each once.
+fn grounds(plan: &Plan, merged: &Merged, cells: &[Cell]) -> Result<Vec<OfScenario>, CampaignError> {
+    let cases = Cases::new(plan)?;
+    let indices = merged.table.wholes("index");
+    let mut found: Vec<OfScenario> = Vec::new();
+    for cell in cells {
+        let index = cell.rows.first().and_then(|row| indices[*row]);
+        let Some(index) = index.and_then(|index| u64::try_from(index).ok()) else {
+            continue;
+        };
+        let Ok((scenario, _)) = cases.case(index).setup else {
+            continue;
+        };
+        let of = OfScenario {
+            scenario: scenario.name,
+            parts: scenario.ground.parts,
+        };
+        if !found.contains(&of) {
+            found.push(of);
+        }
+        if found.len() == GROUNDS {
+            break;
+        }
+    }
+    Ok(found)
 }
 
 fn of_target(merged: &Merged, column: &Column, cells: &[Cell], drawn: &[String]) -> OfTarget {
@@ -224,76 +252,4 @@ fn errors(merged: &Merged) -> Vec<(String, u64)> {
     counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     counts.truncate(ERRORS);
     counts
-}
-
-/// By how much a value is outside of its limits, as a share of the limit that it missed.
-fn excess(value: f64, column: &Column) -> f64 {
-    let beyond = |limit: f64, by: f64| by.max(0.0) / limit.abs().max(1e-9);
-    let low = column.min.map_or(0.0, |min| beyond(min, min - value));
-    let high = column.max.map_or(0.0, |max| beyond(max, value - max));
-    low.max(high)
-}
-
-/// A target with its values and verdicts.
-type Judged<'a> = (&'a Column, &'a [Option<f64>], &'a [Option<bool>]);
-
-fn worst(merged: &Merged) -> Vec<Worst> {
-    let table = &merged.table;
-    let (statuses, passed) = (table.texts("status"), table.flags("passed"));
-    let targets: Vec<Judged<'_>> = merged
-        .columns
-        .all
-        .iter()
-        .filter(|column| merged.columns.targets.contains(&column.name))
-        .map(|column| {
-            let verdicts = table.flags(&format!("{}.pass", column.name));
-            (column, table.numbers(&column.name), verdicts)
-        })
-        .collect();
-    let missed_in = |row: usize| -> Vec<(&Column, f64)> {
-        let missed = targets.iter().filter(|(.., pass)| pass[row] == Some(false));
-        let missed = missed.map(|(column, values, _)| {
-            // What could not be measured is as bad as can be.
-            let by = values[row].map_or(f64::INFINITY, |value| excess(value, column));
-            (*column, by)
-        });
-        missed.collect()
-    };
-    // Without a result first, then by the largest excess.
-    let score = |row: usize| -> f64 {
-        if statuses[row].as_deref() != Some(Status::Ok.name()) {
-            return f64::INFINITY;
-        }
-        let by = missed_in(row).into_iter().map(|(_, by)| by);
-        by.fold(0.0, f64::max)
-    };
-    let failed = (0..table.rows()).filter(|row| passed[*row] != Some(true));
-    let mut failed: Vec<(usize, f64)> = failed.map(|row| (row, score(row))).collect();
-    failed.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let cases = table.texts("case");
-    failed
-        .into_iter()
-        .take(WORST)
-        .map(|(row, _)| Worst {
-            case: cases[row].clone().unwrap_or_default(),
-            status: statuses[row].clone().unwrap_or_default(),
-            factors: merged
-                .columns
-                .factors
-                .iter()
-                .map(|factor| match cells::value(table, factor, row) {
-                    Some(Value::Number(x)) => wheeleg_report::number::short(x),
-                    Some(other) => other.to_string(),
-                    None => String::new(),
-                })
-                .collect(),
-            missed: missed_in(row)
-                .into_iter()
-                .map(|(column, by)| match by.is_finite() {
-                    true => format!("{} by {:.0} %", column.name, 1e2 * by),
-                    false => format!("{} not measured", column.name),
-                })
-                .collect(),
-        })
-        .collect()
 }

@@ -5,6 +5,7 @@ mod findings;
 mod page;
 mod pairs;
 mod shares;
+mod worst;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -17,8 +18,9 @@ use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
-pub use findings::Findings;
+pub use findings::{Findings, OfScenario};
 pub use pairs::{Paired, Pairs};
+pub use worst::Worst;
 
 /// A merged table with its plan.
 pub struct Merged {

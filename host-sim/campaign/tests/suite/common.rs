@@ -65,6 +65,7 @@ pub(crate) fn options(threads: usize) -> Options {
         stop: Stop::default(),
         program: None,
         json: false,
+        save_every: wheeleg_campaign::SAVE_EVERY,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use wheeleg_campaign::{CampaignError, Outcome, Shard, Status, Store, merge, status};
+use wheeleg_campaign::{CampaignError, Cause, Outcome, Shard, Status, Store, merge, status};
 use wheeleg_studies::study::Stop;
 
 use crate::common::{computed, options, parts, run_in, spread};
@@ -32,11 +32,34 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
             _ => Some(outcome),
         }
     });
-    assert_eq!(ran.expect("it goes on").computed, 40);
+    let ran = ran.expect("it goes on");
+    assert_eq!(ran.computed, 40);
     let state = status(&Store::open(folder.path()).expect("a folder"), Shard::ALL);
     let state = state.expect("readable");
     assert_eq!(state.by_status, [37, 1, 1, 0, 1]);
     assert!(state.failed >= 3 && state.missing.is_empty());
+    // Those without a result first, then targets; whoever ran it is told the same.
+    let causes = state.causes.first(20);
+    let no_result = |status, message: &str| Cause::NoResult {
+        status,
+        message: message.to_owned(),
+    };
+    let told: Vec<(String, u64)> = causes
+        .iter()
+        .map(|(cause, cases)| (state.causes.told(cause), *cases))
+        .collect();
+    assert_eq!(causes[0], (&no_result(Status::Error, "planted"), 1));
+    assert!(told[1].0.starts_with("panic: planted in 3 ("), "{told:?}");
+    assert_eq!(told[2], ("limit: more than 1 s".to_owned(), 1));
+    let (target, missed) = &told[3];
+    assert!(
+        target.contains(" missed: ") && target.contains("allowed"),
+        "{told:?}"
+    );
+    assert_eq!((causes.len(), *missed), (4, state.failed - 3), "{told:?}");
+    assert_eq!(state.causes.first(2).len(), 2);
+    assert_eq!(state.causes.kinds(), 4);
+    assert_eq!(ran.causes, state.causes);
     let table = folder.path().join("cases.parquet");
     merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let read = wheeleg_campaign::report::Merged::read(&table)

@@ -48,6 +48,14 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     );
     assert_eq!(findings.worst.len(), 20);
     assert_eq!(findings.worst[0].status, "error");
+    assert!(
+        findings
+            .worst
+            .iter()
+            .all(|worst| !worst.passed && worst.nearest.is_none())
+    );
+    assert_eq!(findings.grounds.len(), 1);
+    assert_eq!(findings.grounds[0].scenario, "stand");
     assert_eq!(findings.errors, [("planted <b>".to_owned(), 1)]);
     // The first target grows with both factors; the table against itself differs in nothing.
     let first = &findings.targets[0].cells[0];
@@ -86,4 +94,44 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     }
     assert!(html.contains("planted &lt;b&gt;") && !html.contains("planted <b>"));
     assert!(html.len() < 10_000_000);
+}
+
+/// Where all passed, those are listed that were nearest to a limit.
+#[test]
+fn where_all_passed_the_nearest_to_a_limit_are_listed() {
+    let plan = spread(10);
+    let folder = tempfile::tempdir().expect("a folder");
+    let limit = std::sync::Mutex::new(None);
+    run_in(folder.path(), &plan, &options(2), &|case| {
+        let mut outcome = computed(case);
+        outcome.passed = Some(true);
+        for target in &mut outcome.targets {
+            (target.value, target.pass) = (None, true);
+        }
+        // One required target with an upper limit is met with the less room the later the case.
+        let required = outcome.targets.iter_mut();
+        let target = required
+            .filter(|target| target.required && target.max.is_some_and(|max| max > 0.0))
+            .find(|target| target.min.is_none())
+            .expect("a target with an upper limit");
+        let max = target.max.expect("a limit");
+        target.value = Some(max * (0.5 + 0.02 * case.place.index as f64));
+        *limit.lock().expect("held by nobody") = Some(target.id.clone());
+        Some(outcome)
+    })
+    .0
+    .expect("it runs");
+    let table = folder.path().join("cases.parquet");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let findings = report::Report::of(&table, None).expect("a table").findings;
+    let id = limit
+        .into_inner()
+        .expect("held by nobody")
+        .expect("a target");
+    assert_eq!(findings.worst.len(), 20);
+    let told = |place: usize| findings.worst[place].nearest.clone().expect("near to one");
+    // Of 20 cases the last has 12 % of room left, the first 50.
+    assert_eq!(told(0), format!("{id} met by 12 %"));
+    assert_eq!(told(19), format!("{id} met by 50 %"));
+    assert!(findings.worst.iter().all(|worst| worst.passed));
 }

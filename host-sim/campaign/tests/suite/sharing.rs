@@ -3,7 +3,9 @@
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use wheeleg_campaign::{CampaignError, Merged, PlanFile, Shard, Store, merge, status};
+use wheeleg_campaign::{
+    CampaignError, Merged, PlanFile, Shard, Store, merge, merge_partial, status,
+};
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::{Signal, Stop};
 
@@ -126,12 +128,44 @@ fn a_pilot_is_taken_up() {
     assert_eq!((ran.computed, ran.of, ran.found), (10, 10, 0));
     let (again, count) = run_in(folder.path(), &plan, &pilot, &|case| Some(computed(case)));
     assert_eq!((again.expect("it runs").found, count), (10, 0));
+    // Its table has what there is, in the order of the plan.
+    let table = folder.path().join("pilot.parquet");
+    let merged_so_far = merge_partial(&[folder.path().to_owned()], &table, &Stop::default());
+    let merged_so_far = merged_so_far.expect("merged").expect("not stopped");
+    assert_eq!(
+        (merged_so_far.rows, merged_so_far.missing),
+        (10, 2 * SAMPLES - 10)
+    );
+    let read = wheeleg_campaign::report::Merged::read(&table).expect("a table");
+    let places = read.table.wholes("index").iter().copied();
+    assert!(
+        places.eq((0..10).map(Some)),
+        "{:?}",
+        read.table.wholes("index")
+    );
+    wheeleg_campaign::report::Report::of(&table, None).expect("a page");
+    let complete = merge(&[folder.path().to_owned()], &table, &Stop::default());
+    assert!(matches!(complete, Err(CampaignError::Incomplete { .. })));
+    let empty = tempfile::tempdir().expect("a folder");
+    Store::create(empty.path(), PlanFile::of(&plan, 1.0)).expect("a folder");
+    let nothing = merge_partial(&[empty.path().to_owned()], &table, &Stop::default());
+    assert!(matches!(nothing, Err(CampaignError::Incomplete { .. })));
     let (ran, count) = run_in(folder.path(), &plan, &options(2), &|case| {
         Some(computed(case))
     });
     let ran = ran.expect("it runs");
     assert_eq!((ran.found, ran.computed, count), (10, 190, 190));
     assert_eq!(merged(folder.path()), whole(&plan).1);
+}
+
+/// A block is about a minute of work on one core, a start-up of each case included: a thousand short
+/// cases are more than one.
+#[test]
+fn a_block_that_nobody_chose_is_a_minute_of_work() {
+    let text = "name = \"short\"\nroot = 1\nsamples = 1000\n[base]\nscenario = \"stand\"\n";
+    let plan = crate::common::plan_of(text);
+    let block = |duration_s| PlanFile::of(&plan, duration_s).block;
+    assert_eq!([0.3, 10.0, 60.0, 7200.0].map(block), [256, 64, 16, 1]);
 }
 
 #[test]

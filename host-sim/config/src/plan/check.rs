@@ -47,6 +47,18 @@ fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
     span.or(Some(entry.span))
 }
 
+/// Where a factor names what it sets, one of a list if it is one.
+fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>> {
+    let entry = r.table(&format!("factor.{}", factor.name))?;
+    let Some((key, item)) = entry.get("parameter") else {
+        return Some(entry.span);
+    };
+    let listed = item.as_array().into_iter().flatten();
+    let one = listed.filter(|value| value.as_str() == Some(full));
+    let one = one.filter_map(toml_edit::Value::span).next();
+    one.or_else(|| item.span()).or(Some(key))
+}
+
 /// What a factor sets, by its path in a plan.
 fn set_by(factor: &Factor) -> Vec<String> {
     match &factor.sets {
@@ -96,18 +108,20 @@ fn field_in_all<'a>(
 
 /// One field that a factor sets, in one file.
 fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &Base) {
-    let span = span_of(r, factor);
-    let named = format!("`factor.{}.parameter` = \"{prefix}{path}\"", factor.name);
+    let full = format!("{prefix}{path}");
+    let named = format!("`factor.{}.parameter` = \"{full}\"", factor.name);
+    let at_path = span_of_path(r, factor, &full);
     if factor.is_text() {
         if !base.has_text(path) {
             let message = format!("{named}: {} has no name there", base.file);
-            r.problem(span, message, "no such name", nearest(base, prefix, path));
+            let help = nearest(base, prefix, path);
+            r.problem(at_path, message, "no such name", help);
         }
         return;
     }
     let Some((info, component)) = base.listed(path) else {
         let message = format!("{named}: {} has no such parameter", base.file);
-        r.problem(span, message, "not known", nearest(base, prefix, path));
+        r.problem(at_path, message, "not known", nearest(base, prefix, path));
         return;
     };
     if info.value.len() > 1 && component.is_none() && !factor.scale {
@@ -115,19 +129,14 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
             "{named} is a list of {} numbers: scale it, or set one of them, `{path}[0]`",
             info.value.len()
         );
-        r.problem(span, message, "a list", None);
+        r.problem(at_path, message, "a list", None);
         return;
     }
+    let span = span_of(r, factor);
     if !unit_fits(r, factor, info, span.clone()) {
         return;
     }
-    range(
-        r,
-        factor,
-        (info, component),
-        &format!("{prefix}{path}"),
-        span,
-    );
+    range(r, factor, (info, component), &full, span);
 }
 
 fn nearest(base: &Base, prefix: &str, path: &str) -> Option<String> {
@@ -207,13 +216,22 @@ fn range(
     let range = format!("{} to {}{}", pretty(min), pretty(max), suffix(&unit));
     if let Some((v, made)) = wrong {
         let how = match factor.scale {
+            _ if v.is_infinite() => {
+                let end = if v > 0.0 { "upper" } else { "lower" };
+                let of = if factor.scale {
+                    ", and the file's value times it leaves the range"
+                } else {
+                    ""
+                };
+                format!("its distribution has no {end} end{of}")
+            }
             true => format!(
                 "{} times the file's value is {}{}",
-                shown(v),
-                shown(made),
+                pretty(v),
+                pretty(made),
                 suffix(&unit)
             ),
-            false => format!("{}{} is out of range", shown(v), suffix(&unit)),
+            false => format!("{}{} is out of range", pretty(v), suffix(&unit)),
         };
         let help = match v.is_infinite() {
             true => "cut the distribution with `min` and `max`".to_owned(),
@@ -230,14 +248,6 @@ fn range(
             factor.name
         );
         r.problem(span, message, "not whole", None);
-    }
-}
-
-fn shown(v: f64) -> String {
-    match v {
-        f64::INFINITY => "without an upper end, it".to_owned(),
-        f64::NEG_INFINITY => "without a lower end, it".to_owned(),
-        v => pretty(v),
     }
 }
 

@@ -18,7 +18,7 @@ impl Reader {
     /// Reads one quantity `{ value, unit, source }` in SI.
     pub(crate) fn quantity(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<Vec<f64>> {
         let path = entry.field_path(spec.key);
-        let example = self.example(spec.key, spec.dimension);
+        let example = self.example(spec);
         let (key_span, item) = entry.get(spec.key)?;
         let bare = item.as_bool().is_none() && !item.is_table_like();
         if spec.dimension == Dimension::Flag && !self.source_required && bare {
@@ -126,7 +126,7 @@ impl Reader {
         } else {
             format!("in [{}]", entry.path)
         };
-        let example = self.example(spec.key, spec.dimension);
+        let example = self.example(spec);
         self.problem(
             Some(entry.span.clone()),
             format!("`{}` is missing {place}", spec.key),
@@ -188,14 +188,23 @@ impl Reader {
     }
 
     /// How a quantity is written.
-    pub(crate) fn example(&self, key: &str, dimension: Dimension) -> String {
-        let unit = dimension.units()[0].0;
-        match (self.source_required, dimension) {
+    fn example(&self, spec: &FieldSpec) -> String {
+        let key = spec.key;
+        let unit = spec.dimension.units()[0].0;
+        let value = match spec.components {
+            1 => "…".to_owned(),
+            several => format!("[{}]", vec!["…"; several].join(", ")),
+        };
+        match (self.source_required, spec.dimension) {
             (true, _) => {
-                format!("write `{key} = {{ value = …, unit = \"{unit}\", source = \"…\" }}`")
+                format!("write `{key} = {{ value = {value}, unit = \"{unit}\", source = \"…\" }}`")
             }
-            (false, Dimension::Number) => format!("write `{key} = …`, a number without unit"),
+            (false, Dimension::Number) => format!("write `{key} = {value}`, without unit"),
             (false, Dimension::Flag) => format!("write `{key} = true` or `{key} = false`"),
+            // The short form has one number.
+            (false, _) if spec.components > 1 => {
+                format!("write `{key} = {{ value = {value}, unit = \"{unit}\" }}`")
+            }
             (false, _) => format!(
                 "write `{key} = {{ value = …, unit = \"{unit}\" }}`, or `{key} = \"… {unit}\"`"
             ),

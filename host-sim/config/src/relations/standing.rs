@@ -57,7 +57,7 @@ impl AtRest {
 
 /// The robot stands where it starts.
 pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
-    let Err(PlantError::NotStanding) = state else {
+    let Err(PlantError::NotStanding | PlantError::OnChassis { .. }) = state else {
         return None;
     };
     let lengths_m = std::array::from_fn(|leg| {

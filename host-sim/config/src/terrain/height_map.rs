@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
-use wheeleg_plant::terrain::{HeightMap, Shape};
+use wheeleg_plant::terrain::{HeightMap, HeightMapError, STEEPEST_DEG, Shape};
 
 use super::fields::{Fields, length};
 use super::files::Files;
@@ -23,6 +23,18 @@ const HIGHEST_M: f64 = 1e4;
 struct Values {
     values: Vec<f64>,
     columns: usize,
+    /// Line of each row in a table; none of a picture.
+    lines: Vec<usize>,
+}
+
+impl Values {
+    /// Where a row stands, as its reader finds it: both count from 1.
+    fn row(&self, row: usize) -> String {
+        match self.lines.get(row - 1) {
+            Some(line) => format!("line {line}"),
+            None => format!("row {row}"),
+        }
+    }
 }
 
 /// Reads a map.
@@ -35,7 +47,7 @@ pub(super) fn height_map(
     let scale = length("scale", [-1e3, 1e3], "height of one unit of the file");
     let offset = length("offset", [-HIGHEST_M, HIGHEST_M], "added to every height");
     let origin = FieldSpec {
-        doc: "place of the lower left value, seen from above with x to the right: x, y",
+        doc: "x and y of the first value of the last row: the map's rear right corner",
         ..length("origin", [-1e5, 1e5], "")
     };
     fields.has("file");
@@ -95,8 +107,8 @@ pub(super) fn height_map(
     let heights: Vec<f64> = values.values.iter().map(|v| v * scale + offset).collect();
     if let Some(at) = heights.iter().position(|h| h.abs() > HIGHEST_M) {
         let what = format!(
-            "row {}, column {}: the height is {} m; allowed -{HIGHEST_M} to {HIGHEST_M} m",
-            at / values.columns + 1,
+            "{}, column {}: the height is {} m; allowed -{HIGHEST_M} to {HIGHEST_M} m",
+            values.row(at / values.columns + 1),
             at % values.columns + 1,
             pretty(heights[at])
         );
@@ -106,8 +118,25 @@ pub(super) fn height_map(
     match HeightMap::new(&heights, values.columns, cell, origin) {
         Ok(map) => Some(vec![Shape::HeightMap(Arc::new(map))]),
         Err(error) => {
+            let what = match error {
+                HeightMapError::Steep {
+                    row,
+                    column,
+                    next_row,
+                    next_column,
+                    rise_m,
+                    slope_deg,
+                } => format!(
+                    "{}, column {column}: the height changes by {} m from here to its neighbour at {}, \
+                     column {next_column}, {slope_deg:.1}°; allowed are {STEEPEST_DEG}°",
+                    values.row(row),
+                    pretty(rise_m),
+                    values.row(next_row),
+                ),
+                size @ HeightMapError::Size { .. } => size.to_string(),
+            };
             let help = "is `cell` right, and `scale`? A wall is a part of its own: `block`";
-            problem(r, &error.to_string(), Some(help.into()));
+            problem(r, &what, Some(help.into()));
             None
         }
     }
@@ -121,7 +150,7 @@ fn is_picture(name: &str) -> bool {
 /// Numbers parted by commas, semicolons or blanks; a `#` begins a remark.
 ///
 /// # Errors
-/// In words, with row and column.
+/// In words, with line and column: remarks and empty lines count, as an editor counts them.
 fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n');
@@ -130,14 +159,13 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     let text = text.trim_start_matches('\u{feff}');
     let mut values = Values::default();
     let mut wrong = Vec::new();
-    let mut row = 0;
-    for line in text.lines() {
+    for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or("").trim();
         if line.is_empty() {
             continue;
         }
-        row += 1;
-        if row > MOST {
+        values.lines.push(number);
+        if values.lines.len() > MOST {
             wrong.push(format!("more than {MOST} rows; allowed are 2 to {MOST}"));
             break;
         }
@@ -146,12 +174,13 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
         } else {
             line.split_whitespace().collect()
         };
-        if row == 1 {
+        if values.lines.len() == 1 {
             values.columns = parted.len();
         } else if parted.len() != values.columns && wrong.len() < TOLD {
             wrong.push(format!(
-                "row {row} has {} values, the first row {}",
+                "line {number} has {} values, line {} has {}",
                 parted.len(),
+                values.lines[0],
                 values.columns
             ));
         }
@@ -159,7 +188,7 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => values.values.push(value),
                 _ if wrong.len() < TOLD => wrong.push(format!(
-                    "row {row}, column {column}: {} is not a finite number",
+                    "line {number}, column {column}: {} is not a finite number",
                     shortened(cell)
                 )),
                 _ => {}
@@ -233,6 +262,7 @@ fn picture(bytes: &[u8]) -> Result<Values, String> {
     Ok(Values {
         values: values.collect(),
         columns: wide,
+        lines: Vec::new(),
     })
 }
 
@@ -247,14 +277,14 @@ mod tests {
         assert_eq!(read("1,2,3\n-4.5,5e-1,6\n"), expected);
         assert_eq!(read("\u{feff}# m\r\n1; 2; 3\r\n\r\n-4.5; 0.5; 6"), expected);
         assert_eq!(read("1 2\t3\n-4.5  .5 6"), expected);
-        let wrong = read("1,x,3\n4,5\n6,,nan\n").unwrap_err();
+        let wrong = read("# heights, m\n1,x,3\n\n4,5\n# the last\n6,,nan\n").unwrap_err();
         assert_eq!(
             wrong,
             [
-                "row 1, column 2: \"x\" is not a finite number",
-                "row 2 has 2 values, the first row 3",
-                "row 3, column 2: \"\" is not a finite number",
-                "row 3, column 3: \"nan\" is not a finite number",
+                "line 2, column 2: \"x\" is not a finite number",
+                "line 4 has 2 values, line 2 has 3",
+                "line 6, column 2: \"\" is not a finite number",
+                "line 6, column 3: \"nan\" is not a finite number",
             ]
         );
         assert_eq!(read("# nothing\n").unwrap_err(), ["it holds no numbers"]);

@@ -33,14 +33,22 @@ impl BodyMechanics {
     /// Puts the robot into the pose in which it stands, starting from where it is.
     ///
     /// # Errors
-    /// [`PlantError::NotStanding`] if it does not stand on its feet in this pose.
+    /// [`PlantError::NotStanding`] if it does not stand on its feet in this pose,
+    /// [`PlantError::OnChassis`] if its chassis lies on the ground where its wheels should stand.
     pub fn stand(&self, motion: &mut BodyMotion) -> Result<(), PlantError> {
         motion.contacts = ContactStates::default();
         self.balance(motion, &UPRIGHT, false)?;
         self.balance(motion, &ALL, true)?;
-        let scene = self.scene(motion)?;
-        if scene.loads.feet.iter().all(|foot| foot.normal_n <= 0.0) {
+        let loads = self.scene(motion)?.loads;
+        if loads.feet.iter().all(|foot| foot.normal_n <= 0.0) {
             return Err(PlantError::NotStanding);
+        }
+        let lies = loads.chassis_n > 0.0;
+        if lies && loads.wheels.iter().all(|wheel| wheel.normal_n <= 0.0) {
+            return Err(PlantError::OnChassis {
+                chassis_n: loads.chassis_n,
+                feet_n: loads.feet.iter().map(|foot| foot.normal_n).sum(),
+            });
         }
         Ok(())
     }

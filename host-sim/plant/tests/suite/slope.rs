@@ -1,8 +1,10 @@
 //! The robot at rest on planes: loads by moments.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 use wheeleg_plant::Plant;
-use wheeleg_plant::terrain::{Material, Part, Plane, Shape};
+use wheeleg_plant::terrain::{HeightMap, Material, Part, Plane, Shape};
 use wheeleg_plant::testing::wheeleg_2003;
 
 #[test]
@@ -129,4 +131,34 @@ fn a_contact_too_stiff_for_the_step_is_named() {
         p.contacts.foot.law.stiffness_n_m = 5e6;
     });
     assert!(finer.is_none());
+}
+
+/// A ramp that begins behind the robot: the level ground before it props the chassis up, and the
+/// wheels hang in the air between. The same pose stands where the ramp is flatter.
+#[test]
+fn a_start_on_the_chassis_is_refused() {
+    let on_ramp = |degrees: f64, begin_m: f64| {
+        let cell_m = 0.05;
+        let (columns, rows) = (61, 3);
+        let height = |i: usize| {
+            let x_m = cell_m * (i % columns) as f64 - 1.0;
+            degrees.to_radians().tan() * (x_m - begin_m).max(0.0)
+        };
+        let heights: Vec<f64> = (0..columns * rows).map(height).collect();
+        let map = HeightMap::new(&heights, columns, cell_m, [-1.0, -0.05]).unwrap();
+        let mut params = wheeleg_2003();
+        params.terrain.parts = vec![Part {
+            shape: Shape::HeightMap(Arc::new(map)),
+            material: Material::ROUGH,
+        }];
+        Plant::new(&params).unwrap().initial_state(1)
+    };
+    for degrees in [20.0, 24.0, 26.0, 28.0, 30.0, 32.0, 35.0] {
+        for begin in [-0.6, -0.5, -0.4, -0.3, -0.25, -0.2, -0.15, -0.1] {
+            println!(
+                "{degrees} {begin} {:?}",
+                on_ramp(degrees, begin).map(|_| ())
+            );
+        }
+    }
 }

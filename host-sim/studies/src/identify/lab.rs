@@ -9,8 +9,25 @@ use std::path::Path;
 use wheeleg_config::{builtin, pretty};
 use wheeleg_plant::axis::{AxisParams, TICK_US};
 
+use super::map::Mapped;
 use crate::StudyError;
 
+/// Names of all columns.
+pub(super) const NAMES: [&str; 13] = [
+    "time_s",
+    "position_mm",
+    "fill_a",
+    "vent_a",
+    "fill_b",
+    "vent_b",
+    "fill_a_us",
+    "vent_a_us",
+    "fill_b_us",
+    "vent_b_us",
+    "pressure_a_bar",
+    "pressure_b_bar",
+    "load_n",
+];
 const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
 const PRESSURES: [&str; 2] = ["pressure_a_bar", "pressure_b_bar"];
 /// Longest measurement, s.
@@ -51,7 +68,11 @@ const QUOTED: usize = 40;
 
 /// What stands in a file, as long as anybody reads it.
 fn shown(text: &str) -> String {
-    match text.char_indices().nth(QUOTED) {
+    shown_at(text, QUOTED)
+}
+
+fn shown_at(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
     }
@@ -88,21 +109,40 @@ impl At<'_> {
     }
 }
 
+/// Where a value stands in a row, and what makes it one in our unit.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    column: usize,
+    factor: f64,
+    offset: f64,
+}
+
 /// Where the columns are.
 struct Columns {
+    /// As the file has them.
     names: Vec<String>,
-    time: usize,
-    position: usize,
-    valves: [usize; 4],
+    time: Place,
+    position: Place,
+    valves: [Place; 4],
     /// On-times; otherwise states.
     on_times: bool,
-    pressures: Option<[usize; 2]>,
-    load: Option<usize>,
+    pressures: Option<[Place; 2]>,
+    load: Option<Place>,
 }
 
 impl Columns {
-    fn of(file: &str, names: Vec<String>) -> Result<Self, StudyError> {
-        let find = |name: &str| names.iter().position(|n| n == name);
+    /// `map` tells where those are that have another name in the file.
+    fn of(file: &str, names: Vec<String>, map: &[Mapped]) -> Result<Self, StudyError> {
+        mapped(file, &names, map)?;
+        let find = |name: &str| -> Option<Place> {
+            let from = map.iter().find(|mapped| mapped.name == name);
+            let own = from.map_or(name, |mapped| mapped.column.as_str());
+            Some(Place {
+                column: names.iter().position(|n| n == own)?,
+                factor: from.map_or(1.0, |mapped| mapped.factor),
+                offset: from.map_or(0.0, |mapped| mapped.offset),
+            })
+        };
         let help = "the columns are time_s, position_mm, fill_a_us, vent_a_us, fill_b_us, vent_b_us \
                     (or fill_a, vent_a, fill_b, vent_b as 0 and 1), and if there are any \
                     pressure_a_bar, pressure_b_bar, load_n";
@@ -120,14 +160,14 @@ impl Columns {
         };
         let times = VALVES.map(|valve| format!("{valve}_us"));
         let on_times = times.iter().any(|name| find(name).is_some());
-        let mut valves = [0; 4];
-        for (at, valve) in valves.iter_mut().zip(0..4) {
-            *at = need(if on_times {
+        let valve = |valve: usize| {
+            need(if on_times {
                 &times[valve]
             } else {
                 VALVES[valve]
-            })?;
-        }
+            })
+        };
+        let valves = [valve(0)?, valve(1)?, valve(2)?, valve(3)?];
         let pressures = match PRESSURES.map(find) {
             [None, None] => None,
             _ => Some([need(PRESSURES[0])?, need(PRESSURES[1])?]),
@@ -141,10 +181,15 @@ impl Columns {
             load: find("load_n"),
             names,
         };
+        if !map.is_empty() {
+            // A table of a user's own has columns that are nothing to us.
+            return Ok(columns);
+        }
         let mut known = vec![columns.time, columns.position];
         known.extend(columns.valves);
         known.extend(columns.pressures.into_iter().flatten());
         known.extend(columns.load);
+        let known: Vec<usize> = known.iter().map(|place| place.column).collect();
         let mut others = columns.names.iter().enumerate();
         match others.find(|(i, _)| !known.contains(i)) {
             Some((_, name)) => Err(StudyError::refused(
@@ -159,12 +204,43 @@ impl Columns {
     }
 }
 
+/// Whether each column that is named is in the table, once.
+fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError> {
+    for (place, mapped) in map.iter().enumerate() {
+        let Mapped { name, column, .. } = mapped;
+        if map[..place].iter().any(|earlier| earlier.name == *name) {
+            let help = "leave one of them out";
+            return Err(StudyError::refused(
+                format!("`--map` tells twice where `{name}` is"),
+                help,
+            ));
+        }
+        let found = names.iter().filter(|name| *name == column).count();
+        if found != 1 {
+            let how = if found == 0 {
+                "no column".to_owned()
+            } else {
+                format!("{found} columns")
+            };
+            let all = shown_at(&names.join("`, `"), 400);
+            return Err(StudyError::refused(
+                format!(
+                    "{file}, line 1: there is {how} `{}`, which `--map` gives for `{name}`",
+                    shown(column)
+                ),
+                format!("the columns are `{all}`"),
+            ));
+        }
+    }
+    Ok(())
+}
+
 impl Lab {
-    /// Reads a file; the axis has the ranges.
+    /// Reads a file; the axis has the ranges, `map` the columns that have another name in it.
     ///
     /// # Errors
     /// [`StudyError`] names file, line, column, value and allowed range.
-    pub fn load(path: &Path, axis: &AxisParams) -> Result<Self, StudyError> {
+    pub fn load(path: &Path, axis: &AxisParams, map: &[Mapped]) -> Result<Self, StudyError> {
         let file = path.display().to_string();
         let text = builtin::text_of(path).map_err(|e| {
             StudyError::refused(
@@ -172,21 +248,26 @@ impl Lab {
                 "give the path of a CSV file, in UTF-8, of at most 64 MiB",
             )
         })?;
-        Self::parse(&file, &text, axis)
+        Self::parse(&file, &text, axis, map)
     }
 
     /// The same from text.
     ///
     /// # Errors
     /// As [`Lab::load`].
-    pub fn parse(file: &str, text: &str, axis: &AxisParams) -> Result<Self, StudyError> {
+    pub fn parse(
+        file: &str,
+        text: &str,
+        axis: &AxisParams,
+        map: &[Mapped],
+    ) -> Result<Self, StudyError> {
         // Some programs begin a file with the mark of its encoding.
         let text = text.trim_start_matches('\u{feff}');
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
         let names = reader.headers().map_err(|e| bad_row(file, &[], &e))?;
-        let columns = Columns::of(file, names.iter().map(str::to_owned).collect())?;
+        let columns = Columns::of(file, names.iter().map(str::to_owned).collect(), map)?;
         let mut rows = Vec::new();
         for record in reader.records() {
             let record = record.map_err(|e| bad_row(file, &columns.names, &e))?;
@@ -202,7 +283,7 @@ impl Lab {
                 "measure longer, or more often",
             ));
         }
-        units(file, &rows, axis)?;
+        units(file, &columns.names[columns.position.column], &rows, axis)?;
         ticks(file, &columns, &rows)
     }
 }
@@ -243,9 +324,13 @@ fn row(
     record: &csv::StringRecord,
     axis: &AxisParams,
 ) -> Result<Row, StudyError> {
-    let number = |column: usize, [min, max]: [f64; 2]| {
-        let (name, text) = (&columns.names[column], record.get(column).unwrap_or(""));
+    let number = |place: Place, [min, max]: [f64; 2]| {
+        let (name, text) = (
+            &columns.names[place.column],
+            record.get(place.column).unwrap_or(""),
+        );
         let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+        let value = value.map(|value| value * place.factor + place.offset);
         value.ok_or_else(|| {
             let what = match text {
                 "" => "there is no value".to_owned(),
@@ -255,8 +340,9 @@ fn row(
             at.wrong(name, &what, &help)
         })
     };
-    let ranged = |column: usize, range: [f64; 2], help: &str| {
-        at.within(&columns.names[column], number(column, range)?, range, help)
+    let ranged = |place: Place, range: [f64; 2], help: &str| {
+        let name = &columns.names[place.column];
+        at.within(name, number(place, range)?, range, help)
     };
     let stroke_mm = axis.cylinder.stroke_m * 1e3;
     let most_mm = stroke_mm * (1.0 + BEYOND);
@@ -268,7 +354,7 @@ fn row(
     let mut on_us = [0; 4];
     for (valve, on) in on_us.iter_mut().enumerate() {
         let column = columns.valves[valve];
-        let name = &columns.names[column];
+        let name = &columns.names[column.column];
         let most = if columns.on_times {
             f64::from(TICK_US)
         } else {
@@ -290,7 +376,7 @@ fn row(
             value as u16 * TICK_US
         };
     }
-    let pressure = |column: usize| ranged(column, [0.1, 20.0], "pressures are absolute, in bar");
+    let pressure = |column: Place| ranged(column, [0.1, 20.0], "pressures are absolute, in bar");
     let pressure_pa = match columns.pressures {
         Some([a, b]) => Some([pressure(a)? * 1e5, pressure(b)? * 1e5]),
         None => None,
@@ -316,7 +402,12 @@ fn row(
 }
 
 /// A piston that hardly moves is one in metres, or one that tells nothing.
-fn units(file: &str, rows: &[(u64, Row)], axis: &AxisParams) -> Result<(), StudyError> {
+fn units(
+    file: &str,
+    column: &str,
+    rows: &[(u64, Row)],
+    axis: &AxisParams,
+) -> Result<(), StudyError> {
     let positions = rows.iter().map(|(_, row)| row.position_m);
     let (low, high) = positions.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
     let stroke_m = axis.cylinder.stroke_m;
@@ -326,7 +417,7 @@ fn units(file: &str, rows: &[(u64, Row)], axis: &AxisParams) -> Result<(), Study
     let metres = high <= 1.1e-3 * stroke_m && high > low;
     Err(StudyError::refused(
         format!(
-            "{file}, column `position_mm`: all values lie within {:.3} mm, less than 2 % of the stroke of {:.0} mm",
+            "{file}, column `{column}`: all values lie within {:.3} mm, less than 2 % of the stroke of {:.0} mm",
             (high - low) * 1e3,
             stroke_m * 1e3
         ),
@@ -356,7 +447,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
             "{} ms after the first row; allowed: whole ms, 1 to {most}",
             pretty(period_ms)
         );
-        return Err(at(rows[1].0).wrong("time_s", &what, help));
+        return Err(at(rows[1].0).wrong(&columns.names[columns.time.column], &what, help));
     }
     for (k, (line, row)) in rows.iter().enumerate() {
         let due_ms = k as f64 * step;
@@ -367,7 +458,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
                 pretty(ms(row)),
                 pretty(due_ms)
             );
-            return Err(at(*line).wrong("time_s", &what, help));
+            return Err(at(*line).wrong(&columns.names[columns.time.column], &what, help));
         }
     }
     if rows.len() as f64 * step > LONGEST_S * 1e3 {

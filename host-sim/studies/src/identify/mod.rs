@@ -9,6 +9,7 @@ pub mod experiment;
 pub mod fit;
 pub mod free;
 pub mod lab;
+pub mod map;
 mod page;
 mod predict;
 pub mod told;
@@ -29,6 +30,7 @@ use self::experiment::Experiment;
 use self::fit::{Fit, Noise, Problem, scatter, trust};
 use self::free::{COUNT, FREE, Logs, applied};
 use self::lab::Lab;
+use self::map::Mapped;
 use self::predict::{Predicted, predict};
 use self::told::Told;
 use crate::StudyError;
@@ -145,6 +147,8 @@ pub struct Options<'a> {
     pub lab: &'a Path,
     /// Built-in axis or path of an axis file.
     pub axis: &'a str,
+    /// Columns that have another name or unit in the measurement.
+    pub map: &'a [Mapped],
     /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
     pub hold_out: f64,
     /// Seed of the starts.
@@ -162,7 +166,7 @@ pub fn identify(
 ) -> Result<Finished<Identified>, StudyError> {
     let source = AxisConfig::source(options.axis)?;
     let config = AxisConfig::parse(&source.file, &source.text)?;
-    let lab = Lab::load(options.lab, &config.axis)?;
+    let lab = Lab::load(options.lab, &config.axis, options.map)?;
     let job = Job::begin("identify", &settings(&config.name))?;
     let identified = Identified::of(config, lab, options, &job.progress)?;
     let toml = identified.rewritten(&source.file, &source.text, options)?;

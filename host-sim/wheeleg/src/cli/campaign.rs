@@ -9,8 +9,8 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use wheeleg_campaign::report::Report;
 use wheeleg_campaign::{
-    CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge, replay,
-    run, simulate, status,
+    CampaignError, Cases, Options, PlanFile, SAVE_EVERY, Shard, Store, Submission, isolated, merge,
+    merge_partial, replay, run, simulate, status,
 };
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::StudyError;
@@ -136,6 +136,9 @@ struct MergeArgs {
     /// The table.
     #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
     out: PathBuf,
+    /// Also where cases are missing: a table of those that have a row, as of a pilot.
+    #[arg(long)]
+    partial: bool,
 }
 
 #[derive(Debug, Args)]
@@ -237,6 +240,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
         stop: stop.clone(),
         program: std::env::current_exe().ok(),
         json: args.progress == Shown::Json,
+        save_every: SAVE_EVERY,
     };
     let simulate = |case: &_| simulate(case, plan.limit_s, &stop);
     let ran = run(&store, &cases, &options, &simulate)?;
@@ -314,17 +318,12 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
 
 fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
+    let merge = if args.partial { merge_partial } else { merge };
     let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
         tell("stopped; no table is written, and the parts stay as they are");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
-    let text = format!(
-        "rows    {}\nhash    {}\ntable   {}\n",
-        merged.rows,
-        merged.hash,
-        args.out.display()
-    );
-    Ok(print(&text)?)
+    Ok(print(&print::merged(&merged, &args.out))?)
 }
 
 fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {

@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::{Drawing, end, place, stop_on_signals, whole};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::identify::map::Mapped;
 use wheeleg_studies::identify::{self, AXIS, Identified, NEXT, Options};
 use wheeleg_studies::study::Settings;
 
@@ -21,6 +22,11 @@ pub(super) struct IdentifyArgs {
     /// Built-in axis or path of an axis file: the data sheet.
     #[arg(long, value_name = "AXIS")]
     axis: String,
+    /// A column that has another name or unit in the file: NAME=COLUMN, or NAME=COLUMN*FACTOR+OFFSET,
+    /// such as `position_mm=x (m)*1000`; may be given several times. The file's other columns are
+    /// then not read.
+    #[arg(long, value_name = "NAME=COLUMN")]
+    map: Vec<Mapped>,
     /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
     hold_out: f64,
@@ -54,6 +60,7 @@ pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
     let options = Options {
         lab: &args.lab,
         axis: &args.axis,
+        map: &args.map,
         hold_out: args.hold_out,
         seed: args.seed,
     };

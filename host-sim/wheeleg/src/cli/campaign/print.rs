@@ -6,7 +6,9 @@ use std::process::ExitCode;
 
 use serde_json::json;
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
-use wheeleg_campaign::{Cases, Ran, Replayed, Shard, State, Status, Store, Submission};
+use wheeleg_campaign::{
+    Cases, Cause, Causes, Merged, Ran, Replayed, Shard, State, Status, Store, Submission,
+};
 use wheeleg_studies::StudyError;
 
 /// Prints cases: place, identity, seed, and the value of each factor.
@@ -48,14 +50,43 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: bool) -> String
         "\nfailed  {} of the {} computed now missed a required target or have no result",
         ran.failed, ran.computed
     );
+    out.push_str(&causes(&ran.causes));
     let folder = store.folder().display();
     let _ = writeln!(out, "folder  {folder}");
-    if shard == Shard::ALL && !pilot && ran.stopped.is_none() {
+    if shard == Shard::ALL && ran.stopped.is_none() {
+        let partial = if pilot { " --partial" } else { "" };
         let _ = writeln!(
             out,
-            "next    wheeleg campaign merge {folder} --out {folder}/cases.parquet"
+            "next    wheeleg campaign merge {folder}{partial} --out {folder}/cases.parquet"
         );
     }
+    out
+}
+
+/// Causes that are told; of more there is the number.
+const CAUSES: usize = 20;
+
+/// Why cases failed, those without a result first.
+fn causes(causes: &Causes) -> String {
+    let mut out = String::new();
+    for (cause, cases) in causes.first(CAUSES) {
+        let _ = writeln!(out, "        {cases:>5}  {}", causes.told(cause));
+    }
+    let more = causes.kinds().saturating_sub(CAUSES);
+    if more > 0 {
+        let _ = writeln!(out, "        and {more} other causes");
+    }
+    out
+}
+
+/// A table that was made.
+pub(super) fn merged(merged: &Merged, table: &Path) -> String {
+    let mut out = format!("rows    {}\n", merged.rows);
+    if merged.missing > 0 {
+        let _ = writeln!(out, "missing {} cases have no row yet", merged.missing);
+    }
+    let _ = writeln!(out, "hash    {}", merged.hash);
+    let _ = writeln!(out, "table   {}", table.display());
     out
 }
 
@@ -77,6 +108,14 @@ pub(super) fn state(state: &State, store: &Store) -> String {
         "cases   {} of {}, {} of them in blocks that are not finished\n",
         state.rows, state.cases, state.partial
     );
+    if state.begun + state.unsaved > 0 {
+        let _ = writeln!(
+            out,
+            "begun   {} more cases, of which {} have ended and are not saved yet",
+            state.begun + state.unsaved,
+            state.unsaved
+        );
+    }
     let counts = Status::ALL.iter().zip(state.by_status);
     let counts = counts.filter(|(_, n)| *n > 0);
     let counts: Vec<String> = counts.map(|(s, n)| format!("{n} {}", s.name())).collect();
@@ -88,6 +127,7 @@ pub(super) fn state(state: &State, store: &Store) -> String {
         "failed  {} missed a required target or have no result",
         state.failed
     );
+    out.push_str(&causes(&state.causes));
     let _ = writeln!(
         out,
         "blocks  {} of {} without a part",
@@ -110,11 +150,25 @@ pub(super) fn state_json(state: &State) -> String {
         .bad
         .iter()
         .map(|(path, why)| json!({ "part": path, "why": why }));
+    let causes = state.causes.first(CAUSES).into_iter();
+    let causes = causes.map(|(cause, cases)| match cause {
+        Cause::NoResult { status, message } => {
+            json!({ "cause": status.name(), "message": message, "cases": cases })
+        }
+        Cause::Missed { target } => json!({ "cause": "missed", "target": target, "cases": cases }),
+        Cause::NotMeasured { target } => {
+            json!({ "cause": "not-measured", "target": target, "cases": cases })
+        }
+    });
     let line = json!({
         "cases": state.cases,
         "rows": state.rows,
         "partial": state.partial,
+        "begun": state.begun,
+        "unsaved": state.unsaved,
         "failed": state.failed,
+        "causes": causes.collect::<Vec<_>>(),
+        "other_causes": state.causes.kinds().saturating_sub(CAUSES),
         "status": counts,
         "missing_blocks": state.missing,
         "bad_parts": bad.collect::<Vec<_>>(),
