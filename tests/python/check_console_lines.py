@@ -8,12 +8,14 @@ line is marked as old. A server that is gone is told, and one that is there agai
 shown without what they do not tell.
 """
 
+import contextlib
 import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import traceback
 from pathlib import Path
 
 import check_console
@@ -49,6 +51,24 @@ def moves_nothing(robot, what):
         time.sleep(0.1)
 
 
+def tried(page, folder, what, act, *arguments):
+    """What of it goes wrong is told with what the page showed, and the rest is looked at all the same."""
+    print(f"{what} …", flush=True)
+    try:
+        return act(*arguments)
+    except Exception as error:
+        where = "; ".join(f"line {frame.lineno}" for frame in traceback.extract_tb(error.__traceback__) if "/tests/python/" in frame.filename)
+        shown = ""
+        # A page that hangs cannot be asked either.
+        with contextlib.suppress(Exception):
+            page.set_default_timeout(5000)
+            page.screenshot(path=folder / f"failed-{what.replace(' ', '-')}.png")
+            shown = page.inner_text("header") + " | " + page.inner_text(".answer")
+            page.set_default_timeout(30000)
+        problems.append(f"{what}: {type(error).__name__} ({where}): {str(error)[:400]}; the page showed {shown!r}")
+        return None
+
+
 def recovers(page):
     page.bring_to_front()
     expect(becomes_ready(page), f"does not recover: {page.inner_text('.answer')!r}")
@@ -57,17 +77,19 @@ def recovers(page):
 def second_browser(browser, console, first, robot):
     second = opened(browser, console, f"#k={console.keys['control']}")
     second.wait_for_selector(".joint")
-    expect(waits(second, "Control", ["browser"]), "the second does not see who is in control")
+    # Its window may have come before the first one, whose page then does not beat.
     for _ in range(check_console.ATTEMPTS):
-        press(second, "Take control")
+        recovers(first)
+        expect(waits(second, "Control", ["browser"]), "the second does not see who is in control")
+        # Pressed without its window coming to the front.
+        second.locator(".buttons button", has_text="Take control").dispatch_event("click")
         second.wait_for_timeout(500)
         if "browser is in control" in second.inner_text(".answer"):
             break
-        recovers(first)
     expect("refused" in second.inner_text(".answer"), f"a second takes the control: {second.inner_text('.answer')!r}")
     expect("asks for the control" in first.inner_text(".answer"), f"the first is not told: {first.inner_text('.answer')!r}")
     expect(robot.state()["armed"], "the first is disturbed")
-    second.click(".stop")
+    second.locator(".stop").dispatch_event("click")
     expect(waits(first, "State", ["STOPPED"]), "a second cannot stop the first")
     second.context.close()
     recovers(first)
@@ -137,8 +159,10 @@ def server_again(program, home, console, page, browser):
     """The server ends and is there again, under the same address and keys."""
     listen = "127.0.0.1:" + console.address.rsplit(":", 1)[1]
     console.end()
-    page.wait_for_selector(".banner:not(.alarm):not([hidden])", timeout=5000)
-    expect("reload" in page.inner_text(".banner:not(.alarm)"), "a server that is gone is not told")
+    try:
+        page.wait_for_function("() => [...document.querySelectorAll('.banner:not(.alarm):not([hidden])')].some((b) => b.textContent.includes('reload'))", timeout=5000)
+    except Exception:
+        problems.append(f"a server that is gone is not told: {page.inner_text('body')[:300]!r}")
     expect(page.get_attribute("body", "data-state") == "stale", "without a server the page looks live")
     again = Console(program, home, listen, "--name", NEAR)
     page.reload()
@@ -196,15 +220,21 @@ def main(program, folder, _axe=None):
                 page.wait_for_selector(".joint")
                 robot.until(lambda state: state["ready"])
                 recovers(page)
-                second_browser(browser, console, page, robot)
-                dead_line(page, robot, relay)
-                slow_line(page, robot, relay, folder)
-                frozen_page(page, robot)
-                hidden_page(page, robot)
+                tried(page, folder, "second browser", second_browser, browser, console, page, robot)
+                for what, act in [
+                    ("dead line", lambda: dead_line(page, robot, relay)),
+                    ("slow line", lambda: slow_line(page, robot, relay, folder)),
+                    ("frozen page", lambda: frozen_page(page, robot)),
+                    ("hidden page", lambda: hidden_page(page, robot)),
+                ]:
+                    tried(page, folder, what, act)
+                    relay.dead.clear()
+                    relay.delay_s = 0.0
                 robot.close()
-                console = server_again(program, home, console, page, browser)
+                again = tried(page, folder, "server again", server_again, program, home, console, page, browser)
+                console = again or console
             console.end()
-            real_boards(program, browser, home, folder)
+            tried(page, folder, "real boards", real_boards, program, browser, home, folder)
         finally:
             console.end()
             browser.close()

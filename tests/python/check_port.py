@@ -23,6 +23,8 @@ APART_MM = 2.0
 JOINTS = [f"/joint/{n}" for n in range(1, 7)]
 # A busy machine may keep a driver from looking for longer than the master lets it; then all begins anew.
 ATTEMPTS = 3
+# Longest time in which a robot can be armed again.
+READY_S = 60
 
 
 @contextlib.contextmanager
@@ -37,11 +39,20 @@ def boards(program):
 
 
 def armed(robot):
-    """In control of a robot that stands, armed."""
-    if robot.state()["hold"]:
-        robot.command("ClearFault")
-    robot.until(lambda state: state["ready"])
-    robot.command("Arm")
+    """In control of a robot that stands, armed; air that went out comes back in its time."""
+    end = time.monotonic() + READY_S
+    while True:
+        try:
+            if robot.state()["hold"]:
+                robot.command("ClearFault")
+            robot.until(lambda state: state["ready"], 10)
+            robot.command("Arm")
+            break
+        except (Refused, TimeoutError) as error:
+            lost = isinstance(error, Refused) and error.reason == "not_in_control"
+            if lost or time.monotonic() > end:
+                raise
+            time.sleep(0.5)
     robot.command("Stand")
 
 
@@ -59,15 +70,44 @@ def three_steps(robot):
                     seen.append([robot.latest(joint)["sensed_mm"] for joint in JOINTS])
                     time.sleep(0.01)
                 if not over():
-                    raise Refused("walk", "it was ended")
+                    raise Refused("walk", f"it was ended: {robot.state()}")
                 time.sleep(1.0)
                 ends = [robot.latest(joint)["sensed_mm"] for joint in JOINTS]
                 extremes = [(min(column), max(column)) for column in zip(*seen)]
                 robot.command("Disarm")
                 return ends, extremes
-        except Refused:
-            if attempt == ATTEMPTS - 1:
-                raise
+        except (Refused, TimeoutError) as error:
+            again(attempt, error)
+
+
+def again(attempt, error):
+    """Before what went wrong is tried once more."""
+    print(f"attempt {attempt + 1}: {error}", file=sys.stderr, flush=True)
+    if attempt == ATTEMPTS - 1:
+        raise error
+    time.sleep(1.0)
+
+
+@contextlib.contextmanager
+def in_mid_walk(robot):
+    """In control of a robot that has been walking for a second; it may be lost in the block."""
+    robot.until(lambda state: state["ready"], 60)
+    for attempt in range(ATTEMPTS):
+        with contextlib.ExitStack() as stack:
+            try:
+                stack.enter_context(robot.control())
+                armed(robot)
+                walked(robot)
+                robot.until(lambda state: state["stepping"], 10)
+                time.sleep(1.0)
+                if not robot.state()["stepping"]:
+                    raise Refused("walk", f"it was ended: {robot.state()}")
+            except (Refused, TimeoutError) as error:
+                again(attempt, error)
+                continue
+            with contextlib.suppress(Lost, Refused):
+                yield
+            return
 
 
 def walked(robot):
@@ -104,16 +144,10 @@ def log_of_the_killed(program, folder, last_us):
 
 def killed_in_mid_walk(program, home, line):
     with served(program, home, *ROBOT, "--port", line, "--record") as (address, keys, recordings, pid):
-        with Robot(address, keys["control"]) as robot:
-            robot.until(lambda state: state["ready"], 60)
-            with contextlib.suppress(Lost, Refused), robot.control():
-                armed(robot)
-                walked(robot)
-                robot.until(lambda state: state["phase"] not in ("idle", "ready"), 10)
-                time.sleep(1.0)
-                last_us = robot.state()["master_us"]
-                os.kill(pid, signal.SIGKILL)
-                robot.until(lambda state: False, 5)
+        with Robot(address, keys["control"]) as robot, in_mid_walk(robot):
+            last_us = robot.state()["master_us"]
+            os.kill(pid, signal.SIGKILL)
+            robot.until(lambda state: False, 5)
     log_of_the_killed(program, recordings / "0001", last_us)
     # Somebody else leads them: they hold, and say why.
     with served(program, home, *ROBOT, "--port", line) as (address, keys, _, _):
@@ -129,12 +163,7 @@ def gone_in_mid_walk(program, home):
     with boards(program) as (line, process):
         with served(program, home, *ROBOT, "--port", line) as (address, keys, _, _):
             with Robot(address, keys["control"]) as robot:
-                robot.until(lambda state: state["ready"], 60)
-                with contextlib.suppress(Refused, Lost), robot.control():
-                    armed(robot)
-                    walked(robot)
-                    robot.until(lambda state: state["phase"] not in ("idle", "ready"), 10)
-                    time.sleep(1.0)
+                with in_mid_walk(robot):
                     begin = robot.state()["master_us"]
                     process.kill()
                     state = robot.until(lambda state: state["hold"], 5)

@@ -43,9 +43,10 @@ pub enum ArgumentKind {
     Choice(&'static [&'static str]),
     /// Yes or no.
     Flag,
-    /// Number of a parameter of the board that the command names.
+    /// A parameter of the board that the command names: its number, for people its name.
     Parameter,
-    /// A value of that parameter, as the raw number of its format. The board checks it.
+    /// A value of that parameter: inside the master as the raw number of its format, for people in
+    /// the unit of the parameter. The board checks it.
     Raw,
 }
 

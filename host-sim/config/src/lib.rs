@@ -15,6 +15,7 @@
 
 pub mod axis;
 mod bars;
+mod board_value;
 pub mod builtin;
 mod command;
 mod commissioned;
@@ -41,13 +42,13 @@ pub mod timing;
 
 pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
+pub use board_value::{allowed_raw, allowed_values, in_unit, raw_of};
 pub use command::command;
 pub use drawing::Drawing;
 pub use error::{ConfigError, Problem, plain_text};
 pub use gait::GaitParams;
 pub use law::LawChoice;
 pub use node::NodeParams;
-pub use node::raw_of;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};

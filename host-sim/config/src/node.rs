@@ -2,8 +2,9 @@
 
 use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Node;
-use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
+use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
+use super::board_value::{in_unit, raw_of, scale};
 use super::params::ParameterInfo;
 use super::quantity::{pretty, suffix};
 use super::reader::{Entry, Reader, range};
@@ -95,7 +96,7 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
             Some((span, path))
         });
         let Some((span, path)) = found else { continue };
-        let value = tidy(f64::from(*raw) / scale(info.format));
+        let value = in_unit(info, *raw);
         r.problem(
             Some(span),
             format!(
@@ -147,8 +148,7 @@ pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
     let (span, item) = entry.get("value")?;
     let value = item.as_float().or(item.as_integer().map(|n| n as f64));
     let Some(value) = value.filter(|v| v.is_finite()) else {
-        let scale = scale(info.format);
-        let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+        let (min, max) = (in_unit(info, info.min), in_unit(info, info.max));
         let message = format!(
             "`{}` = {} must be a number from {}",
             entry.field_path("value"),
@@ -161,16 +161,6 @@ pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
     Some(raw_of(info, value))
 }
 
-/// A value in the parameter's unit as the raw number of its format.
-pub fn raw_of(info: &ParamInfo, value: f64) -> i32 {
-    (value * scale(info.format)).round() as i32
-}
-
-/// A raw number in its unit without the tail of its binary fraction.
-fn tidy(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
-}
-
 /// Lists what the file leaves at the board's default, so that a listing of the
 /// robot is complete.
 fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
@@ -179,16 +169,15 @@ fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
         .iter()
         .filter(|p| entry.as_ref().is_none_or(|e| e.get(p.name).is_none()));
     for info in unset {
-        let scale = scale(info.format);
         r.list(ParameterInfo {
             path: format!("{path}.{}", info.name),
-            value: vec![tidy(f64::from(info.default) / scale)],
+            value: vec![in_unit(info, info.default)],
             unit: info.unit.to_owned(),
-            min: tidy(f64::from(info.min) / scale),
-            max: tidy(f64::from(info.max) / scale),
+            min: in_unit(info, info.min),
+            max: in_unit(info, info.max),
             source: "default of the board (protocol's parameter table)".to_owned(),
             dimension: None,
-            whole: scale == 1.0,
+            whole: scale(info.format) == 1.0,
             doc: info.text,
         });
     }
@@ -215,14 +204,9 @@ fn section(r: &mut Reader, path: &str, table: &'static [ParamInfo]) -> Vec<(u16,
         .collect()
 }
 
-/// Converts between a parameter's unit and its raw numbers.
-fn scale(format: Format) -> f64 {
-    f64::from(format.fraction_bits()).exp2()
-}
-
 fn one(r: &mut Reader, entry: &Entry, info: &'static ParamInfo) -> Option<i32> {
     let scale = scale(info.format);
-    let (min, max) = (f64::from(info.min) / scale, f64::from(info.max) / scale);
+    let (min, max) = (in_unit(info, info.min), in_unit(info, info.max));
     let range = range(min, max, info.unit);
     let stated = (info.unit, range.as_str());
     let (value, span, source) = r.table_quantity(entry, info.name, stated, info.text)?;

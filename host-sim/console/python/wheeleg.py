@@ -8,6 +8,7 @@
             robot.command("Arm")
             robot.command("Stand")
             robot.command("JointReference", joint=3, stroke=120.0)
+            robot.command("WriteParameter", board=3, parameter="error_scale", value=21.0)    # mm
         print(robot.latest("/joint/3")["sensed_mm"])
 
 Commands and their arguments are those of `wheeleg commands`. A command that is refused raises `Refused`, with the
@@ -95,7 +96,7 @@ class Robot:
     # ---- looking ----
 
     def get(self, path):
-        """A document of the HTTP API: `state`, `commands`, `channels`, `events`, `faults`, `recordings`."""
+        """A document of the HTTP API: `state`, `commands`, `channels`, `parameters`, `events`, `faults`, `recordings`."""
         request = urllib.request.Request(f"http://{self.host}/api/v1/{path}")
         request.add_header("Authorization", f"Bearer {self._digits}")
         with urllib.request.urlopen(request, timeout=5) as answer:

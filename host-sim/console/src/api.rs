@@ -96,6 +96,7 @@ fn api() -> Routes {
         .with("get", "/robot", get(robot))
         .with("get", "/channels", get(channels))
         .with("get", "/commands", get(commands))
+        .with("get", "/parameters", get(parameters))
         .with("get", "/events", get(events))
         .with("get", "/faults", get(faults))
         .with("get", "/recordings", get(recordings))
@@ -369,6 +370,10 @@ async fn channels(State(server): State<Arc<Server>>) -> Response {
 
 async fn commands(State(server): State<Arc<Server>>) -> Response {
     json_text(server.context.hub.catalogue.commands_json.clone())
+}
+
+async fn parameters(State(server): State<Arc<Server>>) -> Response {
+    json_text(server.context.hub.parameters().to_string())
 }
 
 #[derive(Deserialize)]

@@ -18,7 +18,7 @@ use wheeleg_telemetry::channels;
 use crate::catalogue::Catalogue;
 use crate::close::Close;
 use crate::desk::{ClientId, Desk};
-use crate::foxglove::{Place, Viewers};
+use crate::foxglove::Viewers;
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::messages::{done, refused};
 use crate::outbox::Outbox;
@@ -88,8 +88,6 @@ enum Asked {
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),
-    /// A parameter is to have this raw value.
-    Write(Place, i32),
 }
 
 /// What of a channel came since the last look.
@@ -332,6 +330,11 @@ impl Hub {
         json!({ "events": events })
     }
 
+    /// The boards' parameters.
+    pub(crate) fn parameters(&self) -> Value {
+        self.inner().viewers.parameters.document()
+    }
+
     /// The faults that are under way.
     pub(crate) fn active_faults(&self) -> Vec<String> {
         self.inner().active_faults()
@@ -350,6 +353,7 @@ impl Hub {
                     time_us,
                     answer,
                 } => inner.answered(id, time_us, answer),
+                Report::Parameter { board, id, raw } => inner.viewers.told((board, id), raw),
                 Report::Failed(why) => inner.failure = Some(why.to_string()),
             }
         }

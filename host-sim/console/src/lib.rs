@@ -15,6 +15,7 @@
 //! * **recording**: a folder with the log of a live robot and all that it was given, in which it can be repeated
 
 mod api;
+mod arguments;
 mod catalogue;
 pub mod client;
 mod close;
@@ -33,6 +34,7 @@ mod messages;
 mod notices;
 mod outbox;
 mod page;
+mod parameters;
 mod progress;
 mod rate;
 pub mod reason;

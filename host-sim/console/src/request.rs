@@ -1,16 +1,13 @@
 //! Frames of a client as typed requests. What is read here came over the network: every answer is
 //! a value, nothing panics, and nothing grows beyond the frame.
 
-use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
-use wheeleg_config::closest;
 use wheeleg_config::faults::FaultSpec;
-use wheeleg_master::argument::{Argument, ArgumentKind, Value};
-use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given, TABLE};
-use wheeleg_protocol::param::params_at;
+use wheeleg_master::command::{Command, CommandCode, TABLE};
 use wheeleg_telemetry::channels;
 
+use crate::arguments::{self, meant};
 use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
 use crate::reason::Reason;
 
@@ -22,8 +19,6 @@ pub(crate) const HZ_MAX: u64 = 50;
 const VALID_MAX_MS: u64 = 1_000;
 /// Longest life of a command about parameters, ms.
 const PARAMETER_VALID_MAX_MS: u64 = 5_000;
-/// Most arguments of a command.
-const ARGUMENTS_MAX: usize = 32;
 
 /// A frame of a client.
 #[derive(Debug, Clone, PartialEq)]
@@ -275,7 +270,8 @@ fn valid_us(order: &Order, valid_ms: u64) -> Result<u64, BadRequest> {
 
 fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
     if let Some(code) = CommandCode::of_name(name) {
-        return robot(code, args).map(Order::Robot);
+        let command = arguments::command(code, args).map_err(bad_argument)?;
+        return Ok(Order::Robot(command));
     }
     if let Some(info) = HOST_TABLE.iter().find(|row| row.name == name) {
         return host(info, args).map(Order::Host);
@@ -289,142 +285,10 @@ fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
     })
 }
 
-/// The name that is most likely meant, as a question.
-fn meant<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> String {
-    let near = closest(word, names);
-    near.map_or(String::new(), |near| format!(", did you mean `{near}`?"))
-}
-
 fn bad_argument(text: impl ToString) -> BadRequest {
     BadRequest {
         reason: Reason::BadArgument,
         text: text.to_string(),
-    }
-}
-
-fn robot(code: CommandCode, args: &Map<String, Json>) -> Result<Command, BadRequest> {
-    if args.len() > ARGUMENTS_MAX {
-        return Err(bad_argument("too many arguments"));
-    }
-    let info = code.info();
-    let given = args.iter().map(|(name, json)| Given {
-        name,
-        // Of an argument that does not exist, the value is not looked at.
-        value: info
-            .argument(name)
-            .map_or(Value::Flag(false), |argument| value(argument, json)),
-    });
-    let given: Vec<Given> = given.collect();
-    Command::build(code, &given).map_err(|error| {
-        let wrong = wrong_arguments(&info, args);
-        match wrong.is_empty() {
-            // Values that contradict each other.
-            true => bad_argument(error),
-            false => bad_argument(wrong.join("; ")),
-        }
-    })
-}
-
-/// All that is wrong with single arguments, in words; values as their sender wrote them.
-fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> {
-    let mut wrong = Vec::new();
-    for name in args.keys().filter(|name| info.argument(name).is_none()) {
-        let names: Vec<&str> = info.arguments.iter().map(|a| a.name).collect();
-        let takes = match names.is_empty() {
-            true => "it takes none".to_owned(),
-            false => format!("it takes: {}", names.join(", ")),
-        };
-        let near = meant(name, names);
-        wrong.push(format!("{} takes no {name:?}{near}; {takes}", info.name));
-    }
-    for argument in info.arguments {
-        let (name, range) = (argument.name, argument.range());
-        match args.get(name) {
-            None => wrong.push(format!("`{name}` is missing; allowed: {range}")),
-            Some(json) => {
-                let how = advice(argument, json, args);
-                match argument.kind.admits(value(argument, json)) {
-                    Some(true) => {}
-                    Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}{how}")),
-                    None => {
-                        let kind = argument.kind.name();
-                        wrong.push(format!(
-                            "`{name}` is {json}, not a {kind}; allowed: {range}{how}"
-                        ));
-                    }
-                }
-            }
-        }
-    }
-    wrong
-}
-
-/// How a text is written that was meant as a number, a word or a parameter of a board.
-fn advice(argument: &Argument, json: &Json, args: &Map<String, Json>) -> String {
-    let Some(text) = json.as_str() else {
-        return String::new();
-    };
-    match argument.kind {
-        ArgumentKind::Choice(words) => meant(text, words.iter().copied()),
-        ArgumentKind::Parameter => {
-            let board = args.get("board").and_then(Json::as_u64);
-            let table = board.and_then(|board| u8::try_from(board).ok());
-            let table = table.map_or(&[][..], params_at);
-            let near = closest(text, table.iter().map(|row| row.name));
-            let row = table.iter().find(|row| Some(row.name) == near);
-            row.map_or(String::new(), |row| {
-                format!(
-                    ", by its number: `{}` of this board is {}",
-                    row.name, row.id
-                )
-            })
-        }
-        _ => {
-            let is_part = |c: char| c.is_ascii_digit() || "+-.".contains(c);
-            let number = text.split(|c| !is_part(c)).next().unwrap_or_default();
-            match number.parse::<f64>() {
-                Ok(_) => format!(", without a unit: {number}"),
-                Err(_) => String::new(),
-            }
-        }
-    }
-}
-
-/// The value of an argument; one of another kind where the JSON is of another kind.
-fn value(argument: &Argument, json: &Json) -> Value {
-    let wrong = match argument.kind {
-        ArgumentKind::Flag => Value::Whole(0),
-        _ => Value::Flag(false),
-    };
-    match argument.kind {
-        ArgumentKind::Whole(_) | ArgumentKind::Parameter | ArgumentKind::Raw => {
-            let whole = json.as_i64().or_else(|| json.as_u64().map(|_| i64::MAX));
-            whole.map_or(wrong, |v| {
-                Value::Whole(v.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
-            })
-        }
-        ArgumentKind::Length(_)
-        | ArgumentKind::Velocity(_)
-        | ArgumentKind::Acceleration(_)
-        | ArgumentKind::Rate(_) => json
-            .as_f64()
-            .map_or(wrong, |v| Value::Fixed(I16F16::saturating_from_num(v))),
-        // The cast saturates; a time before now is as far out of range as there is.
-        ArgumentKind::Time(_) => json.as_f64().map_or(wrong, |s| match s < 0.0 {
-            true => Value::Micros(u32::MAX),
-            false => Value::Micros((s * 1e6).round() as u32),
-        }),
-        ArgumentKind::Choice(words) => {
-            let place = json
-                .as_str()
-                .and_then(|word| words.iter().position(|w| *w == word));
-            match (json.as_str(), place) {
-                (Some(_), Some(place)) => Value::Choice(place as u8),
-                (Some(_), None) => Value::Choice(u8::MAX),
-                _ => wrong,
-            }
-        }
-        ArgumentKind::Flag => json.as_bool().map_or(wrong, Value::Flag),
     }
 }
 
@@ -510,9 +374,67 @@ mod tests {
         assert_eq!((joint, stroke_mm.to_f64()), (3, 120.0));
         assert_eq!((seen_us, valid_us), (81_230_000, 500_000));
         let body = give(
-            r#"{"n":7,"seen_us":0,"valid_ms":5000,"cmd":"ReadParameter","args":{"board":3,"parameter":257}}"#,
+            r#"{"n":7,"seen_us":0,"valid_ms":5000,"cmd":"ReadParameter","args":{"board":3,"parameter":"proportional"}}"#,
         );
         assert!(matches!(body, Body::Give { .. }), "{body:?}");
+    }
+
+    /// In the unit of the parameter, as a scenario's file has it.
+    #[test]
+    fn a_parameter_is_written_in_its_unit() {
+        let write = |args: &str| {
+            give(&format!(
+                r#"{{"n":1,"seen_us":0,"valid_ms":5000,"cmd":"WriteParameter","args":{args}}}"#
+            ))
+        };
+        let raw_of = |args: &str| match write(args) {
+            Body::Give {
+                order: Order::Robot(Command::WriteParameter { node, id, raw }),
+                ..
+            } => (node, id, raw),
+            other => panic!("{args}: {other:?}"),
+        };
+        // I16F16, and in the scenario's words.
+        let args = r#"{"board":3,"parameter":"error_scale","value":21}"#;
+        assert_eq!(raw_of(args), (3, 0x0105, 21 << 16));
+        let text =
+            "command = \"WriteParameter\"\nboard = 3\nparameter = \"error_scale\"\nvalue = 21\n";
+        let wanted = wheeleg_config::command(text).expect("a command");
+        let (node, id, raw) = raw_of(args);
+        assert_eq!(Command::WriteParameter { node, id, raw }, wanted);
+        for (args, told) in [
+            (
+                r#"{"board":3,"parameter":"proportional","value":5}"#,
+                "`value` is 5; allowed: 0 to 4 1/mm",
+            ),
+            (
+                r#"{"board":3,"parameter":"proportional","value":"1"}"#,
+                "`value` is \"1\"; allowed: 0 to 4 1/mm",
+            ),
+            (
+                r#"{"board":3,"parameter":261,"value":5}"#,
+                "`parameter` is 261, not a parameter; allowed: a parameter of the board, by its \
+                 name: 261 of this board is `error_scale`",
+            ),
+            (
+                r#"{"board":3,"parameter":"proportionl","value":1}"#,
+                "did you mean `proportional`?",
+            ),
+            (
+                r#"{"board":9,"parameter":"proportional","value":1}"#,
+                "`board` is 9; allowed: 1 to 8",
+            ),
+            (r#"{"board":3,"value":1}"#, "`parameter` is missing"),
+            (
+                r#"{"board":3,"parameter":"proportional"}"#,
+                "`value` is missing; allowed: 0 to 4 1/mm",
+            ),
+        ] {
+            let Body::Refused(bad) = write(args) else {
+                panic!("{args}: accepted");
+            };
+            assert!(bad.text.contains(told), "{args}: {}", bad.text);
+        }
     }
 
     #[test]
@@ -603,8 +525,8 @@ mod tests {
             ),
             (
                 "ReadParameter",
-                r#"{"board":1,"parameter":"settle_band"}"#,
-                "`settle_band` of this board is 268",
+                r#"{"board":1,"parameter":268}"#,
+                "268 of this board is `settle_band`",
             ),
             ("Speed", r#"{"sped":1}"#, "did you mean `speed`?"),
         ] {

@@ -92,6 +92,7 @@ pub struct Server {
     name: Option<String>,
     fingerprint: Option<Fingerprint>,
     look_only: bool,
+    goes_first: bool,
     notices: Arc<Notices>,
     hub: Arc<Hub>,
     runtime: Option<Runtime>,
@@ -204,12 +205,9 @@ impl Server {
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
         let recorded = Arc::clone(&shared);
-        let (hub, robot) = Hub::new(
-            live::start(live, feed, contact_sink)?,
-            name,
-            shared,
-            viewers,
-        );
+        let robot = live::start(live, feed, contact_sink)?;
+        let goes_first = robot.goes_first;
+        let (hub, robot) = Hub::new(robot, name, shared, viewers);
         let notices = Arc::new(Notices::default());
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
@@ -235,6 +233,7 @@ impl Server {
             name: names.into_iter().next(),
             fingerprint,
             look_only,
+            goes_first,
             notices,
             hub,
             runtime: Some(runtime),
@@ -242,6 +241,12 @@ impl Server {
             recorder: Some(recordings.thread),
             recorded,
         })
+    }
+
+    /// Whether the system has granted the robot's thread to run before ordinary ones.
+    #[must_use]
+    pub fn robot_goes_first(&self) -> bool {
+        self.goes_first
     }
 
     /// Where it listens.

@@ -6,6 +6,7 @@ import { HZ, Scope } from "./scope.js";
 import { LINKS, boardsView } from "./boards.js";
 import { driver } from "./drive.js";
 import { jointCard } from "./joint.js";
+import { parametersView } from "./parameters.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
@@ -214,13 +215,12 @@ function showFields() {
   say(effect, chosen.effect);
   fields.replaceChildren(
     ...chosen.arguments.map((a) => {
-      const unit = a.kind === "value of the parameter" ? "raw, as on the bus" : a.unit;
-      const label = `${a.name}${unit ? ` [${unit}]` : ""}`;
+      const label = `${a.name} [${a.unit}]`;
       const range = a.min != null ? `${a.min} to ${a.max}` : "";
       let input;
       if (a.choices) input = html("select", { name: a.name, "data-kind": "text" }, a.choices.map((c) => html("option", {}, c)));
       else if (a.kind === "flag") input = html("select", { name: a.name, "data-kind": "flag" }, html("option", {}, "false"), html("option", {}, "true"));
-      else if (a.kind === "text") input = html("input", { name: a.name, "data-kind": "text" });
+      else if (a.kind === "text" || a.kind === "parameter") input = html("input", { name: a.name, "data-kind": "text" });
       else input = html("input", { name: a.name, "data-kind": "number", type: "number", step: "any", min: a.min, max: a.max, required: true, value: a.min != null && a.min > 0 ? a.min : 0 });
       return html("label", { title: a.description }, html("span", {}, label), input, html("small", {}, range));
     }),
@@ -244,6 +244,7 @@ const hold = button("Hold", "Space", () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
 const byHand = driver(command);
+const parameters = parametersView(command, () => (link ? link.ask("parameters") : Promise.reject(new Error(lost))));
 const mine = () => Boolean(link && now.state?.control?.session === link.session);
 const stepping = () => Boolean(now.state?.stepping);
 
@@ -308,6 +309,7 @@ function build({ robot, commands: list, faults: injectable }) {
         boards.root,
         byHand.root,
         html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
+        parameters.root,
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
         robot.simulated && html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
         html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
@@ -333,6 +335,7 @@ function showState(state) {
   say(walk.lastElementChild, state.stepping ? "feet down" : "as set below");
   const looks = link?.identity.role !== "control";
   for (const b of [take, ready, walk, hold, disarm, clear, record]) b.toggleAttribute("disabled", looks);
+  parameters.allow(!looks);
   boards.state(state);
   showRecording(state);
   const key = JSON.stringify([state.hold, state.boards.map((b) => b.faults)]);

@@ -47,9 +47,10 @@ pub struct Session {
 /// Most ends of requests that wait for their console; then the oldest goes.
 const OUTCOMES: usize = 256;
 
-/// Keeps the end of a request for its console.
+/// Keeps the end of a request for its console, and what a board has told for it.
 pub(crate) fn keep_outcome(outcomes: &mut VecDeque<(u64, Event)>, time_us: u64, event: &Event) {
-    if matches!(event, Event::Done(_) | Event::Refused { .. }) {
+    let ends = matches!(event, Event::Done(_) | Event::Refused { .. });
+    if ends || matches!(event, Event::Parameter { .. }) {
         if outcomes.len() == OUTCOMES {
             outcomes.pop_front();
         }
@@ -221,7 +222,8 @@ impl Session {
         self.world.master().open_session(client);
     }
 
-    /// The oldest end of a request that nobody has taken yet, with its time in µs.
+    /// The oldest end of a request that nobody has taken yet, or the value of a parameter that came
+    /// with it, with its time in µs.
     pub fn take_outcome(&mut self) -> Option<(u64, Event)> {
         self.outcomes.as_mut()?.pop_front()
     }

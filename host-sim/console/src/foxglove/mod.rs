@@ -4,7 +4,6 @@
 
 mod channels;
 mod outbox;
-mod parameters;
 mod request;
 mod session;
 mod touching;
@@ -16,7 +15,6 @@ pub use request::{
 };
 
 pub(crate) use outbox::{Outbox, status};
-pub(crate) use parameters::Place;
 pub(crate) use session::{Viewing, serve};
 pub(crate) use touching::{ContactSink, contacts};
 pub(crate) use viewers::{ViewerId, Viewers};

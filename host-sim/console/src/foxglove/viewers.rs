@@ -12,9 +12,9 @@ use wheeleg_telemetry::{Derive as _, Derived, OwnedSample, SampleRef, Taken};
 
 use super::channels::Channel;
 use super::outbox::{Outbox, status};
-use super::parameters::{Parameters, Place};
 use super::request::Subscription;
 use super::touching::ContactSource;
+use crate::parameters::{Parameters, Place};
 
 /// Shortest time between two messages of a channel of the registry, ns.
 const PERIOD_NS: u64 = 10_000_000;
@@ -269,9 +269,9 @@ impl Viewers {
         }
     }
 
-    /// A board has taken a value.
-    pub(crate) fn written(&mut self, place: Place, raw: i32) {
-        let Some(name) = self.parameters.written(place, raw) else {
+    /// A board has told a value.
+    pub(crate) fn told(&mut self, place: Place, raw: i32) {
+        let Some(name) = self.parameters.told(place, raw) else {
             return;
         };
         let values = self.parameters.list(std::slice::from_ref(&name));

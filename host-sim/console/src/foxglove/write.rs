@@ -10,7 +10,6 @@ use serde_json::{Map, Value, json};
 use tokio::time::timeout;
 
 use super::outbox::status;
-use super::parameters::Place;
 use super::request::Setting;
 use super::viewers::ViewerId;
 use crate::desk::ClientId;
@@ -49,7 +48,7 @@ pub(crate) async fn write(
 async fn write_all(hub: &Arc<Hub>, settings: Vec<Setting>) -> Result<(), String> {
     let mut writes = Vec::with_capacity(settings.len());
     for setting in settings {
-        writes.push(hub.parameter(&setting.name, setting.value.as_ref())?);
+        writes.push(hub.write(&setting.name, setting.value.as_ref())?);
     }
     if hub.is_armed() {
         return Err("the robot is armed: disarm it first".to_owned());
@@ -84,13 +83,12 @@ impl Session {
         })
     }
 
-    async fn write_all(&mut self, writes: Vec<(Place, i32)>) -> Result<(), String> {
-        for ((board, parameter), raw) in writes {
+    async fn write_all(&mut self, writes: Vec<Value>) -> Result<(), String> {
+        for args in writes {
             // Now that nobody else can arm it.
             if self.hub.is_armed() {
                 return Err("the robot is armed: disarm it first".to_owned());
             }
-            let args = json!({ "board": board, "parameter": parameter, "value": raw });
             self.carry_out("WriteParameter", args).await?;
         }
         Ok(())

@@ -55,10 +55,7 @@ impl Inner {
                 let what = match command.code() {
                     CommandCode::TakeControl => Asked::Take,
                     CommandCode::ReleaseControl => Asked::Release,
-                    _ => match command {
-                        Command::WriteParameter { node, id, raw } => Asked::Write((node, id), raw),
-                        _ => Asked::Other,
-                    },
+                    _ => Asked::Other,
                 };
                 let input = Input::Request {
                     id: self.next_request,
@@ -149,7 +146,6 @@ impl Inner {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
             }
-            Some(Asked::Write(place, raw)) if is_done => self.viewers.written(place, raw),
             Some(Asked::EndFault(fault)) if is_done => {
                 self.faults.retain(|(active, _)| *active != fault);
             }

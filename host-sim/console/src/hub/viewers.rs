@@ -6,7 +6,7 @@ use axum::extract::ws::Message;
 use serde_json::{Value, json};
 
 use super::{CLIENTS, Hub};
-use crate::foxglove::{self, Call, Outbox, Place, Request, Setting, ViewerId, status};
+use crate::foxglove::{self, Call, Outbox, Request, Setting, ViewerId, status};
 use crate::foxglove::{STOP_SERVICE, URDF};
 
 /// Who looks.
@@ -124,17 +124,9 @@ impl Hub {
         self.inner().viewers.tell_parameters(id, names, request);
     }
 
-    /// Which parameter is meant and its raw number, or what is wrong.
-    pub(crate) fn parameter(
-        &self,
-        name: &str,
-        value: Option<&Value>,
-    ) -> Result<(Place, i32), String> {
-        let inner = self.inner();
-        let parameters = &inner.viewers.parameters;
-        let raw = parameters.raw(name, value)?;
-        let place = parameters.place(name).ok_or("there is no such parameter")?;
-        Ok((place, raw))
+    /// Arguments of the `WriteParameter` that sets a parameter, or what is wrong with it.
+    pub(crate) fn write(&self, name: &str, value: Option<&Value>) -> Result<Value, String> {
+        self.inner().viewers.parameters.write(name, value)
     }
 
     /// Whether all axes are armed.

@@ -4,6 +4,7 @@
 
 mod machine;
 mod pace;
+mod priority;
 mod robot;
 mod sink;
 
@@ -149,6 +150,15 @@ pub(crate) enum Report {
         time_us: u64,
         /// What.
         answer: Answer,
+    },
+    /// A board has told the value of a parameter.
+    Parameter {
+        /// Board.
+        board: u8,
+        /// Number of the parameter.
+        id: u16,
+        /// Raw value.
+        raw: i32,
     },
     /// The simulation cannot go on.
     Failed(Box<SimError>),

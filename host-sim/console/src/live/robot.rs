@@ -18,6 +18,7 @@ use wheeleg_telemetry::{Keep, Recorder};
 
 use super::machine::{Machine, only_simulated};
 use super::pace::Pace;
+use super::priority;
 use super::sink::RingSink;
 use super::{
     Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
@@ -64,6 +65,8 @@ pub(crate) struct Robot {
     pub(crate) signals: Arc<Signals>,
     /// The thread.
     pub(crate) thread: JoinHandle<()>,
+    /// It runs before ordinary threads.
+    pub(crate) goes_first: bool,
 }
 
 /// Powers a robot up in a thread of its own. What it is given and what is sampled of it goes to
@@ -89,7 +92,9 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
                 return;
             }
         };
-        let _ = built.send(Ok(()));
+        // A clock that goes as fast as it can leaves nothing to others.
+        let goes_first = live.speed.is_some() && priority::ask();
+        let _ = built.send(Ok(goes_first));
         let cycle = Duration::from_secs_f64(robot.bus.cycle_s);
         let pace = Pace::new(cycle, live.speed, live.paused, Instant::now());
         let feed = Rc::new(RefCell::new(feed));
@@ -128,7 +133,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
                 "end other programs, then try again",
             )
         })?;
-    is_built.recv().unwrap_or_else(|_| {
+    let goes_first = is_built.recv().unwrap_or_else(|_| {
         Err(SimError::simulation(
             "the robot's thread ended before it began",
             "please report this",
@@ -140,6 +145,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
         samples,
         signals,
         thread,
+        goes_first,
     })
 }
 
@@ -417,6 +423,11 @@ impl Loop {
             let (ticket, answer) = match event {
                 Event::Done(ticket) => (ticket, Answer::Done),
                 Event::Refused { ticket, reason } => (ticket, Answer::Refused(reason)),
+                Event::Parameter { node, id, raw } => {
+                    let board = node;
+                    let _ = self.reports.push(Report::Parameter { board, id, raw });
+                    continue;
+                }
                 _ => continue,
             };
             if ticket.client == OPERATOR_CLIENT {

@@ -482,7 +482,7 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     look(&mut driver, "state");
     done(&mut driver, "TakeControl");
     driver.keep_control(true);
-    let read = json!({ "board": 3, "parameter": 0x0105 });
+    let read = json!({ "board": 3, "parameter": "error_scale" });
     let outcome = driver
         .carry_out("ReadParameter", &read, 5000)
         .expect("sent");
@@ -496,14 +496,13 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     // Who writes at the console is seen by viewers as well.
     done(&mut driver, "TakeControl");
     done(&mut driver, "Disarm");
-    let raw = (before.as_f64().expect("a number") * 65_536.0).round() as i64;
-    let args = json!({ "board": 3, "parameter": 0x0105, "value": raw });
+    let args = json!({ "board": 3, "parameter": "error_scale", "value": before });
     let outcome = driver
         .carry_out("WriteParameter", &args, 5000)
         .expect("sent");
     assert_eq!(outcome, Outcome::Done);
     assert_eq!(viewer.values(get("e"))[0]["value"], before);
-    let other_board = json!({ "board": 9, "parameter": 0x0105, "value": raw });
+    let other_board = json!({ "board": 9, "parameter": "error_scale", "value": before });
     assert_eq!(
         refusal(&mut driver, "WriteParameter", &other_board),
         "bad_argument"

@@ -6,6 +6,7 @@ mod common;
 mod control;
 mod foxglove;
 mod hostile;
+mod latency;
 mod looking;
 #[cfg(unix)]
 mod port;

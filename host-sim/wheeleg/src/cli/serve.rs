@@ -178,6 +178,15 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
             "viewers  {socket}/foxglove?token=KEY, that of the file to look"
         );
     }
+    let _ = writeln!(
+        text,
+        "priority {}",
+        match server.robot_goes_first() {
+            true => "SCHED_FIFO 10: the robot's thread goes before other programs",
+            false =>
+                "ordinary: a busy computer may make the robot late (`ulimit -r 10` permits more)",
+        }
+    );
     if args.record {
         let _ = writeln!(text, "records  {}", args.recordings.display());
     }

@@ -1,0 +1,227 @@
+//! The boards' parameters as clients see them: as the robot's file stores them, and as the boards
+//! have told them since.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use wheeleg_config::{NodeParams, allowed_values, in_unit};
+use wheeleg_protocol::Node;
+use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
+
+use crate::arguments;
+
+/// Name under which viewers look for the robot.
+pub(crate) const DESCRIPTION: &str = "/robot_description";
+
+/// A board and the number of its parameter.
+pub(crate) type Place = (u8, u16);
+
+#[derive(Debug, Clone, Copy)]
+struct Parameter {
+    place: Place,
+    info: &'static ParamInfo,
+    raw: i32,
+    /// The board has told it; else it is what the robot's file stores.
+    told: bool,
+}
+
+/// All parameters, by name.
+#[derive(Debug, Clone)]
+pub(crate) struct Parameters {
+    all: BTreeMap<String, Parameter>,
+    urdf: String,
+}
+
+impl Parameters {
+    /// Parameters of boards that a robot's file has set up.
+    pub(crate) fn new(stored: &NodeParams, urdf: String) -> Self {
+        let boards = Node::ALL.into_iter().flat_map(|node| {
+            let board = node.number();
+            let stored = stored.of(node);
+            params_at(board).iter().map(move |info| {
+                let set = stored.iter().find(|(id, _)| *id == info.id);
+                let parameter = Parameter {
+                    place: (board, info.id),
+                    info,
+                    raw: set.map_or(info.default, |(_, raw)| *raw),
+                    told: false,
+                };
+                (name(node, info), parameter)
+            })
+        });
+        Self {
+            all: boards.collect(),
+            urdf,
+        }
+    }
+
+    /// Tables of both kinds of boards, and the values of each board in the order of its table.
+    pub(crate) fn document(&self) -> Value {
+        let boards = Node::ALL.into_iter().map(|node| {
+            let values = params_at(node.number()).iter().map(|info| {
+                let parameter = self.all.get(&name(node, info));
+                parameter.map_or(
+                    Value::Null,
+                    |p| json!({ "value": in_unit(info, p.raw), "told": p.told }),
+                )
+            });
+            json!({
+                "address": node.number(),
+                "kind": kind(node),
+                "values": values.collect::<Vec<_>>(),
+            })
+        });
+        json!({
+            "joint": table(JOINT_PARAMS),
+            "wheel": table(WHEEL_PARAMS),
+            "boards": boards.collect::<Vec<_>>(),
+        })
+    }
+
+    /// Those of `names` that there are, or all; each as the viewers' protocol has it.
+    pub(crate) fn list(&self, names: &[String]) -> Vec<Value> {
+        if names.is_empty() {
+            let all = self.all.iter().map(|(name, p)| entry(name, p));
+            return all.chain([self.description()]).collect();
+        }
+        let one = |name: &String| {
+            let of_board = self.all.get(name).map(|p| entry(name, p));
+            of_board.or_else(|| (name == DESCRIPTION).then(|| self.description()))
+        };
+        names.iter().filter_map(one).collect()
+    }
+
+    fn description(&self) -> Value {
+        json!({ "name": DESCRIPTION, "value": self.urdf })
+    }
+
+    /// Arguments of the `WriteParameter` that sets a parameter, or what is wrong with it.
+    pub(crate) fn write(&self, name: &str, value: Option<&Value>) -> Result<Value, String> {
+        let Some(Parameter { place, info, .. }) = self.all.get(name) else {
+            return Err(format!("there is no parameter {name} that can be written"));
+        };
+        let value = value.filter(|value| arguments::raw(info, value).is_some());
+        let value = value.ok_or_else(|| format!("{name}: allowed are {}", allowed_values(info)))?;
+        Ok(json!({ "board": place.0, "parameter": info.name, "value": value }))
+    }
+
+    /// A board has told the value of a parameter; its name.
+    pub(crate) fn told(&mut self, place: Place, raw: i32) -> Option<String> {
+        let mut all = self.all.iter_mut();
+        let (name, parameter) = all.find(|(_, p)| p.place == place)?;
+        parameter.raw = raw;
+        parameter.told = true;
+        Some(name.clone())
+    }
+}
+
+fn kind(node: Node) -> &'static str {
+    if node.is_joint() { "joint" } else { "wheel" }
+}
+
+fn name(node: Node, info: &ParamInfo) -> String {
+    format!("/{}/{}/{}", kind(node), node.number(), info.name)
+}
+
+fn table(rows: &[ParamInfo]) -> Vec<Value> {
+    let row = |info: &ParamInfo| {
+        json!({
+            "name": info.name,
+            "unit": info.unit,
+            "min": in_unit(info, info.min),
+            "max": in_unit(info, info.max),
+            "default": in_unit(info, info.default),
+            "whole": info.format.fraction_bits() == 0,
+            "saved": info.persistent,
+            "disarmed_only": info.disarmed_only,
+            "description": info.text,
+        })
+    };
+    rows.iter().map(row).collect()
+}
+
+fn entry(name: &str, parameter: &Parameter) -> Value {
+    match parameter.info.format {
+        Format::Flag => json!({ "name": name, "value": parameter.raw != 0 }),
+        _ => {
+            let value = in_unit(parameter.info, parameter.raw);
+            json!({ "name": name, "value": value, "type": "float64" })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::{builtin, raw_of};
+
+    const GAIN: &str = "/joint/3/proportional";
+
+    fn parameters() -> Parameters {
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        Parameters::new(&robot.node, "<robot/>".to_owned())
+    }
+
+    #[test]
+    fn every_board_has_its_whole_table() {
+        let all = parameters().list(&[]);
+        let boards = 6 * params_at(1).len() + 2 * params_at(7).len();
+        assert_eq!(all.len(), boards + 1);
+        assert_eq!(
+            all[boards],
+            json!({ "name": DESCRIPTION, "value": "<robot/>" })
+        );
+        let document = parameters().document();
+        for board in document["boards"].as_array().expect("a list") {
+            let kind = board["kind"].as_str().expect("a text");
+            let rows = document[kind].as_array().expect("a table");
+            let values = board["values"].as_array().expect("a list");
+            assert_eq!(rows.len(), values.len(), "{board}");
+            for (row, value) in rows.iter().zip(values) {
+                let number = |of: &Value| of.as_f64().expect("a number");
+                let range = number(&row["min"])..=number(&row["max"]);
+                assert!(range.contains(&number(&value["value"])), "{row} {value}");
+                assert_eq!(value["told"], false);
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_board_has_told_is_shown_in_its_unit() {
+        let mut parameters = parameters();
+        let info = params_at(3)
+            .iter()
+            .find(|row| row.name == "proportional")
+            .expect("in the table");
+        let told = parameters.told((3, info.id), raw_of(info, 0.03));
+        assert_eq!(told.as_deref(), Some(GAIN));
+        assert_eq!(parameters.list(&[GAIN.to_owned()])[0]["value"], 0.03);
+        let place = params_at(3).iter().position(|row| row.name == info.name);
+        let place = place.expect("in the table");
+        let shown = &parameters.document()["boards"][2]["values"][place];
+        assert_eq!(shown, &json!({ "value": 0.03, "told": true }));
+        assert_eq!(parameters.told((3, 0xFFFF), 0), None);
+    }
+
+    #[test]
+    fn what_a_board_does_not_allow_is_refused_with_the_range() {
+        let parameters = parameters();
+        let args = parameters.write(GAIN, Some(&json!(0.03))).expect("allowed");
+        let wanted = json!({ "board": 3, "parameter": "proportional", "value": 0.03 });
+        assert_eq!(args, wanted);
+        for value in [
+            json!(-0.001),
+            json!(4.001),
+            json!("1"),
+            json!([1]),
+            json!(true),
+        ] {
+            let why = parameters.write(GAIN, Some(&value)).expect_err("refused");
+            assert!(why.contains("0 to 4 1/mm"), "{value}: {why}");
+        }
+        assert!(parameters.write(GAIN, None).is_err());
+        for name in ["/joint/9/proportional", DESCRIPTION, ""] {
+            assert!(parameters.write(name, Some(&json!(1))).is_err(), "{name}");
+        }
+    }
+}
