@@ -12,12 +12,13 @@
 //!
 //! A file appears under its name when it is whole: it is written under another one and renamed.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use wheeleg_config::plan::{Plan, Sources, Text};
+use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
 
 use crate::part::NotAPart;
 use crate::row::Row;
@@ -56,6 +57,7 @@ impl PlanFile {
     #[must_use]
     pub fn of(plan: &Plan, duration_s: f64) -> Self {
         let least = (BLOCK_S * SPEED / duration_s.max(0.1)).clamp(1.0, 4096.0) as u64;
+        let least = least.max(plan.cases().div_ceil(MOST_BLOCKS));
         let block = plan.block.unwrap_or_else(|| least.next_power_of_two());
         Self {
             format: FORMAT,
@@ -301,6 +303,15 @@ impl Store {
         let to = folder.join(format!("{name}.{}", host::unique()));
         fs::rename(path, &to).map_err(failed)?;
         Ok(to)
+    }
+
+    /// Blocks that have a file, whole or not.
+    pub(crate) fn begun(&self) -> BTreeSet<u64> {
+        let entries = fs::read_dir(self.folder.join("parts"));
+        let names = entries.into_iter().flatten().flatten();
+        let number = |name: &str| name.split('.').next()?.parse().ok();
+        let blocks = names.filter_map(|entry| number(&entry.file_name().to_string_lossy()));
+        blocks.collect()
     }
 
     /// Files with rows of a block that was not finished.
