@@ -12,12 +12,13 @@
 //!
 //! A file appears under its name when it is whole: it is written under another one and renamed.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use wheeleg_config::plan::{Plan, Sources, Text};
+use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
 
 use crate::part::NotAPart;
 use crate::row::Row;
@@ -65,9 +66,11 @@ impl PlanFile {
     /// start-up.
     #[must_use]
     pub fn of(plan: &Plan, duration_s: f64) -> Self {
-        let cases = (BLOCK_S / work_s(duration_s)).max(1.0) as u64;
-        // The power of two that is not above it.
-        let block = plan.block.unwrap_or_else(|| 1 << cases.ilog2());
+        let by_work = (BLOCK_S / work_s(duration_s)).max(1.0) as u64;
+        // The power of two that is not above it, unless that makes too many parts.
+        let by_work = 1 << by_work.ilog2();
+        let by_number = plan.cases().div_ceil(MOST_BLOCKS).next_power_of_two();
+        let block = plan.block.unwrap_or_else(|| by_number.max(by_work));
         Self {
             format: FORMAT,
             program: program(),
@@ -312,6 +315,15 @@ impl Store {
         let to = folder.join(format!("{name}.{}", host::unique()));
         fs::rename(path, &to).map_err(failed)?;
         Ok(to)
+    }
+
+    /// Blocks that have a file, whole or not.
+    pub(crate) fn begun(&self) -> BTreeSet<u64> {
+        let entries = fs::read_dir(self.folder.join("parts"));
+        let names = entries.into_iter().flatten().flatten();
+        let number = |name: &str| name.split('.').next()?.parse().ok();
+        let blocks = names.filter_map(|entry| number(&entry.file_name().to_string_lossy()));
+        blocks.collect()
     }
 
     /// Files with rows of a block that was not finished.

@@ -16,6 +16,7 @@ use super::error::{ConfigError, Problem};
 use super::overlay;
 use super::params::{ParameterInfo, params};
 use super::plant::pneumatics::{self, Pneumatics, Sensing};
+use super::plant::sections::{MASS, STROKE};
 use super::reader::Reader;
 use super::relations::{self, Moved};
 use super::suggest::closest;
@@ -24,7 +25,7 @@ params! {
     /// What moves with the rod.
     MovingSection {
         /// Mass of rod, carriage and payload.
-        mass: f64, "mass", Mass, 0.01, 1000.0;
+        mass: f64, "mass", Mass, MASS[0], MASS[1];
         /// Force on the rod, positive extends.
         load: f64, "load", Force, -10_000.0, 10_000.0;
     }
@@ -42,7 +43,7 @@ params! {
     /// State at the start.
     AxisStartSection {
         /// Stroke.
-        stroke: f64, "stroke", Length, 0.0, 2.0;
+        stroke: f64, "stroke", Length, 0.0, STROKE[1];
         /// Pressure of chamber A, absolute.
         pressure_a: f64, "pressure_a", Pressure, 1e4, 2e6;
         /// Pressure of chamber B, absolute.
@@ -85,6 +86,19 @@ pub struct AxisConfig {
     pub axis: AxisParams,
     /// Every parameter as written, for listings and reports.
     pub parameters: Vec<ParameterInfo>,
+    /// The file.
+    pub source: builtin::Source,
+}
+
+/// Fields of a sound file that cannot be what somebody asks of them.
+#[derive(Debug, Clone)]
+pub struct Unfit {
+    /// Paths of the fields; the first is the one that is pointed at.
+    pub fields: Vec<&'static str>,
+    /// Why, with figures.
+    pub why: String,
+    /// What is allowed.
+    pub allowed: String,
 }
 
 /// Another value for a parameter of an axis file.
@@ -169,6 +183,30 @@ impl AxisConfig {
         }
     }
 
+    /// The answer to one who asks more of the axis than it can: `what` cannot be done, and each
+    /// reason with file, line, fields and what is allowed.
+    #[must_use]
+    pub fn unfit(&self, what: &str, reasons: &[Unfit]) -> ConfigError {
+        let builtin::Source { file, text } = &self.source;
+        let what = format!("the axis file {file} is not usable: {what}");
+        let mut r = match Reader::parse(&what, file, text, true) {
+            Ok(r) => r,
+            Err(error) => return error,
+        };
+        for info in &self.parameters {
+            r.list(info.clone());
+        }
+        for Unfit {
+            fields,
+            why,
+            allowed,
+        } in reasons
+        {
+            r.contradiction(fields, why, allowed);
+        }
+        r.refusal(&what)
+    }
+
     /// Reads an axis from TOML text; `file` is the name for messages.
     ///
     /// # Errors
@@ -184,7 +222,12 @@ impl AxisConfig {
         let name = top.as_ref().and_then(|t| r.name(t, "name"));
         let description = top.as_ref().and_then(|t| r.text(t, "description"));
         let axis = read(&mut r);
-        relations::check(&mut r, axis.as_ref().map(moved).as_ref(), None);
+        let facts = relations::Read {
+            moved: axis.as_ref().map(moved),
+            axis: axis.as_ref(),
+            robot: None,
+        };
+        relations::check(&mut r, &facts);
         if let (true, Some(axis)) = (r.is_clean(), &axis) {
             relations::check_plant(&mut r, Axis::new(axis).map(drop));
         }
@@ -194,6 +237,10 @@ impl AxisConfig {
                 description: description?,
                 axis: axis?,
                 parameters: Vec::new(),
+                source: builtin::Source {
+                    file: file.to_owned(),
+                    text: text.to_owned(),
+                },
             })
         })();
         let (mut config, parameters) = r.finish(&what, config)?;

@@ -40,7 +40,7 @@ pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Opt
     let missing = row
         .arguments
         .iter()
-        .filter(|argument| entry.get(argument.name).is_none());
+        .filter(|argument| !entry.has(argument.name));
     let mut complete = true;
     for argument in missing {
         complete = false;
@@ -62,7 +62,7 @@ pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Opt
     let given: Vec<Option<Given>> = row
         .arguments
         .iter()
-        .filter(|argument| entry.get(argument.name).is_some())
+        .filter(|argument| entry.has(argument.name))
         .map(|argument| {
             let value = value(r, entry, argument)?;
             let name = argument.name;

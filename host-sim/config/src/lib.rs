@@ -39,6 +39,7 @@ mod scenario;
 mod suggest;
 pub mod terrain;
 pub mod timing;
+pub mod told;
 
 pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
@@ -52,7 +53,7 @@ pub use node::NodeParams;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
-pub use relations::{RELATIONS, Relation, SENSOR_TRACK, STEPS_AT_REST};
+pub use relations::{RELATIONS, Relation, SENSOR_TRACK};
 pub use relief::Relief;
 pub use robot::{
     BusParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,

@@ -167,7 +167,7 @@ fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
     let entry = r.table(path);
     let unset = table
         .iter()
-        .filter(|p| entry.as_ref().is_none_or(|e| e.get(p.name).is_none()));
+        .filter(|p| entry.as_ref().is_none_or(|e| !e.has(p.name)));
     for info in unset {
         r.list(ParameterInfo {
             path: format!("{path}.{}", info.name),
@@ -199,7 +199,7 @@ fn section(r: &mut Reader, path: &str, table: &'static [ParamInfo]) -> Vec<(u16,
     r.reject_unknown(&entry, &names);
     table
         .iter()
-        .filter(|p| entry.get(p.name).is_some())
+        .filter(|p| entry.has(p.name))
         .filter_map(|p| Some((p.id, one(r, &entry, p)?)))
         .collect()
 }

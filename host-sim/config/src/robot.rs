@@ -143,7 +143,12 @@ impl RobotConfig {
         let node = node::read(&mut r);
         let commissioned = commissioned::read(&mut r);
         let whole = plant.as_ref().map(|(plant, _)| plant);
-        relations::check(&mut r, whole.map(plant::moved).as_ref(), whole);
+        let facts = relations::Read {
+            moved: whole.map(plant::moved),
+            axis: None,
+            robot: whole,
+        };
+        relations::check(&mut r, &facts);
         if let (true, Some(plant)) = (r.is_clean(), whole) {
             relations::check_plant(&mut r, Plant::new(plant).map(drop));
         }

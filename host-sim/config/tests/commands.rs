@@ -414,6 +414,14 @@ fn an_event_at_the_end_and_a_decimal_comma_are_refused() {
     }
     let text = told("2,5 s", "1 s").expect_err("a comma");
     assert_all(&text, &["my.toml:6:", "`duration`", "decimal point"]);
+    for (comma, point) in [("0,5 s", "0.5 s"), ("-0,5s", "-0.5s"), ("2,25", "2.25")] {
+        let text = told(comma, "1 s").expect_err("a comma");
+        let comma = format!("`duration` = \"{comma}\" has a decimal comma");
+        assert_all(
+            &text,
+            &["my.toml:6:", &comma, &format!("write \"{point}\"")],
+        );
+    }
     let text = told("2 S", "1 s").expect_err("another case");
     assert_all(&text, &["my.toml:6:", "`duration`", "did you mean \"s\""]);
     let digits = "9".repeat(300);

@@ -167,7 +167,7 @@ fn out_of_range() {
             &line,
             "`cylinder.bore` = 900 mm",
             "out of range",
-            "4 to 200 mm",
+            "4 to 100 mm",
         ],
     );
 }
@@ -177,16 +177,16 @@ fn limits_themselves_are_allowed() {
     const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
     // With the thickest rod that the bore allows, and an end stop and dead volumes that hold
     // so large a piston.
-    for (bore, rod) in [("4.0", "3.6"), ("200.0", "180.0")] {
+    for (bore, rod) in [("4.0", "3.6"), ("100.0", "90.0")] {
         let mut text = AXIS.to_owned();
         for (from, to) in [
             (
                 "dead_volume_a = { value = 1.0",
-                "dead_volume_a = { value = 1000.0",
+                "dead_volume_a = { value = 480.0",
             ),
             (
                 "dead_volume_b = { value = 1.0",
-                "dead_volume_b = { value = 1000.0",
+                "dead_volume_b = { value = 480.0",
             ),
             (
                 "stiffness       = { value = 1000.0",
@@ -320,7 +320,7 @@ fn unknown_missing_and_mistyped_fields() {
     );
     assert_all(
         &text,
-        &["`cylinder.bore` = nan", "a finite number from 4 to 200 mm"],
+        &["`cylinder.bore` = nan", "a finite number from 4 to 100 mm"],
     );
 }
 

@@ -344,9 +344,18 @@ fn a_plan_needs_its_head() {
             "`sampler` = \"sobbol\" is not known",
         ),
         (
-            "name = \"x\"\nroot = 1\nsamples = 1099511627776\nreplicates = 2\n\
+            "name = \"x\"\nroot = 1\nsamples = 65536000000\nreplicates = 2\n\
              [base]\nscenario = \"stand\"\n",
-            "2199023255552 cases",
+            "131072000000 cases: allowed are 1 to 65536000000",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsamples = 1000000000000\n[base]\nscenario = \"stand\"\n",
+            "`samples` = 1000000000000 must be a whole number from 1 to 65536000000",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nblock = 4\nsamples = 65536000000\n\
+             [base]\nscenario = \"stand\"\n",
+            "`block` = 4 makes 16384000000 part files",
         ),
         ("name = ", "not valid TOML"),
     ] {

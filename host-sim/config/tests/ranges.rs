@@ -4,6 +4,7 @@
 mod common;
 
 use common::{assert_all, report};
+use wheeleg_config::told::{TOLD, limits};
 use wheeleg_config::{
     AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, pretty,
 };
@@ -147,4 +148,43 @@ fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
         }
     }
     assert!(tried > 700, "{tried}");
+}
+
+/// What a board is told of its axis: a quantity that is one field of the file has the limits of the
+/// board's parameter, one that is made of several is a relation between these.
+#[test]
+fn a_file_says_what_a_board_can_be_told() {
+    let (_, file, text) = axis::AXES[0];
+    let listed = AxisConfig::parse(file, text).expect("built in").parameters;
+    for told in TOLD {
+        let row = told.parameter.info();
+        let [low, high] = limits(told.parameter);
+        // Each of these may say as much as their board can be told, or less.
+        let alone = |path: &&str| {
+            let field = listed.iter().find(|p| p.path == *path).expect("listed");
+            let unit = field
+                .dimension
+                .and_then(|d| d.factor(&field.unit))
+                .expect("a unit");
+            let of_row = match row.unit {
+                "mm" => 1e-3,
+                "us" => 1e-6,
+                "kPa" => 1e3,
+                "cm3" => 1e-6,
+                "dm3/(s bar)" => 1e-8,
+                _ => 1.0,
+            };
+            let [least, most] = [field.min, field.max].map(|limit| limit * unit / of_row);
+            least >= low - 1e-6 && most <= high + 1e-6
+        };
+        let related = wheeleg_config::RELATIONS
+            .iter()
+            .any(|relation| relation.fields == told.fields);
+        assert!(
+            related || told.fields.iter().all(alone),
+            "{}: {:?}",
+            row.name,
+            told.fields
+        );
+    }
 }

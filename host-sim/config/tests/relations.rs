@@ -53,13 +53,6 @@ const SHORT: &[Set] = &[
     ("body.foot_pad", "0.20", "m"),
     ("node.joint.sensor_max", "95.0", "mm"),
 ];
-/// No supply to speak of.
-const WEAK: &[Set] = &[
-    ("supply.set_pressure", "110000.0", "Pa"),
-    ("supply.switch_on", "105000.0", "Pa"),
-    ("supply.switch_off", "100000.0", "Pa"),
-    ("supply.droop", "100.0", "Pa"),
-];
 /// Little air, and an end stop that is as hard as can be.
 const TIGHT_A: &[Set] = &[
     ("line.volume", "0.0", "cm3"),
@@ -111,7 +104,6 @@ const EXAMPLES: &[Example] = &[
     example("source's contact", ROBOT, &[], ("source_switch.on", "{}", "bar"), [11.01326, 11.01325]),
     example("regulator", AXIS, &[], ("supply.set_pressure", "{}", "bar"), [11.01326, 11.01325]),
     example("filled reservoir", ROBOT, &[], ("supply.initial_pressure", "{}", "bar"), [11.01326, 11.01325]),
-    example("surroundings", AXIS, WEAK, ("gas.ambient_pressure", "{}", "Pa"), [110_001.0, 109_899.0]),
     example("droop", AXIS, &[], ("supply.droop", "{}", "bar"), [6.0, 5.9999]),
     example("trapped air A", AXIS, &[], ("start.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0]),
     example("trapped air B", AXIS, &[], ("start.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0]),
@@ -134,8 +126,8 @@ const EXAMPLES: &[Example] = &[
     example("step and friction, robot", ROBOT, SOFT_ROBOT, ("link.vertical_rod.mass", "{}", "kg"), [0.054_24, 0.054_29]),
     example("step and end stop", AXIS, &[], ("moving.mass", "{}", "kg"), [0.07, 1.5]),
     example("step and end stop, robot", ROBOT, &[], ("link.vertical_rod.mass", "{}", "kg"), [0.07, 0.8]),
-    example("step and air A", AXIS, TIGHT_A, ("cylinder.dead_volume_a", "{}", "cm3"), [0.02, 4.0]),
-    example("step and air B", AXIS, TIGHT_B, ("cylinder.dead_volume_b", "{}", "cm3"), [0.02, 4.0]),
+    example("step and air A", AXIS, TIGHT_A, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 4.0]),
+    example("step and air B", AXIS, TIGHT_B, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 4.0]),
     example("step and supply", AXIS, SMALL_RESERVOIR, ("regulator.conductance", "{}", "dm3/(s bar)"), [900.0, 1.0]),
     example("air in the stop A", AXIS, SHORT_STEP, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 1.0]),
     example("air in the stop B", AXIS, SHORT_STEP, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 1.0]),
@@ -173,6 +165,11 @@ const EXAMPLES: &[Example] = &[
     example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0]),
     example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0]),
     example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5]),
+    example("told full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9]),
+    example("told volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0]),
+    example("told volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0]),
+    example("told conductance", AXIS, &[], ("fill_valve.conductance", "{}", "dm3/(s bar)"), [0.004_9, 0.005_1]),
+    example("told band of rest", AXIS, &[("sensor.adc.bits", "8", "bit"), ("sensor.potentiometer.offset", "7.0", "mm")], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [512.01, 512.0]),
     example("closed leg", ROBOT, &[], ("body.crank", "{}", "m"), [1.9, 0.29]),
     example("standing", ROBOT, &[], ("body.chassis_com", "[{}, 0.02]", "m"), [-0.5, -0.133]),
     example("carried by its air", ROBOT, &[("body.chassis_com", "[0.3, 0.02]", "m")], ("body.chassis_mass", "{}", "kg"), [300.0, 15.4]),

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use wheeleg_campaign::{Case, Cases};
+use wheeleg_campaign::{Case, Cases, Options, PlanFile, Shard, Store, run, status};
 use wheeleg_config::plan::Value;
 
-use crate::common::{BASE, HEAD, SPREAD, plan_of, spread};
+use crate::common::{BASE, HEAD, SPREAD, computed, options, plan_of, spread};
 
 fn number(case: &Case, factor: usize) -> f64 {
     match case.values[factor] {
@@ -181,4 +181,27 @@ fn a_case_that_cannot_be_says_why() {
         }
     }
     assert!(wrong > 0);
+}
+
+/// A campaign of as many cases as a plan may have is begun, and its state told, in a moment.
+#[test]
+fn the_largest_plan_is_begun_and_told_in_a_moment() {
+    let text = "name = \"test\"\nroot = 7\nsamples = 65536000000\n[base]\nscenario = \"stand\"\n";
+    let plan = plan_of(text);
+    let begun = std::time::Instant::now();
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&plan, 20.0)).expect("a folder");
+    assert_eq!(store.blocks(), 1_000_000);
+    let cases = Cases::new(&plan).expect("a plan");
+    let pilot = Options {
+        first: Some(2),
+        ..options(1)
+    };
+    let ran = run(&store, &cases, &pilot, &|case| Some(computed(case))).expect("it runs");
+    assert_eq!((ran.computed, ran.of), (2, 2));
+    let state = status(&store, Shard::ALL).expect("it can be read");
+    assert_eq!((state.cases, state.rows), (65_536_000_000, 2));
+    assert_eq!(state.missing.len(), 1_000_000);
+    let seconds = begun.elapsed().as_secs_f64();
+    assert!(seconds < 10.0, "{seconds} s");
 }

@@ -226,7 +226,7 @@ fn values(r: &mut Reader, entry: &Entry) -> Option<(Values, String)> {
     let path = &entry.path;
     let mut given: Vec<&str> = distribution::NAMES.to_vec();
     given.push("grid");
-    given.retain(|key| entry.get(key).is_some());
+    given.retain(|key| entry.has(key));
     let [key] = given[..] else {
         r.problem(
             Some(entry.span.clone()),

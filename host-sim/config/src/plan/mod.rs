@@ -112,10 +112,12 @@ const TOP: [&str; 10] = [
     "factor",
 ];
 
-/// Most samples, replicates and cases of a plan: indices stay exact in tables of floats, too.
-const MOST: u64 = 1 << 40;
 /// Most cases of a part file.
-const MOST_IN_BLOCK: u64 = 1 << 16;
+pub const MOST_IN_BLOCK: u64 = 1 << 16;
+/// Most part files of a campaign: their names have six digits, and one folder holds them all.
+pub const MOST_BLOCKS: u64 = 1_000_000;
+/// Most samples, replicates and cases of a plan: indices stay exact in tables of floats, too.
+const MOST: u64 = MOST_IN_BLOCK * MOST_BLOCKS;
 
 impl Plan {
     /// A plan by built-in name, or from a TOML file.
@@ -223,6 +225,20 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
             format!("the plan has {cases} cases: allowed are 1 to {MOST}"),
             "too many",
             Some("cases = grid cells × samples × replicates".into()),
+        );
+    } else if let Some(block) = plan.block
+        && cases.div_ceil(u128::from(block)) > u128::from(MOST_BLOCKS)
+    {
+        let least = cases.div_ceil(u128::from(MOST_BLOCKS));
+        r.problem(
+            top.get("block").map(|(key, _)| key),
+            format!(
+                "`block` = {block} makes {} part files of {cases} cases (grid cells × `samples` × \
+                 `replicates`): allowed is `block` from {least} to {MOST_IN_BLOCK}",
+                cases.div_ceil(u128::from(block))
+            ),
+            "too many files",
+            Some(format!("a campaign has at most {MOST_BLOCKS} part files")),
         );
     }
     Some(plan)

@@ -36,7 +36,7 @@ pub(super) fn list(r: &mut Reader, entry: &Entry, key: &str) -> Option<Vec<Value
         r.problem(Some(entry.span.clone()), message, "expected here", help);
         return None;
     };
-    let values: Vec<Value> = one_kind(&item).unwrap_or_default();
+    let values: Vec<Value> = one_kind(item).unwrap_or_default();
     let twice = values.iter().enumerate();
     let twice = twice.filter(|(i, v)| values[..*i].contains(v)).count();
     if values.is_empty() || twice > 0 {

@@ -11,8 +11,9 @@ use wheeleg_plant::supply::{SupplyParams, SwitchParams};
 use wheeleg_plant::valve::ValveParams;
 
 use super::sections::{
-    AdcSection, CylinderSection, EndStopSection, FlowSection, FrictionSection, GasSection,
-    LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection, ValveSection,
+    AdcSection, CylinderSection, DumpValveSection, EndStopSection, FlowSection, FrictionSection,
+    GasSection, LineSection, NumericsSection, PotentiometerSection, SupplySection, SwitchSection,
+    ValveSection,
 };
 use crate::reader::Reader;
 
@@ -49,7 +50,7 @@ impl Pneumatics {
         // A robot without the contact at the source has no such section.
         let source_switch = r.optional_section::<SwitchSection>("source_switch");
         let regulator = r.section::<FlowSection>("regulator");
-        let dump_valve = r.section::<ValveSection>("dump_valve");
+        let dump_valve = r.section::<DumpValveSection>("dump_valve");
         let fill_valve = r.section::<ValveSection>("fill_valve");
         let vent_valve = r.section::<ValveSection>("vent_valve");
         let line = r.section::<LineSection>("line");
@@ -148,7 +149,7 @@ fn supply_params(
     s: &SupplySection,
     source_switch: Option<&SwitchSection>,
     regulator: &FlowSection,
-    dump: &ValveSection,
+    dump: &DumpValveSection,
 ) -> SupplyParams {
     SupplyParams {
         source_pressure_pa: s.source_pressure,
@@ -162,7 +163,16 @@ fn supply_params(
         ),
         reservoir_m3: s.reservoir,
         initial_pressure_pa: s.initial_pressure,
-        dump_valve: valve(dump),
+        dump_valve: ValveParams {
+            flow: iso(
+                dump.conductance,
+                dump.critical_ratio,
+                dump.subsonic_exponent,
+                dump.linear_ratio,
+            ),
+            t_on_s: dump.t_on,
+            t_off_s: dump.t_off,
+        },
         switch: SwitchParams {
             on_pa: s.switch_on,
             off_pa: s.switch_off,

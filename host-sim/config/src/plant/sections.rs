@@ -1,7 +1,25 @@
 //! The sections of a robot file that describe the plant: every parameter with
 //! its unit and range.
 
+use wheeleg_protocol::param::JointParam;
+
 use crate::params::params;
+use crate::told::limits_si;
+
+// What a joint board is told of its axis has the limits of the board's parameters.
+const VALVE_ON: [f64; 2] = limits_si(JointParam::ValveOn, 1e-6);
+const VALVE_OFF: [f64; 2] = limits_si(JointParam::ValveOff, 1e-6);
+const BORE: [f64; 2] = limits_si(JointParam::Bore, 1e-3);
+const ROD: [f64; 2] = limits_si(JointParam::Rod, 1e-3);
+/// Stroke of a cylinder.
+pub(crate) const STROKE: [f64; 2] = [0.001, limits_si(JointParam::StrokeMax, 1e-3)[1]];
+const DEAD_VOLUME: [f64; 2] = [1e-8, limits_si(JointParam::DeadVolumeA, 1e-6)[1]];
+const SUPPLY: [f64; 2] = limits_si(JointParam::SupplyPressure, 1e3);
+const COULOMB: [f64; 2] = limits_si(JointParam::FrictionCoulomb, 1.0);
+const BREAK_AWAY: [f64; 2] = limits_si(JointParam::FrictionBreakaway, 1.0);
+const VISCOUS: [f64; 2] = limits_si(JointParam::FrictionViscous, 1.0);
+/// Mass that moves with a rod; a board learns the rest.
+pub(crate) const MASS: [f64; 2] = limits_si(JointParam::MovingMass, 1.0);
 
 params! {
     /// Gas and atmosphere.
@@ -27,7 +45,7 @@ params! {
         /// Pressure before the regulator, absolute.
         source_pressure: f64, "source_pressure", Pressure, 1e5, 3e7;
         /// Pressure that the regulator holds at no flow, absolute.
-        set_pressure: f64, "set_pressure", Pressure, 1e5, 2e6;
+        set_pressure: f64, "set_pressure", Pressure, SUPPLY[0], SUPPLY[1];
         /// Pressure below the set point at which the regulator is fully open.
         droop: f64, "droop", Pressure, 100.0, 1e6;
         /// Volume of reservoir and manifold.
@@ -61,8 +79,24 @@ params! {
         linear_ratio: f64, "linear_ratio", Number, 0.900_001, 0.999_99;
     }
 
-    /// An on/off valve.
+    /// A valve of a cylinder.
     ValveSection {
+        /// Sonic conductance C of the open valve.
+        conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
+        /// Critical pressure ratio b.
+        critical_ratio: f64, "critical_ratio", Number, 0.0, 0.9;
+        /// Subsonic exponent m.
+        subsonic_exponent: f64, "subsonic_exponent", Number, 0.3, 1.0;
+        /// Pressure ratio above which the flow is taken as linear.
+        linear_ratio: f64, "linear_ratio", Number, 0.900_001, 0.999_99;
+        /// From energising to open.
+        t_on: f64, "t_on", Time, VALVE_ON[0], VALVE_ON[1];
+        /// From de-energising to shut.
+        t_off: f64, "t_off", Time, VALVE_OFF[0], VALVE_OFF[1];
+    }
+
+    /// The valve that empties the supply, of which no board is told.
+    DumpValveSection {
         /// Sonic conductance C of the open valve.
         conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
         /// Critical pressure ratio b.
@@ -98,15 +132,15 @@ params! {
     /// A cylinder.
     CylinderSection {
         /// Bore.
-        bore: f64, "bore", Length, 0.004, 0.2;
+        bore: f64, "bore", Length, BORE[0], BORE[1];
         /// Diameter of the rod.
-        rod: f64, "rod", Length, 0.0, 0.2;
+        rod: f64, "rod", Length, ROD[0], ROD[1];
         /// Stroke between the stops.
-        stroke: f64, "stroke", Length, 0.001, 2.0;
+        stroke: f64, "stroke", Length, STROKE[0], STROKE[1];
         /// Dead volume at the end of chamber A.
-        dead_volume_a: f64, "dead_volume_a", Volume, 1e-8, 1e-3;
+        dead_volume_a: f64, "dead_volume_a", Volume, DEAD_VOLUME[0], DEAD_VOLUME[1];
         /// Dead volume at the end of chamber B.
-        dead_volume_b: f64, "dead_volume_b", Volume, 1e-8, 1e-3;
+        dead_volume_b: f64, "dead_volume_b", Volume, DEAD_VOLUME[0], DEAD_VOLUME[1];
         /// Leak past the piston seal.
         piston_leak: f64, "piston_leak", SonicConductance, 0.0, 1e-9;
         /// Leak past the rod seal.
@@ -120,13 +154,13 @@ params! {
     /// Seal friction (LuGre type with an elastic share).
     FrictionSection {
         /// Coulomb force.
-        coulomb: f64, "coulomb", Force, 0.0, 500.0;
+        coulomb: f64, "coulomb", Force, COULOMB[0], COULOMB[1];
         /// Break-away force.
-        static_force: f64, "static", Force, 0.0, 500.0;
+        static_force: f64, "static", Force, BREAK_AWAY[0], BREAK_AWAY[1];
         /// Stribeck velocity.
         stribeck: f64, "stribeck", Velocity, 1e-4, 1.0;
         /// Viscous coefficient.
-        viscous: f64, "viscous", Damping, 0.0, 1000.0;
+        viscous: f64, "viscous", Damping, VISCOUS[0], VISCOUS[1];
         /// Bristle stiffness.
         bristle_stiffness: f64, "bristle_stiffness", Stiffness, 1e3, 1e6;
         /// Bristle damping.

@@ -18,11 +18,15 @@ pub(crate) struct Entry {
 
 impl Entry {
     /// Position of the key, and the item.
-    pub(crate) fn get(&self, key: &str) -> Option<(Range<usize>, Item)> {
-        self.fields
-            .iter()
-            .find(|(k, ..)| k == key)
-            .map(|(_, span, item)| (span.clone(), item.clone()))
+    pub(crate) fn get(&self, key: &str) -> Option<(Range<usize>, &Item)> {
+        let mut fields = self.fields.iter();
+        let (_, span, item) = fields.find(|(k, ..)| k == key)?;
+        Some((span.clone(), item))
+    }
+
+    /// Whether there is such a field.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.fields.iter().any(|(k, ..)| k == key)
     }
 
     /// Names and positions of the keys, in the order of the file.
@@ -97,6 +101,20 @@ fn split_number(text: &str) -> Option<(Value, &str)> {
         let (begin, unit) = text.split_at_checked(end)?;
         Some((number(begin)?, unit))
     })
+}
+
+/// A number with a decimal comma, with a point in its place: `0,5 s` is `0.5 s`.
+pub(super) fn with_point(text: &str) -> Option<String> {
+    let (whole, rest) = text.split_once(',')?;
+    let digits = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_digit());
+    let behind = rest
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(rest.len());
+    let (decimals, unit) = rest.split_at(behind);
+    let sign_less = whole.trim_start_matches(['+', '-']);
+    // A second comma, as in 1,234,5, says that it is something else.
+    let one = digits(sign_less) && !decimals.is_empty() && !unit.starts_with([',', '.']);
+    one.then(|| format!("{whole}.{rest}"))
 }
 
 /// The fields of a quantity that is written short, `"10 s"` or `true`: its value, and its

@@ -37,6 +37,14 @@ fn is_long_number(text: &str) -> bool {
     digits && !text.is_empty() && text.parse::<i64>().is_err()
 }
 
+/// Whether a text that is not TOML has a comma between two digits about a byte.
+fn has_decimal_comma(text: &str, at: usize) -> bool {
+    let bytes = text.as_bytes();
+    let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
+    let mut commas = (at.saturating_sub(1)..=at).filter(|i| bytes.get(*i) == Some(&b','));
+    commas.any(|i| digit(i.wrapping_sub(1)) && digit(i + 1))
+}
+
 impl Reader {
     /// Parses `text`; `file` is the name shown in messages.
     pub(crate) fn parse(
@@ -64,6 +72,9 @@ impl Reader {
                     Some(number) if is_long_number(number) => {
                         format!("TOML has no number so large; write \"{number}\" in quotes")
                     }
+                    _ if has_decimal_comma(text, span.start) => {
+                        "numbers have a decimal point: 0.5, not 0,5".to_owned()
+                    }
                     _ => "a field is `name = value`, below the [section] that it belongs to; \
                           https://toml.io describes the rest"
                         .to_owned(),
@@ -85,6 +96,11 @@ impl Reader {
             Some(value) if self.problems.is_empty() => Ok((value, self.parameters)),
             _ => Err(ConfigError::new(what, self.problems)),
         }
+    }
+
+    /// Every problem found.
+    pub(crate) fn refusal(self, what: &str) -> ConfigError {
+        ConfigError::new(what, self.problems)
     }
 
     pub(crate) fn problem(
@@ -275,10 +291,7 @@ impl Reader {
         }
         let entry = self.optional_table(path, &known)?;
         self.reject_unknown(&entry, &known);
-        let missing: Vec<&FieldSpec> = T::FIELDS
-            .iter()
-            .filter(|f| entry.get(f.key).is_none())
-            .collect();
+        let missing: Vec<&FieldSpec> = T::FIELDS.iter().filter(|f| !entry.has(f.key)).collect();
         if !missing.is_empty() {
             let names: Vec<String> = missing
                 .iter()

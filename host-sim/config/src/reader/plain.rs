@@ -111,7 +111,7 @@ impl Reader {
     ) -> Option<T> {
         let names: Vec<String> = choices.iter().map(|(n, _)| format!("\"{n}\"")).collect();
         let names = names.join(", ");
-        if entry.get(key).is_none() {
+        if !entry.has(key) {
             self.problem(
                 Some(entry.span.clone()),
                 format!("`{}` is missing; accepted: {names}", entry.field_path(key)),

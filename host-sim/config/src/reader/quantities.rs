@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use toml_edit::Item;
 
-use super::entry::{fields, number, short};
+use super::entry::{fields, number, short, with_point};
 use super::{Entry, Reader};
 use crate::params::{FieldSpec, ParameterInfo};
 use crate::quantity::{Dimension, pretty, suffix};
@@ -51,7 +51,7 @@ impl Reader {
         };
         let span = value.span().unwrap_or(value_key);
         let range = range(spec.min / factor, spec.max / factor, &unit);
-        let written = self.numbers(&path, spec, &value, span.clone(), &range)?;
+        let written = self.numbers(&path, spec, value, span.clone(), &range)?;
         let mut ok = true;
         for v in &written {
             let si = v * factor;
@@ -110,7 +110,7 @@ impl Reader {
             let span = item.span().unwrap_or(key);
             Entry {
                 path: entry.field_path(spec.key),
-                fields: vec![("value".to_owned(), span.clone(), item)],
+                fields: vec![("value".to_owned(), span.clone(), item.clone())],
                 span,
             }
         })
@@ -118,7 +118,7 @@ impl Reader {
 
     /// Reads a quantity that must be there.
     pub(crate) fn required(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
-        if entry.get(spec.key).is_some() {
+        if entry.has(spec.key) {
             return self.quantity(entry, spec).and_then(|v| v.first().copied());
         }
         let place = if entry.path.is_empty() {
@@ -217,7 +217,11 @@ impl Reader {
         let path = entry.field_path(key);
         let (key_span, item) = entry.get(key)?;
         let span = item.span().unwrap_or(key_span);
-        if let (false, Some(fields)) = (self.source_required, short(&item, &span)) {
+        if let Some((text, point)) = item.as_str().and_then(|t| Some((t, with_point(t.trim())?))) {
+            self.decimal_comma(&path, span, text, &point);
+            return None;
+        }
+        if let (false, Some(fields)) = (self.source_required, short(item, &span)) {
             return Some(Entry { path, fields, span });
         }
         let Some(table) = item.as_table_like() else {
@@ -242,6 +246,16 @@ impl Reader {
         };
         self.reject_unknown(&inner, &["value", "unit", "source"]);
         Some(inner)
+    }
+
+    /// Numbers of many countries have a comma, those of TOML and of this program a point.
+    fn decimal_comma(&mut self, path: &str, span: Range<usize>, text: &str, point: &str) {
+        self.problem(
+            Some(span),
+            format!("`{path}` = \"{text}\" has a decimal comma"),
+            "a comma",
+            Some(format!("numbers have a decimal point: write \"{point}\"")),
+        );
     }
 
     fn source(&mut self, inner: &Entry) -> String {
@@ -272,11 +286,11 @@ impl Reader {
 
     fn unit(&mut self, inner: &Entry, spec: &FieldSpec, example: &str) -> Option<(f64, String)> {
         let path = &inner.path;
-        if spec.dimension == Dimension::Flag && inner.get("unit").is_none() {
+        if spec.dimension == Dimension::Flag && !inner.has("unit") {
             return Some((1.0, "flag".into()));
         }
         let pure = spec.dimension == Dimension::Number && !self.source_required;
-        if pure && inner.get("unit").is_none() {
+        if pure && !inner.has("unit") {
             return Some((1.0, "1".into()));
         }
         let Some((key, item)) = inner.get("unit") else {
@@ -312,7 +326,7 @@ impl Reader {
         );
         let mut units = spec.dimension.units().iter().map(|(name, _)| name);
         let help = match units.find(|name| name.eq_ignore_ascii_case(unit)) {
-            // Of a number such as 0,2 the end reads as a unit.
+            // Of a number such as 0,2,1 the end reads as a unit.
             _ if unit.starts_with(',') => "numbers have a decimal point: 0.2, not 0,2".to_owned(),
             Some(meant) => format!("did you mean \"{meant}\"? {path}: {}", spec.doc),
             None => format!("{path}: {}", spec.doc),
@@ -340,6 +354,17 @@ impl Reader {
         };
         match numbers {
             Some(numbers) if numbers.len() == spec.components => Some(numbers),
+            _ if value
+                .as_str()
+                .is_some_and(|text| with_point(text.trim()).is_some()) =>
+            {
+                let text = value.as_str().unwrap_or_default().trim();
+                let point = with_point(text).unwrap_or_default();
+                let help = format!("numbers have a decimal point and no quotes: write {point}");
+                let message = format!("`{path}` = \"{text}\" has a decimal comma; allowed {range}");
+                self.problem(Some(span), message, "a comma", Some(help));
+                None
+            }
             _ => {
                 let expected = match (spec.dimension, spec.components) {
                     (Dimension::Flag, _) => "true or false".to_owned(),

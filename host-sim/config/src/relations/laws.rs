@@ -7,13 +7,11 @@ use super::{Broken, Facts, ROUNDING, Relation};
 use crate::gait::GaitParams;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
+use crate::told::STEPS_AT_REST;
 
 /// Shares of its track between which a wiper stands: beyond, a board takes it for torn off or
 /// shorted. As a commissioned board is told.
 pub const SENSOR_TRACK: [f64; 2] = [0.01, 0.99];
-
-/// Steps of the converter that a joint's band of rest has at least: below it, rest is noise.
-pub const STEPS_AT_REST: f64 = 2.5;
 
 fn broken(figures: String, allowed: String) -> Option<Broken> {
     Some(Broken { figures, allowed })

@@ -4,6 +4,7 @@
 //! sees the listed values of the file, so that it works beside sections that are wrong or
 //! missing. Those of the whole plant come last, where nothing else is wrong.
 
+mod board;
 mod laws;
 mod moved;
 mod standing;
@@ -11,9 +12,11 @@ mod table;
 
 use std::cell::LazyCell;
 
+use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::{PlantError, PlantParams};
+use wheeleg_protocol::param::JointParam;
 
-pub use laws::{SENSOR_TRACK, STEPS_AT_REST};
+pub use laws::SENSOR_TRACK;
 pub(crate) use moved::Moved;
 use standing::AtRest;
 pub use table::RELATIONS;
@@ -49,6 +52,8 @@ enum Rule {
     Below,
     /// The first field is above the other, or the sum of the others.
     Above,
+    /// A joint board can be told of the axis what this parameter holds.
+    Told(JointParam),
     /// Something else of the fields, or of the cylinder that they make.
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
     /// Something of the whole robot, where nothing else is wrong.
@@ -70,6 +75,18 @@ struct Broken {
 struct Facts<'a> {
     parameters: &'a [ParameterInfo],
     moved: Option<&'a Moved<'a>>,
+    axis: Option<&'a AxisParams>,
+}
+
+/// What was made of a file, as far as it could be read.
+#[derive(Default)]
+pub(crate) struct Read<'a> {
+    /// A cylinder with what it moves.
+    pub moved: Option<Moved<'a>>,
+    /// The axis, if it is one.
+    pub axis: Option<&'a AxisParams>,
+    /// The robot, if it is one.
+    pub robot: Option<&'a PlantParams>,
 }
 
 impl Facts<'_> {
@@ -143,6 +160,7 @@ impl Relation {
                 let of = format!(", which is `{}`", others.join("` + `"));
                 (value(0)? <= sum).then(|| allowed("above", sum, &of))
             }
+            Rule::Told(parameter) => board::told(facts.axis?, parameter),
             Rule::Law(law) => law(facts, self),
             Rule::Whole(_) | Rule::AtRest(_) => None,
         }
@@ -161,10 +179,12 @@ impl Relation {
 
 /// Reports every relation that does not hold: of the listed values, of the cylinder with what it
 /// moves, and of the robot, if it is one.
-pub(crate) fn check(r: &mut Reader, moved: Option<&Moved<'_>>, robot: Option<&PlantParams>) {
+pub(crate) fn check(r: &mut Reader, read: &Read<'_>) {
+    let (moved, axis) = (read.moved.as_ref(), read.axis);
     let facts = Facts {
         parameters: r.parameters(),
         moved,
+        axis,
     };
     let found: Vec<(&Relation, Broken)> = RELATIONS
         .iter()
@@ -174,12 +194,13 @@ pub(crate) fn check(r: &mut Reader, moved: Option<&Moved<'_>>, robot: Option<&Pl
         relation.report(r, broken);
     }
     // What the others name, these would name less well: the first alone is told.
-    let Some(robot) = robot.filter(|_| r.is_clean()) else {
+    let Some(robot) = read.robot.filter(|_| r.is_clean()) else {
         return;
     };
     let facts = Facts {
         parameters: r.parameters(),
         moved,
+        axis,
     };
     // A rest is looked for once, and only where a leg closes.
     let at_rest = LazyCell::new(|| AtRest::new(&facts, robot));

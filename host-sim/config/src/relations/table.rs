@@ -1,6 +1,7 @@
 //! The table of relations.
 
 use wheeleg_plant::cylinder::ROD_MOST;
+use wheeleg_protocol::param::JointParam;
 
 use super::{Facts, Relation, Rule, laws, moved, standing};
 
@@ -41,6 +42,15 @@ const fn law(
     relation(name, fields, broken, Rule::Law(law))
 }
 
+const fn told(name: &'static str, fields: Fields, parameter: JointParam) -> Relation {
+    relation(
+        name,
+        fields,
+        "a joint board cannot be told of this axis",
+        Rule::Told(parameter),
+    )
+}
+
 const HYSTERESIS: &str = "a contact opens at a lower pressure than it closes";
 const NO_CONTACT: &str = "a contact that never closes: the supply would be taken for lost";
 const REGULATOR: &str = "a regulator lowers the pressure of its source, and raises none";
@@ -65,7 +75,6 @@ pub const RELATIONS: &[Relation] = &[
     at_most("source's contact", &["source_switch.on", "supply.source_pressure"], NO_CONTACT),
     at_most("regulator", &["supply.set_pressure", "supply.source_pressure"], REGULATOR),
     at_most("filled reservoir", &["supply.initial_pressure", "supply.source_pressure"], REGULATOR),
-    at_most("surroundings", &["gas.ambient_pressure", "supply.set_pressure"], "a supply below the surroundings moves nothing"),
     law("droop", &["supply.droop", "supply.set_pressure", "gas.ambient_pressure"], "a regulator that would be fully open below the surroundings alone", laws::droop),
     at_most("trapped air A", &["start.pressure_a", "supply.set_pressure"], PRESSURE),
     at_most("trapped air B", &["start.pressure_b", "supply.set_pressure"], PRESSURE),
@@ -132,6 +141,12 @@ pub const RELATIONS: &[Relation] = &[
     law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max"], "a joint board would take a piston in its stop for a fault of the sensor", laws::calibration),
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
+    // What the board of an axis can be told; of one field it is the field's own range.
+    told("told full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
+    told("told volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),
+    told("told volume B", &["cylinder.dead_volume_b", "line.volume"], JointParam::DeadVolumeB),
+    told("told conductance", &["fill_valve.conductance", "line.conductance"], JointParam::Conductance),
+    told("told band of rest", &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"], JointParam::RestBand),
     // The whole robot.
     relation("closed leg", &["body.crank", "body.p4", "body.stroke_zero", "start.yaw.stroke", "cylinder.stroke", "body.min_cos_theta3"], "they make no leg", Rule::Whole(standing::closes)),
     relation("standing", &["body.chassis_com", "body.chassis_mass", "body.o4", "body.foot_pad", "body.wheel_radius", "body.stroke_zero", "gait.stroke", "gait.held_leg_s5", "gait.held_leg_s6", "body.gravity", "contact.stiffness", "wheel_contact.stiffness"], "the robot does not stand on its wheels and feet in its start pose, on level ground", Rule::AtRest(standing::stands)),

@@ -42,7 +42,7 @@ impl<'a> Fields<'a> {
         if !self.known.contains(&key) {
             self.known.push(key);
         }
-        self.entry.get(key).is_some()
+        self.entry.has(key)
     }
 
     /// A quantity that the part must have, SI.

@@ -5,15 +5,15 @@
 //! usual laws are stated beside each; the predictive law's own are in
 //! [`wheeleg_control::axis::AxisModel::new`].
 
-use wheeleg_config::{SENSOR_TRACK, STEPS_AT_REST};
+use wheeleg_config::SENSOR_TRACK;
+use wheeleg_config::told::{limits, told};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
 use wheeleg_node::sensor::SensorConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_protocol::param::{JointParam, ParamInfo};
+use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
-use super::commission::value;
 use super::firmware::{Design, Supervision};
 
 /// A controller of the comparison.
@@ -119,40 +119,41 @@ fn supervision(facts: &Facts) -> Supervision {
 /// The axis's data sheet in the formats of the board.
 #[must_use]
 pub fn axis_data(axis: &AxisParams) -> AxisData {
+    let of = |parameter: JointParam| told(axis, parameter).unwrap_or_default();
+    let fixed = |parameter: JointParam| PositionMm::from_f64(of(parameter));
+    let micros = |us: f64| Micros(us.round() as u32);
+    let gain = |parameter: JointParam| Gain::saturating_from_num(of(parameter));
     let c = &axis.cylinder;
-    let mm = |metres: f64| PositionMm::from_f64(metres * 1e3);
-    let micros = |seconds: f64| Micros((seconds * 1e6).round() as u32);
-    let path = match &c.line_flow {
-        Some(line) => c.fill_valve.flow.in_series(line),
-        None => c.fill_valve.flow,
-    };
-    let gain = |value: f64| Gain::saturating_from_num(value);
-    let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
+    // No less than an eighth of what the smallest pulse does, too: below it, rest is luck.
+    let band_mm = of(JointParam::RestBand).max(0.13e3 * free_step_m(axis));
     AxisData {
-        bore: mm(c.bore_m),
-        rod: mm(c.rod_m),
-        dead_a: PositionMm::from_f64((c.dead_volume_a_m3 + c.line_volume_m3) * 1e6),
-        dead_b: PositionMm::from_f64((c.dead_volume_b_m3 + c.line_volume_m3) * 1e6),
-        conductance: gain(path.conductance_m3_s_pa * 1e8),
-        critical_ratio: gain(path.critical_ratio),
-        supply: PositionMm::from_f64(axis.supply.set_pressure_pa * 1e-3),
-        mass: PositionMm::from_f64(axis.moving_mass_kg),
-        coulomb: PositionMm::from_f64(c.friction.coulomb_n),
-        breakaway: PositionMm::from_f64(c.friction.static_n),
-        viscous: PositionMm::from_f64(c.friction.viscous_n_s_m),
-        valve_on: micros(c.fill_valve.t_on_s.max(c.vent_valve.t_on_s)),
-        valve_off: micros(c.fill_valve.t_off_s.max(c.vent_valve.t_off_s)),
-        margin: micros(0.1 * c.fill_valve.t_on_s.max(1e-3)),
-        line_delay: micros(c.line_delay_s),
-        // No less than an eighth of what the smallest pulse does, too: below it, rest is luck.
-        band: mm((STEPS_AT_REST * lsb_m)
-            .max(0.13 * free_step_m(axis))
-            .max(2e-5)),
+        bore: fixed(JointParam::Bore),
+        rod: fixed(JointParam::Rod),
+        dead_a: fixed(JointParam::DeadVolumeA),
+        dead_b: fixed(JointParam::DeadVolumeB),
+        conductance: gain(JointParam::Conductance),
+        critical_ratio: gain(JointParam::CriticalRatio),
+        supply: fixed(JointParam::SupplyPressure),
+        mass: fixed(JointParam::MovingMass),
+        coulomb: fixed(JointParam::FrictionCoulomb),
+        breakaway: fixed(JointParam::FrictionBreakaway),
+        viscous: fixed(JointParam::FrictionViscous),
+        valve_on: micros(of(JointParam::ValveOn)),
+        valve_off: micros(of(JointParam::ValveOff)),
+        margin: micros(0.1e6 * c.fill_valve.t_on_s.max(1e-3)),
+        line_delay: micros(of(JointParam::LineDelay)),
+        band: PositionMm::from_f64(within(JointParam::RestBand, band_mm)),
         release: PositionMm::ZERO,
         precharged: false,
         learns_mass: true,
-        stroke: mm(c.stroke_m),
+        stroke: fixed(JointParam::StrokeMax),
     }
+}
+
+/// A value of the designer's choice, as near as a board can have it.
+fn within(parameter: JointParam, value: f64) -> f64 {
+    let [low, high] = limits(parameter);
+    value.clamp(low, high)
 }
 
 /// How far a free piston is moved by the shortest opening of one valve, at mid stroke \[m\].
@@ -193,8 +194,9 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
 }
 
 fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
-    let gain = |value: f64| Gain::saturating_from_num(value);
-    let mm = |value: f64| PositionMm::from_f64(value);
+    use JointParam as P;
+    let gain = |of: P, value: f64| Gain::saturating_from_num(within(of, value));
+    let mm = |of: P, value: f64| PositionMm::from_f64(within(of, value));
     let duty = |value: f64| Duty::from_per_mille((value * 1000.0).round() as i16);
     // A PWM loop acts half a period and the dead time late.
     let lag_s = facts.dead_time_s + 0.5 * facts.period_s;
@@ -205,23 +207,23 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     let proportional = 1.0 / full_mm;
     let (settle_mm, release_mm) = (0.5, 1.5);
     let base = JointGains {
-        proportional: gain(proportional),
-        correction_pd: gain(0.6),
-        correction_id: gain(0.6),
-        feed_forward: gain(1.0 / facts.speed_mm_s),
-        error_scale: mm(full_mm.clamp(0.25, 1000.0)),
-        velocity_scale: VelocityMmS::from_f64((0.5 * facts.speed_mm_s).clamp(1.0, 5000.0)),
-        integral_scale: mm((full_mm * 0.1).clamp(0.05, 1000.0)),
-        integral_zone: mm(0.3 * full_mm),
+        proportional: gain(P::Proportional, proportional),
+        correction_pd: gain(P::CorrectionPd, 0.6),
+        correction_id: gain(P::CorrectionId, 0.6),
+        feed_forward: gain(P::FeedForward, 1.0 / facts.speed_mm_s),
+        error_scale: mm(P::ErrorScale, full_mm),
+        velocity_scale: VelocityMmS::from_f64(within(P::VelocityScale, 0.5 * facts.speed_mm_s)),
+        integral_scale: mm(P::IntegralScale, full_mm * 0.1),
+        integral_zone: mm(P::IntegralZone, 0.3 * full_mm),
         duty_limit: Duty::ONE,
         dead_zone_duty: duty((facts.shortest_duty + 0.01).min(0.5)),
         minimum_duty: duty(0.01),
-        settle_band: mm(settle_mm),
+        settle_band: mm(P::SettleBand, settle_mm),
         settle_velocity: VelocityMmS::from_f64(10.0),
-        release_band: mm(release_mm),
+        release_band: mm(P::ReleaseBand, release_mm),
         velocity_window: 16,
         stroke_min: PositionMm::ZERO,
-        stroke_max: mm(facts.stroke_mm),
+        stroke_max: mm(P::StrokeMax, facts.stroke_mm),
         pwm_period: Micros((facts.period_s * 1e6).round() as u32),
         axis: *data,
         ..JointGains::default()
@@ -231,36 +233,38 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
             law: Law::OnOff,
             // A full push cannot be shorter than the dead time: a dead band of four
             // dead times at full speed, or it chatters all the more.
-            settle_band: mm(4.0 * facts.speed_mm_s * facts.dead_time_s),
-            release_band: mm(6.0 * facts.speed_mm_s * facts.dead_time_s),
+            settle_band: mm(P::SettleBand, 4.0 * facts.speed_mm_s * facts.dead_time_s),
+            release_band: mm(P::ReleaseBand, 6.0 * facts.speed_mm_s * facts.dead_time_s),
             ..base
         },
         Kind::PwmP => JointGains {
             law: Law::Proportional,
             // Without damping, a quarter of the gain.
-            proportional: gain(proportional * 6.0 / 25.0),
+            proportional: gain(P::Proportional, proportional * 6.0 / 25.0),
             ..base
         },
         Kind::PwmPid => JointGains {
             law: Law::Pid,
-            proportional: gain(proportional * 0.5),
-            derivative: gain(proportional * 4.0 * lag_s),
-            integral: gain(proportional / (130.0 * lag_s)),
+            proportional: gain(P::Proportional, proportional * 0.5),
+            derivative: gain(P::Derivative, proportional * 4.0 * lag_s),
+            integral: gain(P::Integral, proportional / (130.0 * lag_s)),
             ..base
         },
         Kind::FuzzyPd => base,
         Kind::FuzzyId => JointGains {
-            correction_id: gain(0.5),
-            settle_band: mm(0.4),
-            release_band: mm(1.2),
+            correction_id: gain(P::CorrectionId, 0.5),
+            settle_band: mm(P::SettleBand, 0.4),
+            release_band: mm(P::ReleaseBand, 1.2),
             ..base
         },
         Kind::Sliding => JointGains {
             law: Law::Sliding,
-            sliding_time: Micros((6.0 * facts.dead_time_s * 1e6).round() as u32),
-            settle_band: mm(facts.speed_mm_s * facts.dead_time_s),
-            release_band: mm(3.0 * facts.speed_mm_s * facts.dead_time_s),
-            error_scale: mm((20.0 * facts.speed_mm_s * facts.dead_time_s).clamp(0.25, 1000.0)),
+            sliding_time: Micros(
+                within(P::SlidingTime, 6.0 * facts.dead_time_s * 1e6).round() as u32,
+            ),
+            settle_band: mm(P::SettleBand, facts.speed_mm_s * facts.dead_time_s),
+            release_band: mm(P::ReleaseBand, 3.0 * facts.speed_mm_s * facts.dead_time_s),
+            error_scale: mm(P::ErrorScale, 20.0 * facts.speed_mm_s * facts.dead_time_s),
             ..base
         },
         Kind::Predictive => JointGains {
@@ -272,15 +276,6 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
 
 /// Beyond its stops a piston is measured to this share of its stroke, and this much more \[m\].
 const BEYOND_STOP: (f64, f64) = (0.02, 0.005);
-
-/// The longest stroke that a board can be told \[m\]: that of `stroke_max`, and what lies within
-/// `sensor_max` with the way beyond the stops.
-#[must_use]
-pub fn longest_stroke_m() -> f64 {
-    let most = |row: &ParamInfo| value(row, row.max) * 1e-3;
-    let measured = (most(JointParam::SensorMax.info()) - BEYOND_STOP.1) / (1.0 + BEYOND_STOP.0);
-    measured.min(most(JointParam::StrokeMax.info()))
-}
 
 /// Calibration of the axis's position sensor, as commissioning would find it.
 fn sensor(axis: &AxisParams) -> SensorConfig {
@@ -359,5 +354,68 @@ mod tests {
         assert!((period_ms(0.009, 0.009) - 20.0).abs() < 1e-9);
         let slow = period_ms(0.02, 0.01);
         assert!((40.0..=46.0).contains(&slow), "{slow}");
+    }
+
+    /// What an axis file may say, at and between the ends of its ranges, is what a board can be told:
+    /// no design is refused by the board.
+    #[test]
+    fn a_board_accepts_the_designs_for_every_axis_that_a_file_may_have() {
+        use rand::{RngExt as _, SeedableRng as _};
+        const BENCH: &str = include_str!("../../../axes/bench-vq110u.toml");
+        let listed = AxisConfig::parse("bench.toml", BENCH)
+            .expect("built in")
+            .parameters;
+        let free = |path: &str| {
+            let parts = [
+                "fill_valve.",
+                "vent_valve.",
+                "line.",
+                "cylinder.",
+                "friction.",
+                "moving.m",
+            ];
+            let parts = parts.iter().chain(&["sensor.", "supply.set", "numerics."]);
+            let mut parts = parts.filter(|part| path.starts_with(**part));
+            parts.next().is_some()
+        };
+        let listed: Vec<_> = listed.iter().filter(|p| free(&p.path)).collect();
+        let (mut sound, mut tried) = (0, 0);
+        for seed in 0..1500 {
+            let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
+            let changes = (0..rng.random_range(1..5)).map(|_| {
+                let p = listed[rng.random_range(0..listed.len())];
+                let share: f64 = [0.0, 1.0, rng.random()][rng.random_range(0..3)];
+                let low = p.min.max(1e-4 * p.max);
+                let value = match share {
+                    0.0 => p.min,
+                    share => (low * (p.max / low).powf(share)).clamp(p.min, p.max),
+                };
+                let value = if p.whole { value.round() } else { value };
+                wheeleg_config::axis::Change {
+                    path: p.path.clone(),
+                    values: vec![value; p.value.len()],
+                    unit: p.unit.clone(),
+                    source: "ASSUMED".to_owned(),
+                }
+            });
+            let changes: Vec<_> = changes.collect();
+            let text = AxisConfig::rewritten("bench.toml", BENCH, &changes).expect("sound");
+            tried += 1;
+            let Ok(config) = AxisConfig::parse("bench.toml", &text) else {
+                continue;
+            };
+            sound += 1;
+            for kind in Kind::ALL {
+                let board = Node::new(&design(&config.axis, kind));
+                assert!(
+                    board.is_ok(),
+                    "{}, {changes:?}: {:?}",
+                    kind.name(),
+                    board.err()
+                );
+            }
+        }
+        println!("{sound} of {tried} axes can be");
+        assert!(sound > tried / 5, "{sound} of {tried}");
     }
 }

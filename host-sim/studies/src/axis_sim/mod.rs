@@ -46,7 +46,7 @@ mod textbook;
 mod unphysical;
 pub mod valve_resolution;
 
-pub use design::{Kind, axis_data, design, longest_stroke_m};
+pub use design::{Kind, axis_data, design};
 pub use firmware::{Design, Firmware, Supervision, TICK};
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};

@@ -10,6 +10,7 @@
 //! | error after a lost contact | 2 mm |
 //! | overshoot, but for a load that is let go | 3 mm |
 //! | it settles at all | yes |
+//! | settling time, of a board that settles and rests | 0.25 s |
 //!
 //! A tuning that made any of them worse is refused: its parameters are not written.
 
@@ -25,6 +26,8 @@ const ERROR_MM: f64 = 0.5;
 const CONTACT_MM: f64 = 2.0;
 /// Overshoot that is good enough, mm.
 const OVERSHOOT_MM: f64 = 3.0;
+/// Settling time that is good enough, s.
+const SETTLE_S: f64 = 0.25;
 /// What a figure may grow by within its own scatter.
 const SCATTER: f64 = 1.1;
 
@@ -44,6 +47,8 @@ pub enum Figure {
     Overshoot,
     /// It does not settle: 1.
     NeverSettles,
+    /// Settling time \[s\].
+    SettlingTime,
 }
 
 /// One figure of one move that tuning made worse.
@@ -76,6 +81,9 @@ impl Worse {
             }
             Figure::Overshoot => format!("{name}: overshoot {after:.2} mm, before {before:.2} mm"),
             Figure::NeverSettles => format!("{name}: never settles"),
+            Figure::SettlingTime => {
+                format!("{name}: settles in {after:.3} s, before in {before:.3} s")
+            }
         }
     }
 }
@@ -100,6 +108,10 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     let judged = |figure: Figure| match figure {
         Figure::LimitCycle => rests,
         Figure::Overshoot => !motion.loses_contact() && tried,
+        // Whoever never settles, or goes on about the target, has no time to compare with.
+        Figure::SettlingTime => {
+            tried && step && before.settle_s.is_some() && before.limit_cycle != Some(true)
+        }
         _ => true,
     };
     let rows = [
@@ -134,6 +146,12 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
             OVERSHOOT_MM,
         ),
         (Figure::NeverSettles, never(before), never(after), 0.0),
+        (
+            Figure::SettlingTime,
+            size(before.settle_s),
+            size(after.settle_s),
+            SETTLE_S,
+        ),
     ];
     rows.into_iter()
         .filter(|(figure, before, after, enough)| {
@@ -169,7 +187,7 @@ mod tests {
         assert_eq!(names(&good, &good), []);
         let exact = Figures {
             steady_error_mm: Some(0.05),
-            settle_s: Some(0.9),
+            settle_s: Some(0.32),
             ..good.clone()
         };
         assert_eq!(names(&exact, &good), [], "both are good enough");
@@ -188,6 +206,17 @@ mod tests {
         ];
         assert_eq!(names(&good, &away), all);
         assert_eq!(names(&away, &good), []);
+        let slow = |settle_s| Figures {
+            settle_s: Some(settle_s),
+            ..good.clone()
+        };
+        assert_eq!(names(&good, &slow(0.34)), [Figure::SettlingTime]);
+        assert_eq!(names(&slow(0.1), &slow(0.24)), [], "fast enough");
+        let cycling = Figures {
+            limit_cycle: Some(true),
+            ..good.clone()
+        };
+        assert_eq!(names(&cycling, &slow(0.9)), [], "it never was at rest");
         assert_eq!(names(&away, &away), []);
     }
 }

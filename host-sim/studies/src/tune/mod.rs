@@ -192,7 +192,7 @@ pub fn tune(
 /// Reads an axis that can be tuned.
 fn load(file: &str) -> Result<AxisConfig, StudyError> {
     let config = AxisConfig::load(file)?;
-    feasible::check(file, &config.axis)?;
+    feasible::check(&config)?;
     Ok(config)
 }
 

@@ -1,0 +1,157 @@
+//! What a joint board is told of its axis: each quantity with the board's parameter that holds it,
+//! and the fields of the axis file that it is made of.
+//!
+//! The limits are those of the protocol's table. A quantity that is one field of the file has them
+//! as the range of that field; one that is made of several is a relation between these.
+
+use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::flow::Iso6358;
+use wheeleg_protocol::param::{JointParam, ParamInfo};
+
+/// Steps of the converter that a joint's band of rest has at least: below it, rest is noise.
+pub const STEPS_AT_REST: f64 = 2.5;
+
+/// One quantity.
+#[derive(Debug, Clone, Copy)]
+pub struct Told {
+    /// The board's parameter.
+    pub parameter: JointParam,
+    /// Fields of the axis file.
+    pub fields: &'static [&'static str],
+    value: fn(&AxisParams) -> f64,
+}
+
+impl Told {
+    /// The quantity of an axis, in the unit of the parameter.
+    #[must_use]
+    pub fn value(&self, axis: &AxisParams) -> f64 {
+        (self.value)(axis)
+    }
+
+    /// Whether a board can be told so.
+    #[must_use]
+    pub fn fits(&self, axis: &AxisParams) -> bool {
+        let row = self.parameter.info();
+        let raw = (self.value(axis) * scale(row)).round();
+        (f64::from(row.min)..=f64::from(row.max)).contains(&raw)
+    }
+}
+
+/// The quantity of a parameter, in its unit; `None` if it is not of the axis.
+#[must_use]
+pub fn told(axis: &AxisParams, parameter: JointParam) -> Option<f64> {
+    let row = TOLD.iter().find(|row| row.parameter == parameter);
+    row.map(|row| row.value(axis))
+}
+
+/// All of them.
+#[rustfmt::skip]
+pub const TOLD: &[Told] = &[
+    told_by(JointParam::StrokeMax, &["cylinder.stroke"], |a| a.cylinder.stroke_m * 1e3),
+    told_by(JointParam::ValveOn, &["fill_valve.t_on", "vent_valve.t_on"], |a| longer(a, |v| v.t_on_s)),
+    told_by(JointParam::ValveOff, &["fill_valve.t_off", "vent_valve.t_off"], |a| longer(a, |v| v.t_off_s)),
+    told_by(JointParam::SensorFullScale, &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"],
+        |a| a.potentiometer.electrical_stroke_m / a.potentiometer.gain * 1e3),
+    told_by(JointParam::Bore, &["cylinder.bore"], |a| a.cylinder.bore_m * 1e3),
+    told_by(JointParam::Rod, &["cylinder.rod"], |a| a.cylinder.rod_m * 1e3),
+    told_by(JointParam::DeadVolumeA, &["cylinder.dead_volume_a", "line.volume"],
+        |a| (a.cylinder.dead_volume_a_m3 + a.cylinder.line_volume_m3) * 1e6),
+    told_by(JointParam::DeadVolumeB, &["cylinder.dead_volume_b", "line.volume"],
+        |a| (a.cylinder.dead_volume_b_m3 + a.cylinder.line_volume_m3) * 1e6),
+    told_by(JointParam::Conductance, &["fill_valve.conductance", "line.conductance"],
+        |a| path(a).conductance_m3_s_pa * 1e8),
+    told_by(JointParam::CriticalRatio, &["fill_valve.critical_ratio", "line.critical_ratio"],
+        |a| path(a).critical_ratio),
+    told_by(JointParam::SupplyPressure, &["supply.set_pressure"], |a| a.supply.set_pressure_pa * 1e-3),
+    told_by(JointParam::MovingMass, &["moving.mass"], |a| a.moving_mass_kg),
+    told_by(JointParam::FrictionCoulomb, &["friction.coulomb"], |a| a.cylinder.friction.coulomb_n),
+    told_by(JointParam::FrictionBreakaway, &["friction.static"], |a| a.cylinder.friction.static_n),
+    told_by(JointParam::FrictionViscous, &["friction.viscous"], |a| a.cylinder.friction.viscous_n_s_m),
+    told_by(JointParam::LineDelay, &["line.delay"], |a| a.cylinder.line_delay_s * 1e6),
+    told_by(JointParam::RestBand, &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"],
+        |a| (STEPS_AT_REST * lsb_m(a) * 1e3).max(LEAST_BAND_MM)),
+];
+
+/// A band of rest is never told smaller \[mm\]: that of the parameter.
+const LEAST_BAND_MM: f64 = limits(JointParam::RestBand)[0];
+
+const fn told_by(
+    parameter: JointParam,
+    fields: &'static [&'static str],
+    value: fn(&AxisParams) -> f64,
+) -> Told {
+    Told {
+        parameter,
+        fields,
+        value,
+    }
+}
+
+/// The longer time of fill and vent valve \[µs\]: a board knows one of both.
+fn longer(axis: &AxisParams, time_s: fn(&wheeleg_plant::valve::ValveParams) -> f64) -> f64 {
+    let c = &axis.cylinder;
+    time_s(&c.fill_valve).max(time_s(&c.vent_valve)) * 1e6
+}
+
+/// An open valve with its line.
+fn path(axis: &AxisParams) -> Iso6358 {
+    let c = &axis.cylinder;
+    match &c.line_flow {
+        Some(line) => c.fill_valve.flow.in_series(line),
+        None => c.fill_valve.flow,
+    }
+}
+
+/// Step of the converter \[m\].
+fn lsb_m(axis: &AxisParams) -> f64 {
+    axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits)
+}
+
+fn scale(row: &ParamInfo) -> f64 {
+    f64::from(row.format.fraction_bits()).exp2()
+}
+
+/// Limits of a board's parameter, in its unit, as its table says them: with at most three decimals.
+#[must_use]
+pub const fn limits(parameter: JointParam) -> [f64; 2] {
+    let row = parameter.info();
+    let bits = row.format.fraction_bits();
+    [thousandths(row.min, bits), thousandths(row.max, bits)]
+}
+
+/// A raw number with so many fractional bits, to the nearest thousandth.
+const fn thousandths(raw: i32, bits: u32) -> f64 {
+    let half = if raw < 0 { -0.5 } else { 0.5 };
+    let thousandths = raw as f64 / (1_u64 << bits) as f64 * 1000.0 + half;
+    thousandths as i64 as f64 / 1000.0
+}
+
+/// The same in SI, where one unit of the parameter is `si`.
+pub(crate) const fn limits_si(parameter: JointParam, si: f64) -> [f64; 2] {
+    let [low, high] = limits(parameter);
+    [low * si, high * si]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three decimals are all that the limits of these rows have.
+    #[test]
+    fn limits_are_those_of_the_table_to_the_raw_number() {
+        for told in TOLD {
+            let row = told.parameter.info();
+            let raw = limits(told.parameter).map(|limit| (limit * scale(row)).round());
+            assert_eq!(
+                raw,
+                [f64::from(row.min), f64::from(row.max)],
+                "{}",
+                row.name
+            );
+        }
+        assert_eq!(limits(JointParam::MovingMass), [0.02, 200.0]);
+        assert_eq!(limits(JointParam::SensorMin)[0], -50.0);
+        let [low, high] = limits_si(JointParam::ValveOn, 1e-6);
+        assert!(low == 0.0 && (high - 0.05).abs() < 1e-9);
+    }
+}
