@@ -403,7 +403,7 @@ def parameters(page):
     panel.get_by_label("Board", exact=True).select_option("3")
     panel.get_by_label("Parameters whose name has").fill("error_scale")
     value = panel.get_by_label("error_scale, value", exact=True)
-    row = panel.locator("tr", has=value)
+    row = panel.locator("tr", has=page.get_by_label("error_scale, value", exact=True))
     value.wait_for(timeout=5000)
     expect(float(value.input_value()) == 21 and "board" in row.inner_text(), f"the panel: {row.inner_text()!r}, {value.input_value()}")
     expect(panel.locator("tbody tr:visible").count() < 4, "the panel shows what was not asked for")

@@ -76,12 +76,28 @@ pub(crate) fn lines() -> StepResult<String> {
     last_line(&mut console("tests/python/check_console_lines.py")?)
 }
 
+/// The memory of a page that is open for a day's work.
+pub(crate) fn page_hours() -> StepResult<String> {
+    last_line(&mut console("tests/python/check_page_hours.py")?)
+}
+
 /// A robot driven by a program of its own, with the client that we give away.
 pub(crate) fn client(report: &mut Report) {
     report.step("console from Python", || {
         rust::build(&["--bin", "wheeleg"])?;
         run(command(tools::python()?)
             .arg("tests/python/check_client.py")
+            .arg(target_dir().join("release").join("wheeleg")))?;
+        Ok(())
+    });
+}
+
+/// The HTTP API by its own document, asked at random.
+pub(crate) fn api(report: &mut Report) {
+    report.step("console's HTTP API by its document", || {
+        rust::build(&["--bin", "wheeleg"])?;
+        run(command(tools::python()?)
+            .arg("tests/python/check_api.py")
             .arg(target_dir().join("release").join("wheeleg")))?;
         Ok(())
     });

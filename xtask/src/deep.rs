@@ -14,7 +14,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 21] = [
+const CHECKS: [Check; 23] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -117,6 +117,18 @@ const CHECKS: [Check; 21] = [
         "the console's page whose line, server or view is gone, while nobody else is at work",
         5,
         browser::lines,
+    ),
+    Check(
+        "live-hour",
+        "a simulated hour of a live robot that is recorded and looked at, in bounded memory",
+        5,
+        live_hour,
+    ),
+    Check(
+        "page-hours",
+        "the console's page with what a robot tells in eight hours, in bounded memory",
+        10,
+        browser::page_hours,
     ),
     Check(
         "port",
@@ -326,6 +338,12 @@ fn long_run() -> StepResult<String> {
         ("WHEELEG_LONG_RUN_S", 7_200),
         " s simulated in ",
     )
+}
+
+fn live_hour() -> StepResult<String> {
+    let test = "hours::memory_does_not_grow_while_a_robot_lives_is_recorded_and_is_looked_at";
+    let amount = ("WHEELEG_CONSOLE_S", 3_600);
+    measured(["suite", test], amount, " s lived in ")
 }
 
 fn practice() -> StepResult<String> {

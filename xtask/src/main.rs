@@ -168,6 +168,7 @@ fn test(report: &mut Report) {
     mcap::steps(report, run.as_deref());
     browser::steps(report, run.as_deref());
     browser::client(report);
+    browser::api(report);
     browser::viewer(report);
     rigid_body::steps(report);
     plant::steps(report);

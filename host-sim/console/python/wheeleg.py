@@ -24,6 +24,7 @@ import struct
 import threading
 import urllib.request
 
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 SUBPROTOCOL = "wheeleg.console.v1"
@@ -173,7 +174,10 @@ class Robot:
         with self._changed:
             self._n += 1
             text = json.dumps({"n": self._n, **frame}).encode()
-            self._socket.send(_mac(self._session_key, _prefixed("f1", text))[:16] + text)
+            try:
+                self._socket.send(_mac(self._session_key, _prefixed("f1", text))[:16] + text)
+            except ConnectionClosed as error:
+                raise Lost(str(error)) from error
             return self._n
 
     def _answered(self, frame, seconds):

@@ -4,6 +4,8 @@
 const SUBPROTOCOL = "wheeleg.console.v1";
 /** A command is about what its sender saw at most this long before, ms. */
 const VALID_MS = 800;
+/** After an answer that took longer the next question follows at once, ms. */
+const ECHO_SLOW_MS = 100;
 
 const text = new TextEncoder();
 const bytes = (hexadecimal) => Uint8Array.from(hexadecimal.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
@@ -180,11 +182,15 @@ export class Link {
     await this.answered({ op: "unsubscribe", channels: [] });
     this.delay_ms = performance.now() - asked_ms;
     this.asked_ms = null;
+    // A line that was slow just now may be quick again; it is not believed to be before it has shown it.
+    if (this.delay_ms > ECHO_SLOW_MS && this.socket.readyState === WebSocket.OPEN) this.echo();
   }
 
-  /** How long an answer has been waited for, ms: all that has come until now was sent before. */
-  unanswered_ms() {
-    return this.asked_ms === null ? 0 : performance.now() - this.asked_ms;
+  /** How late what comes may be, ms: all that has come until now was sent before the answer that is waited for, and the
+   * line is as slow as the last answer has shown. */
+  late_ms() {
+    const waited = this.asked_ms === null ? 0 : performance.now() - this.asked_ms;
+    return Math.max(waited, this.delay_ms || 0);
   }
 
   beat() {

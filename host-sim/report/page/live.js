@@ -354,9 +354,8 @@ function showState(state) {
 function paint() {
   requestAnimationFrame(paint);
   if (!views) return;
-  // What comes over a line that is slow was said before the answer that is still waited for.
   const silent = performance.now() - now.heard_ms;
-  const age = Math.max(silent, link?.unanswered_ms() ?? 0);
+  const age = Math.max(silent, link?.late_ms() ?? 0);
   const stale = lost !== "" || age > STALE_MS;
   document.body.dataset.state = stale ? "stale" : "live";
   banner.hidden = !stale;

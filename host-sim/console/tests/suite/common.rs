@@ -35,6 +35,12 @@ impl TestRig {
         Self::with(Some(speed), true)
     }
 
+    /// The same, as fast as it goes.
+    #[cfg(target_os = "linux")]
+    pub(crate) fn unpaced_and_recorded() -> Self {
+        Self::with(None, true)
+    }
+
     fn with(speed: Option<f64>, record: bool) -> Self {
         let live = Live {
             speed,

@@ -50,7 +50,7 @@ impl Driven {
         let request = Request {
             client,
             id: self.requests,
-            deadline_us: u64::MAX,
+            deadline_us: self.session.now_ns() / 1_000 + 500_000,
             command,
         };
         let answer = self.session.request(request, &mut self.recorder);
@@ -162,7 +162,10 @@ fn a_stop_is_in_sync_within_11_ms_and_holds_within_13_wherever_the_cycle_is() {
         driven.pass(place_ms);
         let taken_ns = driven.session.now_ns();
         driven.ask(STOP_CLIENT, Command::EmergencyStop);
-        let sync_ns = driven.sync_ns(|s| s.record().is_some_and(|record| record.emergency_stop));
+        // The record that has it first is that of the cycle in which the stop came, made as the next one
+        // begins: that one's SYNC has the bit.
+        let before_ns = driven.sync_ns(|s| s.record().is_some_and(|record| record.emergency_stop));
+        let sync_ns = before_ns + CYCLE_MS * MS;
         driven.pass(20);
         let recording = driven.finish();
         let hold = NodeMode::Hold.code();

@@ -6,6 +6,8 @@ mod common;
 mod control;
 mod foxglove;
 mod hostile;
+#[cfg(target_os = "linux")]
+mod hours;
 mod latency;
 mod looking;
 #[cfg(unix)]
