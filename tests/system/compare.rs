@@ -512,7 +512,7 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
         .stderr(
             contains("mine.toml")
                 .and(contains("`moving.load`"))
-                .and(contains("130.0 N"))
+                .and(contains("130 N"))
                 .and(contains("114.7 N"))
                 .and(contains("1.25")),
         );

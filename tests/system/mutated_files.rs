@@ -101,7 +101,7 @@ const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n
 
 /// Says what a user is told, and that it is told in words: the file, the field or section, what about
 /// it, and no value as a program prints it for itself.
-fn messages(error: &dyn Diagnostic) -> String {
+fn messages(error: &dyn Diagnostic, file: &str) -> String {
     let mut text = error.to_string();
     let mut remedy = error.help().is_some() || error.related().is_some();
     for problem in error.related().into_iter().flatten() {
@@ -122,7 +122,7 @@ fn messages(error: &dyn Diagnostic) -> String {
     assert!(error.code().is_some(), "no code: {text}");
     assert!(remedy, "no remedy: {text}");
     assert!(text.len() < 20_000, "too long: {} bytes", text.len());
-    ensure_words(&text);
+    ensure_words(&text, file);
     text
 }
 
@@ -203,7 +203,7 @@ fn options(scenario: &Path, robot: Option<&Path>, out: &Path) -> Options {
 }
 
 /// Runs and judges; its log must have numbers of this world.
-fn played(options: &Options, stop: &Stop) -> Result<Fate, StudyError> {
+fn played(options: &Options, text: &str, stop: &Stop) -> Result<Fate, StudyError> {
     let finished = run(options, stop)?;
     let out = finished.report.parent().expect("a folder");
     assert!(out.join("summary.json").exists(), "no summary");
@@ -222,34 +222,38 @@ fn played(options: &Options, stop: &Stop) -> Result<Fate, StudyError> {
     assert!(worst[0] < 100.1, "{} bar, and nobody said so", worst[0]);
     assert!(worst[1] < 1e5, "{} mm/s, and nobody said so", worst[1]);
     Ok(match finished.result.failure {
-        Some(failure) => Fate::Ended(messages(&failure)),
+        Some(failure) => Fate::Ended(messages(&failure, text)),
         None => Fate::Ran,
     })
 }
 
-fn refused(error: &dyn Diagnostic) -> Fate {
-    Fate::Refused(messages(error))
+fn refused(error: &dyn Diagnostic, text: &str) -> Fate {
+    Fate::Refused(messages(error, text))
 }
 
 /// What the program makes of a file of a kind.
 fn fate(kind: Kind, file: &Path, stop: &Stop) -> Fate {
     let folder = file.parent().expect("a folder");
     let out = folder.join("out");
+    let text = &std::fs::read_to_string(file).unwrap_or_default();
     match kind {
-        Kind::Scenario => played(&options(file, None, &out), stop).unwrap_or_else(|e| refused(&e)),
+        Kind::Scenario => {
+            played(&options(file, None, &out), text, stop).unwrap_or_else(|e| refused(&e, text))
+        }
         Kind::Robot => {
             let stand = folder.join("stand.toml");
-            played(&options(&stand, Some(file), &out), stop).unwrap_or_else(|e| refused(&e))
+            played(&options(&stand, Some(file), &out), text, stop)
+                .unwrap_or_else(|e| refused(&e, text))
         }
-        Kind::Axis => axis_fate(file),
-        Kind::Plan => plan_fate(file, stop).unwrap_or_else(|e| refused(&e)),
+        Kind::Axis => axis_fate(file, text),
+        Kind::Plan => plan_fate(file, text, stop).unwrap_or_else(|e| refused(&e, text)),
     }
 }
 
-fn axis_fate(file: &Path) -> Fate {
+fn axis_fate(file: &Path, text: &str) -> Fate {
     let config = match AxisConfig::from_path(file) {
         Ok(config) => config,
-        Err(error) => return refused(&error),
+        Err(error) => return refused(&error, text),
     };
     match plant_check::check(&config.axis) {
         Ok(check) => {
@@ -258,7 +262,7 @@ fn axis_fate(file: &Path) -> Fate {
         }
         // The command's own words are tested with it.
         Err(error) => {
-            ensure_words(&error.to_string());
+            ensure_words(&error.to_string(), text);
             return Fate::Ended(error.to_string());
         }
     }
@@ -266,11 +270,15 @@ fn axis_fate(file: &Path) -> Fate {
     let id = id.parse().expect("a case");
     match compare::play(&id, &[file.to_string_lossy().into_owned()]) {
         Ok(_) => Fate::Ran,
-        Err(error) => refused(&error),
+        Err(error) => refused(&error, text),
     }
 }
 
-fn plan_fate(file: &Path, stop: &Stop) -> Result<Fate, wheeleg_campaign::CampaignError> {
+fn plan_fate(
+    file: &Path,
+    text: &str,
+    stop: &Stop,
+) -> Result<Fate, wheeleg_campaign::CampaignError> {
     let plan = Plan::load(&file.to_string_lossy())?;
     let cases = Cases::new(&plan)?;
     cases.ensure_possible()?;
@@ -279,7 +287,7 @@ fn plan_fate(file: &Path, stop: &Stop) -> Result<Fate, wheeleg_campaign::Campaig
         if let Some(error) = wheeleg_campaign::simulate(&cases.case(index), limit_s, stop)
             .and_then(|outcome| outcome.error)
         {
-            ensure_words(&error);
+            ensure_words(&error, text);
         }
     }
     Ok(Fate::Ran)

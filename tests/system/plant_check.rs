@@ -28,7 +28,13 @@ fn text(seed: u64) -> String {
     // The port is larger than the valve, the end stop holds the force within 0.1 to 0.3 mm.
     let end_stop_n_mm = (force_n / log(0.1, 0.3)).clamp(20.0, 9000.0);
     let dead_cm3 = log(0.15, 0.4) * piston_cm2;
+    // Every ratio that a file may say, evenly: those of two valves and a tube are independent.
+    let mut ratio = || 0.9 * (log(1.0, std::f64::consts::E)).ln();
+    let ratios = [ratio(), ratio(), ratio()];
     let changes = [
+        ("fill_valve.critical_ratio", ratios[0], "1"),
+        ("vent_valve.critical_ratio", ratios[1], "1"),
+        ("line.critical_ratio", ratios[2], "1"),
         ("fill_valve.conductance", conductance, "dm3/(s bar)"),
         (
             "vent_valve.conductance",
@@ -39,7 +45,6 @@ fn text(seed: u64) -> String {
         ("fill_valve.t_off", log(1.0, 25.0), "ms"),
         ("vent_valve.t_on", log(1.0, 25.0), "ms"),
         ("vent_valve.t_off", log(1.0, 25.0), "ms"),
-        ("fill_valve.critical_ratio", log(0.15, 0.45), "1"),
         ("line.volume", dead_cm3 * log(0.5, 2.0), "cm3"),
         ("line.delay", log(0.2, 3.0), "ms"),
         (

@@ -419,3 +419,41 @@ fn a_table_takes_no_place_of_a_file_or_a_pipe_unseen() {
         .filter(hidden);
     assert_eq!(left.count(), 0);
 }
+
+/// The record of what was tried names tests and files that there are.
+#[test]
+fn the_record_names_tests_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let record = root.join("docs/records/practice-inputs.md");
+    let record = std::fs::read_to_string(record).expect("the record");
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./:…".contains(c);
+    let quoted = record
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .filter(|word| word.chars().all(plain));
+    let mut seen = 0;
+    for word in quoted {
+        if word.ends_with(".rs") {
+            let places = ["tests/system", "tests", "host-sim", "host-sim/wheeleg/src"];
+            let there = places
+                .iter()
+                .any(|place| root.join(place).join(word).exists());
+            assert!(there, "there is no file {word}");
+        } else if let Some((module, name)) = word.split_once("::") {
+            let file = root.join("tests/system").join(format!("{module}.rs"));
+            let text = std::fs::read_to_string(file);
+            let text = text.unwrap_or_else(|_| panic!("there is no module of {word}"));
+            let (begin, end) = match name.strip_suffix('…') {
+                Some(begin) => (begin, ""),
+                None => (name, "("),
+            };
+            let there = text.contains(&format!("fn {begin}{end}"));
+            assert!(there, "there is no test {word}");
+        } else {
+            continue;
+        }
+        seen += 1;
+    }
+    assert!(seen > 30, "{seen}");
+}

@@ -1,11 +1,12 @@
 //! Robots and scenarios that are part of the program, and files beside it.
 
+use std::borrow::Cow;
 use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
-use super::error::{ConfigError, Problem};
+use super::error::{ConfigError, Problem, word};
 use super::terrain::Files;
 use super::{RobotConfig, Scenario, closest};
 
@@ -199,6 +200,17 @@ pub fn text_of(path: &Path) -> std::io::Result<String> {
     read.map(|_| text)
 }
 
+/// Longest path that is quoted whole, bytes: no file system has a longer one.
+const LONGEST_PATH: usize = 4096;
+
+/// A path for a message; one that no file can have is not told whole.
+fn file(path: &str) -> Cow<'_, str> {
+    match path.len() {
+        0..=LONGEST_PATH => path.into(),
+        _ => word(path),
+    }
+}
+
 /// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
 /// holds a path separator is a path.
 pub(super) fn find(
@@ -221,8 +233,12 @@ pub(super) fn find(
                 };
                 let message = format!("cannot read the {kind} file: {why}");
                 ConfigError::new(
-                    format!("the {kind} file {name_or_path} is not usable"),
-                    vec![Problem::whole(name_or_path, message, Some(help.to_owned()))],
+                    format!("the {kind} file {} is not usable", file(name_or_path)),
+                    vec![Problem::whole(
+                        &file(name_or_path),
+                        message,
+                        Some(help.to_owned()),
+                    )],
                 )
             });
     }
@@ -236,9 +252,9 @@ pub(super) fn find(
         None => list,
     };
     Err(ConfigError::new(
-        format!("unknown {kind} `{name_or_path}`"),
+        format!("unknown {kind} `{}`", word(name_or_path)),
         vec![Problem::whole(
-            name_or_path,
+            &word(name_or_path),
             format!("no built-in {kind} has this name"),
             Some(help),
         )],

@@ -53,6 +53,18 @@ fn shown(text: &str) -> String {
     out
 }
 
+/// Longest word of a command line that is quoted, characters.
+const LONGEST_WORD: usize = 80;
+
+/// A word of a command line, for a message: of one that is longer than any name the beginning.
+#[must_use]
+pub fn word(text: &str) -> std::borrow::Cow<'_, str> {
+    match text.char_indices().nth(LONGEST_WORD) {
+        Some((end, _)) => format!("{}…", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 /// A message without the middle that is too much.
 fn shortened(message: String) -> String {
     let message = shown(&message);

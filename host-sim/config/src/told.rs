@@ -126,10 +126,11 @@ const fn thousandths(raw: i32, bits: u32) -> f64 {
     thousandths as i64 as f64 / 1000.0
 }
 
-/// The same in SI, where one unit of the parameter is `si`.
-pub(crate) const fn limits_si(parameter: JointParam, si: f64) -> [f64; 2] {
+/// The same in SI, of which so many units of the parameter make one: a division of these is exact
+/// to the last digit.
+pub(crate) const fn limits_si(parameter: JointParam, per_si: f64) -> [f64; 2] {
     let [low, high] = limits(parameter);
-    [low * si, high * si]
+    [low / per_si, high / per_si]
 }
 
 #[cfg(test)]
@@ -151,7 +152,6 @@ mod tests {
         }
         assert_eq!(limits(JointParam::MovingMass), [0.02, 200.0]);
         assert_eq!(limits(JointParam::SensorMin)[0], -50.0);
-        let [low, high] = limits_si(JointParam::ValveOn, 1e-6);
-        assert!(low == 0.0 && (high - 0.05).abs() < 1e-9);
+        assert_eq!(limits_si(JointParam::ValveOn, 1e6), [0.0, 0.05]);
     }
 }

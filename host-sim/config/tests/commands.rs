@@ -422,6 +422,18 @@ fn an_event_at_the_end_and_a_decimal_comma_are_refused() {
             &["my.toml:6:", &comma, &format!("write \"{point}\"")],
         );
     }
+    for (odd, help) in [
+        ("200 µs", "\"us\" for \"µs\""),
+        ("200 μs", "\"us\" for \"μs\""),
+        ("2 с", "plain letters"),
+        ("1_000 ms", "written as 1000"),
+        ("0x10 s", "written as 16"),
+        ("2,5,1 s", "decimal point"),
+        ("２ s", "does not begin with a number"),
+    ] {
+        let text = told(odd, "1 s").expect_err("odd");
+        assert_all(&text, &["my.toml:6:", "`duration`", "\"s\", \"ms\"", help]);
+    }
     let text = told("2 S", "1 s").expect_err("another case");
     assert_all(&text, &["my.toml:6:", "`duration`", "did you mean \"s\""]);
     let digits = "9".repeat(300);

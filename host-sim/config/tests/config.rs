@@ -710,3 +710,28 @@ fn what_is_no_text_is_told() {
         assert_all(&said, &[path, told]);
     }
 }
+
+/// What a seed is not, and a name that stands twice.
+#[test]
+fn odd_seeds_and_doubled_names_are_told_with_what_would_do() {
+    let told = |seed: &str| {
+        let text = format!(
+            "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+             targets = \"none\"\nseed = {seed}\n[motion]\nkind = \"stand\"\n"
+        );
+        report(&wheeleg_config::Scenario::parse("my.toml", &text).expect_err(seed))
+    };
+    const RANGE: &str = "0 to 18446744073709551615";
+    for (seed, help) in [
+        ("-1", "no sign and no point"),
+        ("1.0", "no sign and no point"),
+        ("\"many\"", "write it in quotes"),
+    ] {
+        assert_all(&told(seed), &["my.toml:6:", "`seed`", seed, RANGE, help]);
+    }
+    assert_all(
+        &told("1\nseed = 2"),
+        &["my.toml:7:", "duplicate key", "stands once"],
+    );
+    assert_all(&told("0,5"), &["my.toml:6:", "decimal point"]);
+}

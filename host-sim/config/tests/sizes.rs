@@ -77,3 +77,18 @@ fn two_thousand_factors_are_judged_in_a_moment() {
     assert_eq!(error.problems().len(), 2 * COUNT - 1);
     assert!(seconds < 20.0, "{seconds} s");
 }
+
+/// Each case of a campaign reads its robot anew.
+#[test]
+fn a_robot_is_read_in_a_moment() {
+    const ROBOT: &str = include_str!("../../robots/wheeleg.toml");
+    let seconds = |_| {
+        let begun = Instant::now();
+        let robot = wheeleg_config::RobotConfig::parse("my.toml", ROBOT);
+        robot.expect("built in");
+        begun.elapsed().as_secs_f64()
+    };
+    let quickest = (0..40).map(seconds).fold(f64::INFINITY, f64::min);
+    println!("a robot's file in {:.2} ms", quickest * 1e3);
+    assert!(quickest < 0.1, "{quickest} s");
+}

@@ -509,3 +509,41 @@ fn a_map_without_heights_is_refused() {
         ],
     );
 }
+
+/// Very many parts that lie on each other would each be asked at every step.
+#[test]
+fn parts_on_one_place_are_bounded() {
+    let ground = |count: usize, apart_m: f64, kind: &str| {
+        let part = |i: usize| {
+            let from = 1.0 + apart_m * i as f64;
+            match kind {
+                "plane" => "[[terrain]]\nkind = \"plane\"\n".to_owned(),
+                _ => format!(
+                    "[[terrain]]\nkind = \"block\"\nx = {{ value = [{from}, {}], unit = \"m\" }}\n\
+                     y = {{ value = [-0.5, 0.5], unit = \"m\" }}\nheight = \"5 mm\"\n",
+                    from + 1.0
+                ),
+            }
+        };
+        let head = "name = \"heap\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+                    seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n";
+        let text = head.to_owned() + &(0..count).map(part).collect::<String>();
+        wheeleg_config::Scenario::parse("my.toml", &text)
+            .map(drop)
+            .map_err(|error| common::report(&error))
+    };
+    // Beside each other, and in a heap that is still one; with the floor below they are 64.
+    assert_eq!(ground(500, 1.0, "block"), Ok(()));
+    assert_eq!(ground(63, 0.0, "block"), Ok(()));
+    assert_eq!(ground(64, 0.0, "plane"), Ok(()));
+    for (count, apart_m, kind) in [
+        (64, 0.0, "block"),
+        (2000, 1e-3, "block"),
+        (65, 0.0, "plane"),
+    ] {
+        let said = ground(count, apart_m, kind).expect_err("a heap");
+        for part in ["my.toml:", "`terrain[", "x = ", "allowed are 1 to 64"] {
+            assert!(said.contains(part), "`{part}` in: {said}");
+        }
+    }
+}

@@ -7,6 +7,7 @@
 mod ellipsoid;
 mod height_map;
 mod index;
+mod overlap;
 mod plane;
 mod rim;
 mod rocks;
@@ -24,6 +25,7 @@ use crate::soil::Soil;
 pub use ellipsoid::Ellipsoid;
 pub use height_map::{HeightMap, HeightMapError, STEEPEST_DEG};
 pub use index::Index;
+pub use overlap::{Heap, MOST_OVER_A_PLACE, heap};
 pub use plane::Plane;
 pub use rim::{Rim, RimTouch};
 pub use rocks::{MOST_ROCKS, RockError, RockField};

@@ -311,6 +311,14 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
         ),
         (with(7, "0.005,40,0,0,0"), "lab.csv"),
         (
+            with(7, "0.005,179,0,0,0,1000,1,1"),
+            "line 7, column `position_mm`: it jumps from ",
+        ),
+        (
+            with(7, "0.005,40,0,0,0,1000,1,1,5"),
+            "line 7, column `pressure_b_bar`: more values behind it",
+        ),
+        (
             with(
                 1,
                 "time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us,pressure_a_bar,p",
@@ -393,7 +401,8 @@ fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
         let mut text = String::from("time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us\n");
         for k in 0..rows {
             let time_s = k as f64 * 1e-3;
-            let _ = writeln!(text, "{time_s:.3},{},{},0,0,0", 40 + k % 100, k % 1000);
+            let out = 40 + (k % 100).min(100 - k % 100);
+            let _ = writeln!(text, "{time_s:.3},{out},{},0,0,0", k % 1000);
         }
         let read = || {
             let begun = std::time::Instant::now();
@@ -412,7 +421,10 @@ fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
     assert!(large_s < 24.0 * small_s, "{small_s} s, then {large_s} s");
     let (million_s, million) = seconds(1_000_000);
     let said = million.expect_err("17 minutes").to_string();
-    assert!(said.contains("large.csv is longer than 600 s"), "{said}");
+    assert!(
+        said.contains("large.csv, column `time_s`: it is longer than 600 s"),
+        "{said}"
+    );
     assert!(
         million_s < 40.0 * small_s,
         "{small_s} s, then {million_s} s"

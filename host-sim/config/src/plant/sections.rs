@@ -7,14 +7,14 @@ use crate::params::params;
 use crate::told::limits_si;
 
 // What a joint board is told of its axis has the limits of the board's parameters.
-const VALVE_ON: [f64; 2] = limits_si(JointParam::ValveOn, 1e-6);
-const VALVE_OFF: [f64; 2] = limits_si(JointParam::ValveOff, 1e-6);
-const BORE: [f64; 2] = limits_si(JointParam::Bore, 1e-3);
-const ROD: [f64; 2] = limits_si(JointParam::Rod, 1e-3);
+const VALVE_ON: [f64; 2] = limits_si(JointParam::ValveOn, 1e6);
+const VALVE_OFF: [f64; 2] = limits_si(JointParam::ValveOff, 1e6);
+const BORE: [f64; 2] = limits_si(JointParam::Bore, 1e3);
+const ROD: [f64; 2] = limits_si(JointParam::Rod, 1e3);
 /// Stroke of a cylinder.
-pub(crate) const STROKE: [f64; 2] = [0.001, limits_si(JointParam::StrokeMax, 1e-3)[1]];
-const DEAD_VOLUME: [f64; 2] = [1e-8, limits_si(JointParam::DeadVolumeA, 1e-6)[1]];
-const SUPPLY: [f64; 2] = limits_si(JointParam::SupplyPressure, 1e3);
+pub(crate) const STROKE: [f64; 2] = [0.001, limits_si(JointParam::StrokeMax, 1e3)[1]];
+const DEAD_VOLUME: [f64; 2] = [1e-8, limits_si(JointParam::DeadVolumeA, 1e6)[1]];
+const SUPPLY: [f64; 2] = limits_si(JointParam::SupplyPressure, 1e-3);
 const COULOMB: [f64; 2] = limits_si(JointParam::FrictionCoulomb, 1.0);
 const BREAK_AWAY: [f64; 2] = limits_si(JointParam::FrictionBreakaway, 1.0);
 const VISCOUS: [f64; 2] = limits_si(JointParam::FrictionViscous, 1.0);

@@ -72,6 +72,10 @@ impl Reader {
                     Some(number) if is_long_number(number) => {
                         format!("TOML has no number so large; write \"{number}\" in quotes")
                     }
+                    _ if e.message().contains("duplicate key") => {
+                        "a name stands once in its section, and a [section] once in the file"
+                            .to_owned()
+                    }
                     _ if has_decimal_comma(text, span.start) => {
                         "numbers have a decimal point: 0.5, not 0,5".to_owned()
                     }

@@ -181,7 +181,10 @@ impl Reader {
                     allowed.start(),
                     allowed.end()
                 );
-                let help = format!("above {LARGEST_OF_TOML}, write it in quotes");
+                let help = match item.is_integer() || item.is_float() {
+                    true => "a whole number has no sign and no point".to_owned(),
+                    false => format!("above {LARGEST_OF_TOML}, write it in quotes"),
+                };
                 let help = long.then_some(help);
                 self.problem(item.span().or(Some(key_span)), message, "not allowed", help);
                 None

@@ -328,6 +328,18 @@ impl Reader {
         let help = match units.find(|name| name.eq_ignore_ascii_case(unit)) {
             // Of a number such as 0,2,1 the end reads as a unit.
             _ if unit.starts_with(',') => "numbers have a decimal point: 0.2, not 0,2".to_owned(),
+            _ if unit.contains(|c: char| c.is_ascii_digit())
+                && !unit.starts_with(char::is_alphabetic) =>
+            {
+                "numbers are written as 1000, 0.5 or 1e3".to_owned()
+            }
+            _ if unit.starts_with("x") => "numbers are written as 16, 0.5 or 1e3".to_owned(),
+            // Both signs for micro; letters that look like others.
+            _ if unit.starts_with(['µ', 'μ']) => {
+                let plain = unit.replacen(['µ', 'μ'], "u", 1);
+                format!("units have plain letters: \"{plain}\" for \"{unit}\"")
+            }
+            _ if !unit.is_ascii() => "units have plain letters, a to z and A to Z".to_owned(),
             Some(meant) => format!("did you mean \"{meant}\"? {path}: {}", spec.doc),
             None => format!("{path}: {}", spec.doc),
         };

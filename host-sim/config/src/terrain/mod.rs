@@ -11,8 +11,11 @@ mod material;
 mod rocks;
 mod solids;
 
-use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
+use wheeleg_plant::terrain::{
+    Heap, Index, MOST_OVER_A_PLACE, Material, Part, Plane, Shape, Terrain, heap,
+};
 
+use super::quantity::pretty;
 use super::reader::{Entry, Reader};
 use fields::{Fields, angle, length};
 pub use files::Data;
@@ -89,7 +92,10 @@ pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
         .into_iter()
         .partition(|(kind, _)| kind.is_everywhere());
     let mut terrain = Terrain { parts: Vec::new() };
+    // Where the parts of each section begin.
+    let mut begins = Vec::new();
     for (kind, i) in &everywhere {
+        begins.push((terrain.parts.len(), *i));
         let entry = r.entry("terrain", *i);
         let added = part(r, *kind, &entry, (&terrain, files), top);
         terrain.parts.extend(added.unwrap_or_default());
@@ -99,11 +105,49 @@ pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     }
     let below = terrain.clone();
     for (kind, i) in &lying {
+        begins.push((terrain.parts.len(), *i));
         let entry = r.entry("terrain", *i);
         let added = part(r, *kind, &entry, (&below, files), top);
         terrain.parts.extend(added.unwrap_or_default());
     }
+    if let Some(heap) = heap(&terrain.parts, &Index::new(&terrain.parts)) {
+        heaped(r, &heap, &begins);
+    }
     Ground { terrain, parts }
+}
+
+/// Reports parts that lie on each other: with the first that is too much. `begins`: number of the
+/// first part of each section, and of the section.
+fn heaped(r: &mut Reader, heap: &Heap, begins: &[(usize, usize)]) {
+    let section = |part: u32| {
+        let after = begins.partition_point(|(first, _)| *first <= part as usize);
+        begins[after.saturating_sub(1)].1
+    };
+    let mut sections: Vec<usize> = heap.parts.iter().map(|part| section(*part)).collect();
+    sections.sort_unstable();
+    sections.dedup();
+    let (Some(first), Some(last)) = (sections.first(), sections.last()) else {
+        return;
+    };
+    let entry = r.entry("terrain", *last);
+    let fields = match entry.has("x") {
+        true => format!("`{0}.x` and `{0}.y`", entry.path),
+        false => format!("`{}`", entry.path),
+    };
+    let [x_m, y_m] = heap.place_m.map(pretty);
+    r.problem(
+        Some(entry.span.clone()),
+        format!(
+            "{fields}: more than {MOST_OVER_A_PLACE} parts of the ground, from `terrain[{first}]` to \
+             `terrain[{last}]`, lie over one place, at x = {x_m} m, y = {y_m} m: allowed are 1 to \
+             {MOST_OVER_A_PLACE}"
+        ),
+        "on top of the others",
+        Some(
+            "a body touches each part on its own: put them beside each other, or make one of them"
+                .to_owned(),
+        ),
+    );
 }
 
 /// Reads one part; `below` is the ground that it lies on, `files` where its data are.

@@ -1,5 +1,5 @@
 //! Which parts of the terrain may touch a body: a grid of square cells over all parts of limited
-//! size.
+//! size, and a coarser one for those that are much larger than most.
 //!
 //! Each part is in every cell that its box covers. A query looks at the cells below the body and
 //! at the boxes in them, so its cost depends on how many parts are near, not on how many there
@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::Part;
 use super::surface::{Bounds, Surface};
 
-/// Parts that would cover more cells are looked at always.
+/// Parts that would cover more cells belong to the coarser grid.
 const CELLS: u64 = 64;
 
 /// A part in a cell.
@@ -25,8 +25,10 @@ struct Item {
 /// The grid, built once.
 #[derive(Debug, Clone, Default)]
 pub struct Index {
-    /// Parts without limits, and very large ones.
+    /// Parts without limits.
     everywhere: Vec<u32>,
+    /// Those that are too large for the cells of this grid.
+    coarse: Option<Box<Index>>,
     origin_m: [f64; 2],
     cell_m: f64,
     size: [u32; 2],
@@ -44,17 +46,26 @@ impl Index {
     /// Sorts the parts into cells.
     #[must_use]
     pub fn new(parts: &[Part]) -> Self {
-        let mut index = Self {
-            top_m: f64::NEG_INFINITY,
-            ..Self::default()
-        };
+        let mut everywhere = Vec::new();
         let mut limited = Vec::new();
         for (number, part) in (0..).zip(parts) {
             match part.shape.bounds() {
                 Some(bounds) => limited.push((number, bounds)),
-                None => index.everywhere.push(number),
+                None => everywhere.push(number),
             }
         }
+        Self {
+            everywhere,
+            ..Self::of(limited)
+        }
+    }
+
+    /// Sorts parts of limited size into cells.
+    fn of(mut limited: Vec<(u32, Bounds)>) -> Self {
+        let mut index = Self {
+            top_m: f64::NEG_INFINITY,
+            ..Self::default()
+        };
         let Some(middle) = limited.len().checked_sub(1).map(|last| last / 2) else {
             return index;
         };
@@ -64,10 +75,11 @@ impl Index {
         let mut sizes: Vec<f64> = limited.iter().map(|(_, b)| mean(b)).collect();
         sizes.sort_by(f64::total_cmp);
         let typical = sizes[middle];
+        let mut large = Vec::new();
         limited.retain(|(number, bounds)| {
             let small = mean(bounds) < 8.0 * typical;
             if !small {
-                index.everywhere.push(*number);
+                large.push((*number, *bounds));
             }
             small
         });
@@ -85,11 +97,21 @@ impl Index {
         index.cell_m = typical.max((span[0] * span[1] / most).sqrt());
         index.origin_m = low;
         index.size = span.map(|s| (s / index.cell_m) as u32 + 1);
-        index.fill(&limited);
+        index.fill(&limited, &mut large);
+        large.sort_unstable_by_key(|(number, _)| *number);
+        if index.items.is_empty() {
+            // Long and thin, all of them: no grid of squares tells them apart.
+            index.everywhere = large.into_iter().map(|(number, _)| number).collect();
+        } else if !large.is_empty() {
+            let coarse = Self::of(large);
+            index.top_m = index.top_m.max(coarse.top_m);
+            index.coarse = Some(Box::new(coarse));
+        }
         index
     }
 
-    fn fill(&mut self, limited: &[(u32, Bounds)]) {
+    /// Sorts parts into cells; those that cover too many are `large`.
+    fn fill(&mut self, limited: &[(u32, Bounds)], large: &mut Vec<(u32, Bounds)>) {
         let cells = (u64::from(self.size[0]) * u64::from(self.size[1])) as usize;
         let mut counts = vec![0_u32; cells + 1];
         let mut placed = Vec::new();
@@ -100,13 +122,12 @@ impl Index {
             };
             let [wide, high] = [0, 1].map(|i| u64::from(covered[1][i] - covered[0][i]) + 1);
             if wide * high > CELLS {
-                self.everywhere.push(*part);
+                large.push((*part, *bounds));
                 continue;
             }
             self.each(covered, |cell| counts[cell + 1] += 1);
             placed.push((*part, *bounds, covered));
         }
-        self.everywhere.sort_unstable();
         for i in 0..cells {
             counts[i + 1] += counts[i];
         }
@@ -166,6 +187,18 @@ impl Index {
     #[inline]
     pub fn near(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32)) {
         self.everywhere.iter().for_each(|part| f(*part));
+        let mut grid = Some(self);
+        while let Some(index) = grid {
+            index.near_in_grid(centre_m, reach_m, &mut f);
+            grid = index.coarse.as_deref();
+            grid.iter()
+                .flat_map(|g| &g.everywhere)
+                .for_each(|part| f(*part));
+        }
+    }
+
+    #[inline]
+    fn near_in_grid(&self, centre_m: &Vector3<f64>, reach_m: f64, f: &mut impl FnMut(u32)) {
         if self.items.is_empty() {
             return;
         }
@@ -190,6 +223,29 @@ impl Index {
                     }
                 }
             }
+        }
+    }
+
+    /// Gives every part that may be above or below a place, each once.
+    pub fn above(&self, place_m: [f64; 2], mut f: impl FnMut(u32)) {
+        let mut grid = Some(self);
+        while let Some(index) = grid {
+            index.everywhere.iter().for_each(|part| f(*part));
+            if let Some([[x, y], _]) = index.covered(place_m, place_m)
+                && !index.items.is_empty()
+            {
+                let cell = y as usize * index.size[0] as usize + x as usize;
+                let items = index.begins[cell] as usize..index.begins[cell + 1] as usize;
+                let over = |item: &&Item| {
+                    (0..2).all(|i| {
+                        let within = item.bounds.low_m[i]..=item.bounds.high_m[i];
+                        within.contains(&place_m[i])
+                    })
+                };
+                let items = index.items[items].iter().filter(over);
+                items.for_each(|item| f(item.part));
+            }
+            grid = index.coarse.as_deref();
         }
     }
 

@@ -38,6 +38,8 @@ const LATEST_S: f64 = 1e10;
 const PERIOD_MAX_MS: f64 = 100.0;
 /// Fewest rows.
 const ROWS_MIN: usize = 200;
+/// Fastest piston, m/s: a sensor that tells more has lost its track. As a joint board has it at most.
+const FASTEST_M_S: f64 = 20.0;
 /// How far beyond its stroke a position may be, as a share of it: sensors are not set that well.
 const BEYOND: f64 = 0.02;
 
@@ -298,7 +300,11 @@ fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
             Some(missing) => {
                 At { file, line }.wrong(missing, &format!("no value: the row has {of}"), HELP)
             }
-            None => StudyError::refused(format!("{file}, line {line}: the row has {of}"), HELP),
+            None => {
+                let last = columns.last().map_or("time_s", String::as_str);
+                let what = format!("more values behind it: the row has {of}");
+                At { file, line }.wrong(last, &what, HELP)
+            }
         };
     }
     let line = error.position().map_or(1, csv::Position::line);
@@ -463,9 +469,21 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
     }
     if rows.len() as f64 * step > LONGEST_S * 1e3 {
         return Err(StudyError::refused(
-            format!("{file} is longer than {LONGEST_S} s"),
+            format!("{file}, column `time_s`: it is longer than {LONGEST_S} s"),
             "cut it",
         ));
+    }
+    for pair in rows.windows(2) {
+        let [from_mm, to_mm] = [&pair[0], &pair[1]].map(|(_, row)| row.position_m * 1e3);
+        if (to_mm - from_mm).abs() > FASTEST_M_S * step {
+            let what = format!(
+                "it jumps from {} to {} mm within {step} ms; allowed are {FASTEST_M_S} m/s",
+                pretty(from_mm),
+                pretty(to_mm)
+            );
+            let help = "a sensor that has lost its track, or rows that are missing: cut before it";
+            return Err(at(pair[1].0).wrong("position_mm", &what, help));
+        }
     }
     let held = step as usize;
     let each = |value: &dyn Fn(&Row) -> f64| -> Vec<f64> {

@@ -102,28 +102,43 @@ fn refusal(cause: &Cause) -> Option<Cause> {
     }
 }
 
-/// Faults, findings and refusals as the user reads them, with their time. A user who asks for the
-/// same again and again gets one line, at the time of the first refusal.
+/// Faults, findings and refusals that are told one by one.
+const TOLD: usize = 20;
+
+/// Faults, findings and refusals as the user reads them, with their time: the first twenty, and how
+/// many more there are. A user who asks for the same again and again gets one line, at the time of
+/// the first refusal.
 fn messages(recording: &Recording) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // Each refusal with the place of its line, and how often it came.
+    // Each refusal that is told, with the place of its line, and how often it came.
     let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
+    let mut more = 0_u64;
     for event in &recording.events {
         let refusal = refusal(&event.v.cause);
         if refusal.is_none() && event.v.cause.kind() != EventKind::Fault {
             continue;
         }
-        if let Some(refusal) = refusal {
-            if let Some((_, _, count)) = refusals.iter_mut().find(|known| known.0 == refusal) {
-                *count += 1;
-                continue;
-            }
-            refusals.push((refusal, lines.len(), 1));
+        let known = refusals
+            .iter_mut()
+            .find(|known| refusal.as_ref() == Some(&known.0));
+        if let Some((_, _, count)) = known {
+            *count += 1;
+            continue;
         }
+        if lines.len() == TOLD {
+            more += 1;
+            continue;
+        }
+        refusals.extend(refusal.map(|refusal| (refusal, lines.len(), 1)));
         lines.push(format!("{:.3} s: {}", event.t_s(), event.v));
     }
     for (_, place, count) in refusals.into_iter().filter(|(_, _, count)| *count > 1) {
         lines[place].push_str(&format!(" ({count} times)"));
+    }
+    if more > 0 {
+        lines.push(format!(
+            "{more} more of these are in the log and the tables alone"
+        ));
     }
     if recording.events_left_out > 0 {
         lines.push(format!(

@@ -123,7 +123,7 @@ enum Command {
 #[must_use]
 pub(crate) fn main() -> ExitCode {
     let cli = usage::parse::<Cli>(std::env::args_os());
-    let cli = cli.unwrap_or_else(|wrong| wrong.exit());
+    let cli = cli.unwrap_or_else(|wrong| usage::refuse(&wrong));
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),

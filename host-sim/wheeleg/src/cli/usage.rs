@@ -39,6 +39,39 @@ pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C
     })
 }
 
+/// Longest line of a refusal, characters.
+const LINE: usize = 800;
+
+/// Says what is wrong with a command line and ends the program; whatever was given is told no longer
+/// than anybody reads it.
+pub(super) fn refuse(wrong: &clap::Error) -> ! {
+    let whole = wrong.render().to_string();
+    let text = shortened(&whole);
+    if !wrong.use_stderr() || text == whole {
+        wrong.exit();
+    }
+    super::tell(text.trim_end());
+    std::process::exit(wrong.exit_code());
+}
+
+/// The same with long words, and long lines of short ones, cut.
+fn shortened(text: &str) -> String {
+    let line = |line: &str| {
+        let words = line.split_inclusive(char::is_whitespace);
+        let line: String = words
+            .map(|w| wheeleg_config::word(w).into_owned())
+            .collect();
+        let count = line.chars().count();
+        if count <= LINE {
+            return line;
+        }
+        let begin = line.chars().take(LINE / 2);
+        let end = line.chars().skip(count - LINE / 2);
+        begin.chain(" … ".chars()).chain(end).collect()
+    };
+    text.split_inclusive('\n').map(line).collect()
+}
+
 /// Adds the commands that have an option, as one writes them.
 fn find(command: &Command, option: &str, having: &mut Vec<String>) {
     let name = |arg: &clap::Arg| arg.get_long().map(|long| format!("--{long}"));
@@ -93,6 +126,28 @@ mod tests {
         assert!(near.contains("similar argument exists: '--seed'"), "{near}");
         let command = said(&["wheeleg", "lst"]);
         assert!(command.contains("'list'"), "{command}");
+    }
+
+    #[test]
+    fn what_was_given_is_told_no_longer_than_anybody_reads_it() {
+        let (word, words) = ("x".repeat(100_000), "x ".repeat(50_000));
+        for long in [&word, &words] {
+            for line in [
+                &["wheeleg", "run", "stand", "--law", long][..],
+                &["wheeleg", "compare", "--case", long],
+                &["wheeleg", "compare", "--case", &format!("a/b/c/d/{long}")],
+                &["wheeleg", "run", "stand", "--seed", long],
+                &["wheeleg", "run", "stand", "--faults", long],
+                &["wheeleg", long],
+                &["wheeleg", "run", "stand", &format!("--{long}")],
+            ] {
+                let (whole, text) = (said(line), shortened(&said(line)));
+                assert!(whole.len() > 50_000 && text.len() < 4000, "{}", text.len());
+                assert!(text.contains("xx") || text.contains("x x"), "{text}");
+            }
+        }
+        let short = said(&["wheeleg", "run", "stand", "--law", "pdi"]);
+        assert_eq!(shortened(&short), short);
     }
 
     #[test]
