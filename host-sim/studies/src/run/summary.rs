@@ -275,4 +275,36 @@ mod tests {
             assert!(line.starts_with(begin) && line.ends_with(end), "{line}");
         }
     }
+
+    /// However many there are, the first twenty are told, and how many more; a refusal that is told
+    /// is counted to the end.
+    #[test]
+    fn of_very_many_faults_twenty_are_told_and_their_number() {
+        let fault = || Cause::Board {
+            board: Address::joint(1).expect("a joint"),
+            change: BoardChange::FaultLatched(Fault::EmergencyStop),
+        };
+        let moving = || Cause::Command {
+            code: CommandCode::JointReference,
+            answer: Answer::Rejected(Reject::Refused(Refusal::Moving)),
+        };
+        let mut recording = Recording::default();
+        for ms in 0..40_000 {
+            let cause = if ms % 2 == 0 { moving() } else { fault() };
+            recording.events.push(Row {
+                t_ns: ms * 1_000_000,
+                v: cause.into(),
+            });
+        }
+        let begun = std::time::Instant::now();
+        let found = messages(&recording);
+        assert!(begun.elapsed().as_secs_f64() < 5.0);
+        assert_eq!(found.len(), 21, "{found:?}");
+        assert!(found[0].ends_with("(20000 times)"), "{}", found[0]);
+        assert!(
+            found[20].starts_with("19981 more of these"),
+            "{}",
+            found[20]
+        );
+    }
 }
