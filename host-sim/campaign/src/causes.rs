@@ -40,12 +40,15 @@ pub struct Causes {
     others: u64,
 }
 
+/// A target with its values and verdicts.
+type Judged<'a> = (&'a str, &'a [Option<f64>], &'a [Option<bool>]);
+
 /// The columns of a table that say why a case failed.
 pub(crate) struct Seen<'a> {
     passed: &'a [Option<bool>],
     statuses: &'a [Option<String>],
     errors: &'a [Option<String>],
-    targets: Vec<(&'a str, &'a [Option<f64>], &'a [Option<bool>])>,
+    targets: Vec<Judged<'a>>,
 }
 
 impl Causes {

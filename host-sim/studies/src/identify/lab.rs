@@ -12,22 +12,6 @@ use wheeleg_plant::axis::{AxisParams, TICK_US};
 use super::map::Mapped;
 use crate::StudyError;
 
-/// Names of all columns.
-pub(super) const NAMES: [&str; 13] = [
-    "time_s",
-    "position_mm",
-    "fill_a",
-    "vent_a",
-    "fill_b",
-    "vent_b",
-    "fill_a_us",
-    "vent_a_us",
-    "fill_b_us",
-    "vent_b_us",
-    "pressure_a_bar",
-    "pressure_b_bar",
-    "load_n",
-];
 const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
 const PRESSURES: [&str; 2] = ["pressure_a_bar", "pressure_b_bar"];
 /// Longest measurement, s.

@@ -2,7 +2,22 @@
 
 use std::str::FromStr;
 
-use super::lab::NAMES;
+/// Names of all columns.
+const NAMES: [&str; 13] = [
+    "time_s",
+    "position_mm",
+    "fill_a",
+    "vent_a",
+    "fill_b",
+    "vent_b",
+    "fill_a_us",
+    "vent_a_us",
+    "fill_b_us",
+    "vent_b_us",
+    "pressure_a_bar",
+    "pressure_b_bar",
+    "load_n",
+];
 
 /// One column: `NAME=COLUMN`, and if its unit is another one `NAME=COLUMN*FACTOR+OFFSET`.
 ///
