@@ -10,7 +10,7 @@ const number = (value) => String(value).replace("-", "−");
  *  @param {() => Promise<any>} look what the server knows of the parameters */
 export function parametersView(command, look) {
   const which = html("select", { "aria-label": "Board", onchange: build }, [1, 2, 3, 4, 5, 6, 7, 8].map((n) => html("option", { value: n }, `Board ${n}`)));
-  const sieve = html("input", { type: "search", "aria-label": "Parameters whose name has", placeholder: "name", size: 12, oninput: filter });
+  const sieve = html("input", { type: "search", "aria-label": "Parameters whose name has", placeholder: "name", size: 8, oninput: filter });
   const read = html("button", { class: "btn", type: "button", onclick: readShown }, "Read");
   const save = html("button", { class: "btn", type: "button", onclick: () => command("SaveParameters", { board: board() }) }, "Save on the board");
   const body = html("tbody");
@@ -73,7 +73,7 @@ export function parametersView(command, look) {
     await refresh();
   }
 
-  const panel = html("details", { ontoggle: () => panel.open && rows.length === 0 && build() }, html("summary", {}, "Table"), html("div", { class: "row" }, which, sieve, read, save), html("div", { class: "scroll tall", tabindex: 0, role: "region", "aria-label": "Table of parameters" }, table));
+  const panel = html("details", { ontoggle: () => panel.open && rows.length === 0 && build() }, html("summary", {}, "Table"), html("div", { class: "row parameterrow" }, which, sieve, read, save), html("div", { class: "scroll tall", tabindex: 0, role: "region", "aria-label": "Table of parameters" }, table));
   return {
     root: html("section", { class: "panel", "aria-label": "Parameters" }, html("h2", {}, "Parameters"), panel),
     /** Whether who looks may write. @param {boolean} may */

@@ -90,9 +90,8 @@ fn read(
             let told: FrameTransforms = of_schema(payload);
             for at in told.transforms {
                 let rotation = at.rotation.expect("a rotation");
-                let norm = [rotation.x, rotation.y, rotation.z, rotation.w]
-                    .iter()
-                    .map(|v| v * v);
+                let parts = [rotation.x, rotation.y, rotation.z, rotation.w];
+                let norm = parts.iter().map(|v| v * v);
                 assert!((norm.sum::<f64>() - 1.0).abs() < 1e-6, "{rotation:?}");
                 frames.insert(at.child_frame_id);
             }
