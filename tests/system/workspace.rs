@@ -170,6 +170,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
     (
         "wheeleg-peers",
         &[
+            "wheeleg-console",
             "wheeleg-control",
             "wheeleg-plant",
             "wheeleg-protocol",

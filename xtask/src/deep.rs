@@ -341,9 +341,9 @@ fn long_run() -> StepResult<String> {
 }
 
 fn live_hour() -> StepResult<String> {
-    let test = "hours::memory_does_not_grow_while_a_robot_lives_is_recorded_and_is_looked_at";
+    let test = "memory_does_not_grow_while_a_robot_lives_is_recorded_and_is_looked_at";
     let amount = ("WHEELEG_CONSOLE_S", 3_600);
-    measured(["suite", test], amount, " s lived in ")
+    measured(["hours", test], amount, " s lived in ")
 }
 
 fn practice() -> StepResult<String> {

@@ -30,15 +30,9 @@ impl TestRig {
         Self::with(speed, false)
     }
 
-    /// A robot that is recorded from power-up on.
-    pub(crate) fn recorded(speed: f64) -> Self {
-        Self::with(Some(speed), true)
-    }
-
-    /// The same, as fast as it goes.
-    #[cfg(target_os = "linux")]
-    pub(crate) fn unpaced_and_recorded() -> Self {
-        Self::with(None, true)
+    /// A robot that is recorded from power-up on; without a speed as fast as it goes.
+    pub(crate) fn recorded(speed: impl Into<Option<f64>>) -> Self {
+        Self::with(speed.into(), true)
     }
 
     fn with(speed: Option<f64>, record: bool) -> Self {

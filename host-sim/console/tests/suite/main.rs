@@ -6,8 +6,6 @@ mod common;
 mod control;
 mod foxglove;
 mod hostile;
-#[cfg(target_os = "linux")]
-mod hours;
 mod latency;
 mod looking;
 #[cfg(unix)]

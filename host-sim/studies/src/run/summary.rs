@@ -11,6 +11,7 @@ use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_master::behaviour::Behaviour;
 use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event as MasterEvent;
+use wheeleg_protocol::Address;
 use wheeleg_remote_host::PilSummary;
 use wheeleg_telemetry::{Cause, EventKind, Recording};
 
@@ -102,8 +103,22 @@ fn refusal(cause: &Cause) -> Option<Cause> {
     }
 }
 
+/// What several boards may tell alike, without the board.
+fn alike(cause: &Cause) -> Option<Cause> {
+    match cause {
+        Cause::Board { change, .. } => Some(Cause::Board {
+            board: Address::MASTER,
+            change: *change,
+        }),
+        Cause::Master(MasterEvent::NodeLost(_)) => Some(Cause::Master(MasterEvent::NodeLost(0))),
+        _ => None,
+    }
+}
+
 /// Faults, findings and refusals that are told one by one.
 const TOLD: usize = 20;
+/// What several boards tell alike within this time is one line \[ns\].
+const ALIKE_NS: u64 = 50_000_000;
 
 /// Faults, findings and refusals as the user reads them, with their time: the first twenty, and how
 /// many more there are. A user who asks for the same again and again gets one line, at the time of
@@ -112,6 +127,8 @@ fn messages(recording: &Recording) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     // Each refusal that is told, with the place of its line, and how often it came.
     let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
+    // What boards told, with its time, the place of its line, and the boards.
+    let mut shared: Vec<(Cause, u64, usize, Vec<Address>)> = Vec::new();
     let mut more = 0_u64;
     for event in &recording.events {
         let refusal = refusal(&event.v.cause);
@@ -125,15 +142,33 @@ fn messages(recording: &Recording) -> Vec<String> {
             *count += 1;
             continue;
         }
+        let (told, board) = (alike(&event.v.cause), event.v.cause.board());
+        let told = told.zip(board);
+        let known = told.as_ref().and_then(|(told, board)| {
+            shared.iter_mut().find(|(cause, since_ns, _, boards)| {
+                cause == told && event.t_ns < since_ns + ALIKE_NS && !boards.contains(board)
+            })
+        });
+        if let (Some((.., boards)), Some(board)) = (known, board) {
+            boards.push(board);
+            continue;
+        }
         if lines.len() == TOLD {
             more += 1;
             continue;
         }
+        shared.extend(told.map(|(told, board)| (told, event.t_ns, lines.len(), vec![board])));
         refusals.extend(refusal.map(|refusal| (refusal, lines.len(), 1)));
         lines.push(format!("{:.3} s: {}", event.t_s(), event.v));
     }
     for (_, place, count) in refusals.into_iter().filter(|(_, _, count)| *count > 1) {
         lines[place].push_str(&format!(" ({count} times)"));
+    }
+    for (.., place, boards) in shared {
+        let others: Vec<String> = boards[1..].iter().map(Address::to_string).collect();
+        if !others.is_empty() {
+            lines[place].push_str(&format!(" Likewise {}.", others.join(", ")));
+        }
     }
     if more > 0 {
         lines.push(format!(
@@ -213,7 +248,7 @@ mod tests {
     use super::*;
     use wheeleg_master::command::CommandCode;
     use wheeleg_master::dispatcher::{Refusal, Reject};
-    use wheeleg_protocol::{Address, Fault};
+    use wheeleg_protocol::Fault;
     use wheeleg_telemetry::Row;
     use wheeleg_telemetry::event::{Answer, BoardChange};
 
@@ -306,5 +341,30 @@ mod tests {
             "{}",
             found[20]
         );
+    }
+
+    /// Boards that tell the same within 50 ms share a line; the same board later has one of its own.
+    #[test]
+    fn boards_that_tell_the_same_at_a_time_share_a_line() {
+        let mut recording = Recording::default();
+        for (ms, joint) in [(10, 1), (10, 2), (30, 4), (40, 1), (70, 2)] {
+            let cause = Cause::Board {
+                board: Address::joint(joint).expect("a joint"),
+                change: BoardChange::FaultLatched(Fault::EmergencyStop),
+            };
+            recording.events.push(Row {
+                t_ns: ms * 1_000_000,
+                v: cause.into(),
+            });
+        }
+        let found = messages(&recording);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].starts_with("0.010 s: joint 1: "), "{found:?}");
+        assert!(
+            found[0].ends_with(" Likewise joint 2, joint 4."),
+            "{found:?}"
+        );
+        assert!(found[1].starts_with("0.040 s: joint 1: "), "{found:?}");
+        assert!(found[1].ends_with(" Likewise joint 2."), "{found:?}");
     }
 }
