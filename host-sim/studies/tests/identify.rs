@@ -204,7 +204,7 @@ fn a_table_of_a_users_own_is_read_by_its_map() {
     let own = "n,t (ms),x [m],V1,V2,pA,pB\n";
     let (mut plain, mut mine) = (sound.to_owned(), own.to_owned());
     for k in 0..300_u32 {
-        let (t_s, at_mm) = (0.005 * f64::from(k), f64::from(150_u32.abs_diff(k)));
+        let (t_s, at_mm) = (0.005 * f64::from(k), f64::from(150 - 150_u32.abs_diff(k)));
         let (a, b) = (u32::from(k % 20 < 10), u32::from(k % 30 < 15));
         let [bar_a, bar_b] = [f64::from(1 + k % 5), f64::from(1 + k % 6)];
         plain += &format!(
