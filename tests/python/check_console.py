@@ -264,13 +264,13 @@ def drives_by_gamepad(page):
 
 
 def board_table(page):
-    page.locator("summary", has_text="Table").click()
+    page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
     row = page.locator(".boardtable tbody tr").nth(2)
     try:
         page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardtable tbody tr')[2].cells[3].textContent)", timeout=15000)
     except Exception:
         problems.append(f"the table of boards has no counts: {row.inner_text()!r}")
-    page.locator("summary", has_text="Table").click()
+    page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
 
 
 def in_space(page, folder):

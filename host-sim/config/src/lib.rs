@@ -51,6 +51,7 @@ pub use gait::GaitParams;
 pub use law::LawChoice;
 pub use node::NodeParams;
 pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
+pub use plant::sections::MASS as MASSES_KG;
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
 pub use relations::{RELATIONS, Relation, SENSOR_TRACK};

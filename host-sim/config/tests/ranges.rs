@@ -6,7 +6,7 @@ mod common;
 use common::{assert_all, report};
 use wheeleg_config::told::{TOLD, limits};
 use wheeleg_config::{
-    AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, pretty,
+    AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, in_unit, pretty,
 };
 use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Address;
@@ -43,9 +43,9 @@ fn file_board_listing_and_refusals_have_the_same_range() {
             let (min, max) = (i64::from(info.min), i64::from(info.max));
 
             let shown = listed.iter().find(|p| p.path == name).expect("listed");
-            for (told, limit) in [(shown.min, min), (shown.max, max)] {
-                assert!((told - value(limit)).abs() < 1e-6, "{name}: {told}");
-            }
+            // The shortest numbers that mean the board's.
+            let limits = [info.min, info.max].map(|raw| in_unit(info, raw));
+            assert_eq!([shown.min, shown.max], limits, "{name}");
 
             for limit in [info.min, info.max] {
                 // At its limit it may contradict another; it is never out of its range.
@@ -71,8 +71,8 @@ fn file_board_listing_and_refusals_have_the_same_range() {
                 let said = read(section, info, value(beyond)).expect_err("beyond its limits");
                 let range = format!(
                     "is out of range: allowed {} to {}",
-                    pretty(value(min)),
-                    pretty(value(max))
+                    pretty(in_unit(info, info.min)),
+                    pretty(in_unit(info, info.max))
                 );
                 assert_all(&said, &["my.toml:", &format!("`{name}` = "), &range]);
                 if let Ok(raw) = i32::try_from(beyond) {

@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use wheeleg_plant::axis::{LOADS_N, MASSES_KG};
+use wheeleg_config::MASSES_KG;
+use wheeleg_plant::axis::LOADS_N;
 use wheeleg_protocol::param::JointParam;
 use wheeleg_studies::axis_sim::{Action, AxisSim as Bench, Node, REFERENCES_M, Row, SPEEDS_M_S};
 

@@ -2,8 +2,9 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use wheeleg_config::MASSES_KG;
 use wheeleg_plant::assembly::CylinderOutputs;
-use wheeleg_plant::axis::{Axis as Plant, AxisState, LOADS_N, MASSES_KG};
+use wheeleg_plant::axis::{Axis as Plant, AxisState, LOADS_N};
 
 use crate::axis::AxisLike;
 use crate::columns::{self, Columns};

@@ -18,8 +18,8 @@ const SUPPLY: [f64; 2] = limits_si(JointParam::SupplyPressure, 1e-3);
 const COULOMB: [f64; 2] = limits_si(JointParam::FrictionCoulomb, 1.0);
 const BREAK_AWAY: [f64; 2] = limits_si(JointParam::FrictionBreakaway, 1.0);
 const VISCOUS: [f64; 2] = limits_si(JointParam::FrictionViscous, 1.0);
-/// Mass that moves with a rod; a board learns the rest.
-pub(crate) const MASS: [f64; 2] = limits_si(JointParam::MovingMass, 1.0);
+/// Mass that moves with a rod \[kg\]; a board learns the rest.
+pub const MASS: [f64; 2] = limits_si(JointParam::MovingMass, 1.0);
 
 params! {
     /// Gas and atmosphere.
