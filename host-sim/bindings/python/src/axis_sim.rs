@@ -162,7 +162,7 @@ impl AxisSim {
         Ok(())
     }
 
-    /// Moving mass, kg, 0.01 to 1000.
+    /// Moving mass, kg, 0.02 to 200.
     #[getter]
     fn mass_kg(&self) -> f64 {
         self.bench.state.core.motion.mass_kg

@@ -133,7 +133,7 @@ impl Cylinder {
         Ok(())
     }
 
-    /// Moving mass, kg, 0.01 to 1000.
+    /// Moving mass, kg, 0.02 to 200.
     #[getter]
     fn mass_kg(&self) -> f64 {
         self.state.core.motion.mass_kg
