@@ -61,13 +61,18 @@ fn console(check: &str) -> StepResult<Command> {
         let install = format!("apt-get install -y {CHROMIUM}");
         return Err(StepError::missing(CHROMIUM, install));
     }
+    let mut python = of_program(check)?;
+    python.arg(target_dir().join("console-shots")).arg(axe()?);
+    Ok(python)
+}
+
+/// A check in Python of the program, which is built for it.
+fn of_program(check: &str) -> StepResult<Command> {
     rust::build(&["--bin", "wheeleg"])?;
     let mut python = command(tools::python()?);
     python
         .arg(check)
-        .arg(target_dir().join("release").join("wheeleg"))
-        .arg(target_dir().join("console-shots"))
-        .arg(axe()?);
+        .arg(target_dir().join("release").join("wheeleg"));
     Ok(python)
 }
 
@@ -84,10 +89,7 @@ pub(crate) fn page_hours() -> StepResult<String> {
 /// A robot driven by a program of its own, with the client that we give away.
 pub(crate) fn client(report: &mut Report) {
     report.step("console from Python", || {
-        rust::build(&["--bin", "wheeleg"])?;
-        run(command(tools::python()?)
-            .arg("tests/python/check_client.py")
-            .arg(target_dir().join("release").join("wheeleg")))?;
+        run(&mut of_program("tests/python/check_client.py")?)?;
         Ok(())
     });
 }
@@ -95,10 +97,7 @@ pub(crate) fn client(report: &mut Report) {
 /// The HTTP API by its own document, asked at random.
 pub(crate) fn api(report: &mut Report) {
     report.step("console's HTTP API by its document", || {
-        rust::build(&["--bin", "wheeleg"])?;
-        run(command(tools::python()?)
-            .arg("tests/python/check_api.py")
-            .arg(target_dir().join("release").join("wheeleg")))?;
+        run(&mut of_program("tests/python/check_api.py")?)?;
         Ok(())
     });
 }
@@ -106,12 +105,7 @@ pub(crate) fn api(report: &mut Report) {
 /// Boards that are a process of their own, led over a pseudo-terminal. On a computer that is busy with something else they
 /// miss cycles, as they should, and nothing is compared.
 pub(crate) fn port() -> StepResult<String> {
-    rust::build(&["--bin", "wheeleg"])?;
-    last_line(
-        command(tools::python()?)
-            .arg("tests/python/check_port.py")
-            .arg(target_dir().join("release").join("wheeleg")),
-    )
+    last_line(&mut of_program("tests/python/check_port.py")?)
 }
 
 /// What a check says of itself at its end.
@@ -123,10 +117,7 @@ fn last_line(check: &mut Command) -> StepResult<String> {
 /// A robot looked at by a client of Foxglove's protocol, from its published text alone.
 pub(crate) fn viewer(report: &mut Report) {
     report.step("console for Foxglove and Lichtblick", || {
-        rust::build(&["--bin", "wheeleg"])?;
-        run(command(tools::python()?)
-            .arg("tests/python/check_foxglove.py")
-            .arg(target_dir().join("release").join("wheeleg")))?;
+        run(&mut of_program("tests/python/check_foxglove.py")?)?;
         Ok(())
     });
 }

@@ -17,10 +17,15 @@ pub fn raw_of(info: &ParamInfo, value: f64) -> i32 {
 /// format counts whole numbers.
 #[must_use]
 pub fn allowed_raw(info: &ParamInfo, value: f64) -> Option<i32> {
-    let raw = (value * scale(info.format)).round();
-    let within = (f64::from(info.min)..=f64::from(info.max)).contains(&raw);
     let whole = scale(info.format) != 1.0 || value.fract() == 0.0;
-    (within && whole).then_some(raw as i32)
+    raw_within(info, value).filter(|_| whole)
+}
+
+/// The raw number nearest to a value, where the limits admit it.
+pub(super) fn raw_within(info: &ParamInfo, value: f64) -> Option<i32> {
+    let raw = (value * scale(info.format)).round();
+    let limits = f64::from(info.min)..=f64::from(info.max);
+    limits.contains(&raw).then_some(raw as i32)
 }
 
 /// A raw number in the parameter's unit: the shortest decimal number that means it.

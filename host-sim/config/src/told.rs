@@ -6,7 +6,9 @@
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::flow::Iso6358;
-use wheeleg_protocol::param::{JointParam, ParamInfo};
+use wheeleg_protocol::param::JointParam;
+
+use super::board_value::raw_within;
 
 /// Steps of the converter that a joint's band of rest has at least: below it, rest is noise.
 pub const STEPS_AT_REST: f64 = 2.5;
@@ -31,9 +33,7 @@ impl Told {
     /// Whether a board can be told so.
     #[must_use]
     pub fn fits(&self, axis: &AxisParams) -> bool {
-        let row = self.parameter.info();
-        let raw = (self.value(axis) * scale(row)).round();
-        (f64::from(row.min)..=f64::from(row.max)).contains(&raw)
+        raw_within(self.parameter.info(), self.value(axis)).is_some()
     }
 }
 
@@ -107,10 +107,6 @@ fn lsb_m(axis: &AxisParams) -> f64 {
     axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits)
 }
 
-fn scale(row: &ParamInfo) -> f64 {
-    f64::from(row.format.fraction_bits()).exp2()
-}
-
 /// Limits of a board's parameter, in its unit, as its table says them: with at most three decimals.
 #[must_use]
 pub const fn limits(parameter: JointParam) -> [f64; 2] {
@@ -136,13 +132,14 @@ pub(crate) const fn limits_si(parameter: JointParam, per_si: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board_value::scale;
 
     /// Three decimals are all that the limits of these rows have.
     #[test]
     fn limits_are_those_of_the_table_to_the_raw_number() {
         for told in TOLD {
             let row = told.parameter.info();
-            let raw = limits(told.parameter).map(|limit| (limit * scale(row)).round());
+            let raw = limits(told.parameter).map(|limit| (limit * scale(row.format)).round());
             assert_eq!(
                 raw,
                 [f64::from(row.min), f64::from(row.max)],

@@ -9,7 +9,8 @@ use crate::row::Status;
 
 /// Cases that are listed.
 const WORST: usize = 20;
-/// A limit of less than this is none to be near to: a share of it tells nothing.
+/// A limit of less than this is none to be near to: a share of it tells nothing. What is missed is a share
+/// of this at least.
 const NOTHING: f64 = 1e-9;
 
 /// A case with what was missed in it, or what was nearest to be.
@@ -32,7 +33,7 @@ pub struct Worst {
 
 /// By how much a value is outside of its limits, as a share of the limit that it missed.
 fn excess(value: f64, column: &Column) -> f64 {
-    let beyond = |limit: f64, by: f64| by.max(0.0) / limit.abs().max(1e-9);
+    let beyond = |limit: f64, by: f64| by.max(0.0) / limit.abs().max(NOTHING);
     let low = column.min.map_or(0.0, |min| beyond(min, min - value));
     let high = column.max.map_or(0.0, |max| beyond(max, value - max));
     low.max(high)
