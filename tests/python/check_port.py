@@ -25,6 +25,8 @@ JOINTS = [f"/joint/{n}" for n in range(1, 7)]
 ATTEMPTS = 3
 # Longest time in which a robot can be armed again.
 READY_S = 60
+# A server that is there within the boards' 50 ms is a master that counts anew, and they tell `StaleMaster` then.
+NOBODY_S = 0.2
 
 
 @contextlib.contextmanager
@@ -148,6 +150,7 @@ def killed_in_mid_walk(program, home, line):
             last_us = robot.state()["master_us"]
             os.kill(pid, signal.SIGKILL)
             robot.until(lambda state: False, 5)
+    time.sleep(NOBODY_S)
     log_of_the_killed(program, recordings / "0001", last_us)
     # Somebody else leads them: they hold, and say why.
     with served(program, home, *ROBOT, "--port", line) as (address, keys, _, _):
