@@ -158,6 +158,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
 /// A version against itself: every combination has its pair, and none turns. Against one that kept what this one misses,
 /// and the other way round, each is counted on its side.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn two_versions_are_compared_case_by_case() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let only = Options {

@@ -122,6 +122,7 @@ fn the_default_law_starts_no_later_than_the_papers_from_a_stop() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn kinds_of_move_are_ordered_as_their_pressures_are() {
     let paper = |start| median_s(Law::Paper, start);
     for (held, rest) in [
@@ -137,6 +138,7 @@ fn kinds_of_move_are_ordered_as_their_pressures_are() {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn taking_a_cause_away_shortens_the_delay_where_physics_demands() {
     let a = &measured().ablation;
     // A millisecond: the tick, and what other noise does to the phase of pulses.

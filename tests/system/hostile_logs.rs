@@ -120,6 +120,7 @@ fn chunk(records: &[u8]) -> Vec<u8> {
 
 /// A small file, and more than a gigabyte of names once it is read.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn a_log_that_swells_when_it_is_read_costs_little_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("log.mcap");

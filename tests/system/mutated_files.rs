@@ -32,6 +32,7 @@ use mutate::mutate;
 const FILES_VARIABLE: &str = "WHEELEG_MUTATED_FILES";
 const FIRST_VARIABLE: &str = "WHEELEG_MUTATED_FIRST";
 const FILES: u64 = 200;
+const FEW_FILES: u64 = 20;
 /// A run that is not over is stopped with Ctrl-C then; a mistake may have made it a long one.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// One that goes on after that hangs. It may share its processor with others.
@@ -391,10 +392,19 @@ fn try_one(files: &[(Kind, String)], number: u64, tally: &Mutex<Tally>) {
 }
 
 #[test]
+fn a_few_are_run_or_refused_in_words() {
+    are_run_or_refused_in_words(1, FEW_FILES);
+}
+
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn each_is_run_or_refused_in_words() {
-    let files = files();
     let first = variable(FIRST_VARIABLE, 1);
-    let count = variable(FILES_VARIABLE, FILES);
+    are_run_or_refused_in_words(first, variable(FILES_VARIABLE, FILES));
+}
+
+fn are_run_or_refused_in_words(first: u64, count: u64) {
+    let files = files();
     let tally = Mutex::new(Tally::default());
     let next = AtomicU64::new(first);
     let processors = thread::available_parallelism().map_or(1, NonZero::get);

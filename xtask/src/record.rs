@@ -21,6 +21,7 @@ pub(crate) fn note(name: &str, result: &Result<String, impl Display>) -> Result<
     let commit = ask(command("git").args(["rev-parse", "--short", "HEAD"]));
     let commit = commit.unwrap_or_else(|| "-".to_owned());
     let first = text.lines().next().unwrap_or_default().replace('|', "/");
+    let first = first.replace(&format!("{}/", root().display()), "");
     let mut file = OpenOptions::new()
         .append(true)
         .open(root().join(RECORD))

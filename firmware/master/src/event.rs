@@ -117,6 +117,8 @@ pub enum Event {
         node: u8,
         /// Its answer.
         record: FaultRecord,
+        /// Time since its first fault, µs, modulo 2^32. A fault may be older than this master.
+        ago_us: u32,
     },
     /// A board has said what it has heard; asked for in turn.
     Link {

@@ -188,7 +188,11 @@ fn master(event: &MasterEvent) -> String {
             Some(node) => format!("{}: {finding}", board(node)),
             None => finding.to_string(),
         },
-        MasterEvent::Diagnosis { node, record } => diagnosis(node, &record),
+        MasterEvent::Diagnosis {
+            node,
+            record,
+            ago_us,
+        } => diagnosis(node, &record, ago_us),
         // Sample by sample in the log.
         MasterEvent::Link { node, record } => {
             format!("{} has heard {} sound frames", board(node), record.frames)
@@ -365,13 +369,11 @@ pub fn hex(id: UniqueId) -> String {
 }
 
 /// Why a board stopped or started, with the remedy of the tables.
-fn diagnosis(node: u8, record: &FaultRecord) -> String {
+fn diagnosis(node: u8, record: &FaultRecord, ago_us: u32) -> String {
     let mut parts = Vec::new();
     if let Some(fault) = record.first_fault.fault() {
-        // Both clocks count microseconds modulo 2^32.
-        let at_us = record.first_time_us.wrapping_add(record.clock_offset_us);
-        let at_s = f64::from(at_us) * 1e-6;
-        parts.push(format!("first fault, {at_s:.3} s after power-up: {fault}"));
+        let ago_s = f64::from(ago_us) * 1e-6;
+        parts.push(format!("first fault, {ago_s:.3} s ago: {fault}"));
     }
     if record.disarm_reason == DisarmReason::Reset || record.reset_cause.is_fault() {
         let cause = record.reset_cause;
@@ -435,18 +437,22 @@ mod tests {
                 active: FaultBits::NONE,
                 sticky: FaultBits::NONE,
                 first_fault,
-                first_time_us: 2_298_000,
+                first_time_us: 0,
                 disarm_reason: DisarmReason::Fault,
                 limits: LimitBits::NONE,
                 reset_cause,
                 clock_offset_us: 0,
             };
-            Cause::Master(MasterEvent::Diagnosis { node: 8, record }).to_string()
+            let diagnosis = MasterEvent::Diagnosis {
+                node: 8,
+                record,
+                ago_us: 2_298_000,
+            };
+            Cause::Master(diagnosis).to_string()
         };
         let fault = Fault::SlotOverrun;
         let text = says(FaultCode::new(fault), ResetCause::PowerUp);
-        let expected =
-            format!("master: wheel 8 says why: first fault, 2.298 s after power-up: {fault}");
+        let expected = format!("master: wheel 8 says why: first fault, 2.298 s ago: {fault}");
         assert_eq!(text, expected);
         for cause in [
             ResetCause::Watchdog,

@@ -51,6 +51,7 @@ fn steps(recording: &Recording) -> [(f64, f64); 3] {
 }
 
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn no_standing_foot_is_moved_by_a_step_and_no_switch_is_taken_for_broken_on_uneven_ground() {
     let mut told = Vec::new();
     for (name, ..) in builtin::SCENARIOS {

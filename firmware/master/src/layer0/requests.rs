@@ -3,7 +3,7 @@
 use wheeleg_protocol::frame::encoded_len;
 use wheeleg_protocol::link::{CYCLE_US, GiveUp, Outcome, SlotTiming, Step};
 use wheeleg_protocol::{
-    Address, Disarm, Discover, Envelope, Identify, LinkRecord, LinkReport, Message,
+    Address, Disarm, Discover, Envelope, FaultRecord, Identify, LinkRecord, LinkReport, Message,
 };
 
 use super::acyclic::{Job, Purpose};
@@ -201,7 +201,13 @@ impl Layer0 {
         };
         match result {
             Ok(Message::FaultRecord(record)) => {
-                events.push(now_us, Event::Diagnosis { node, record });
+                let ago_us = ago_us(&record, now_us);
+                let diagnosis = Event::Diagnosis {
+                    node,
+                    record,
+                    ago_us,
+                };
+                events.push(now_us, diagnosis);
                 // What led to it.
                 self.questions.log(index);
                 self.nodes.forget_count(from);
@@ -381,4 +387,10 @@ impl Layer0 {
             self.line.stretch(bytes, into_us);
         }
     }
+}
+
+/// Time since a board's first fault. All clocks count microseconds modulo 2^32.
+const fn ago_us(record: &FaultRecord, now_us: u64) -> u32 {
+    let here_us = record.first_time_us.wrapping_add(record.clock_offset_us);
+    (now_us as u32).wrapping_sub(here_us)
 }

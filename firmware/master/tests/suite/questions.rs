@@ -24,7 +24,7 @@ fn noise(rig: &mut TestRig) {
 fn diagnoses(rig: &TestRig) -> Vec<(u8, FaultRecord)> {
     let events = rig.events.iter();
     let diagnosis = |(_, event): &(u64, Event)| match *event {
-        Event::Diagnosis { node, record } => Some((node, record)),
+        Event::Diagnosis { node, record, .. } => Some((node, record)),
         _ => None,
     };
     events.filter_map(diagnosis).collect()
@@ -58,6 +58,29 @@ fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
     );
     rig.run(2 * ROUND);
     assert_eq!(diagnoses(&rig).len(), 1, "once");
+}
+
+/// A new master leads boards that have told their fault to nobody yet.
+#[test]
+fn a_fault_from_before_this_master_is_told_by_its_age() {
+    const AGE_US: u64 = 3_000_000;
+    let mut rig = TestRig::new(MasterConfig::default());
+    rig.arm();
+    let latched_us = (rig.now_us as u32).wrapping_sub(AGE_US as u32);
+    let record = &mut rig.node(5).fault_record;
+    record.first_fault = FaultCode::new(Fault::LinkLost);
+    record.clock_offset_us = 1_000;
+    record.first_time_us = latched_us.wrapping_sub(1_000);
+    rig.node(5).faults.insert(Fault::LinkLost);
+    assert!(rig.now_us < AGE_US, "before the master's time");
+    rig.cycle();
+    let ages = rig.events.iter().filter_map(|(_, event)| match event {
+        Event::Diagnosis { ago_us, .. } => Some(u64::from(*ago_us)),
+        _ => None,
+    });
+    let ages: Vec<_> = ages.collect();
+    assert_eq!(ages.len(), 1);
+    assert!((AGE_US..AGE_US + 20_000).contains(&ages[0]), "{ages:?}");
 }
 
 #[test]

@@ -110,10 +110,10 @@ impl Expected {
             (Self::FoundAt(who, wanted), MasterEvent::Found { node, finding }) => {
                 (Some(who), wanted) == (node, finding)
             }
-            (Self::SaysFault(who, fault), MasterEvent::Diagnosis { node, record }) => {
+            (Self::SaysFault(who, fault), MasterEvent::Diagnosis { node, record, .. }) => {
                 (who, Some(fault)) == (node, record.first_fault.fault())
             }
-            (Self::SaysReset(who, cause), MasterEvent::Diagnosis { node, record }) => {
+            (Self::SaysReset(who, cause), MasterEvent::Diagnosis { node, record, .. }) => {
                 let anew = record.disarm_reason == DisarmReason::Reset || cause.is_fault();
                 anew && (who, cause) == (node, record.reset_cause)
             }
@@ -247,7 +247,11 @@ mod tests {
                 reset_cause,
                 ..record()
             };
-            Cause::Master(MasterEvent::Diagnosis { node: 2, record })
+            Cause::Master(MasterEvent::Diagnosis {
+                node: 2,
+                record,
+                ago_us: 0,
+            })
         };
         let wanted = Expected::SaysReset(2, ResetCause::PowerUp);
         assert!(wanted.is(&says(DisarmReason::Reset, ResetCause::PowerUp)));
