@@ -222,7 +222,7 @@ fault_table!(
     SupplyLost = 38, bit 10, "The air supply pressure is gone.",
         "Restore the compressed air supply and the dump valve, then clear the fault.";
     EmergencyStop = 39, bit 11, "Emergency stop.",
-        "Remove the cause, release the emergency stop at the master, then clear the fault.";
+        "Remove the cause, then clear the fault: that releases the emergency stop.";
     OverTravel = 40, bit 12, "The axis left its allowed travel.",
         "Move the axis back by hand with the air off, check its calibration, then clear the fault.";
     EncoderFault = 41, bit 13, "The encoder lost or reversed its counts.",

@@ -54,7 +54,9 @@ const answer = html("p", { class: "answer", role: "status" }, "Nothing was asked
 /** @param {string} what @param {import("./link.js").Answer} given */
 function tell(what, { status, text, reason, holder }) {
   const held = holder ? ` (${holder} is in control)` : "";
-  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `refused: ${text || reason}${held}`;
+  // A command that ran for long and was ended was not refused.
+  const verdict = reason === "interrupted" ? "ended early" : "refused";
+  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${text || reason}${held}`;
   answer.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
   answer.classList.toggle("bad", status !== "done");
 }
@@ -408,7 +410,7 @@ const listener = {
 async function begin() {
   const who = identity();
   if (!who) {
-    page.replaceChildren(html("p", { class: "alone" }, "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key."));
+    page.replaceChildren(html("p", { class: "alone" }, "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key. Without a terminal, add #k= and the digits of the file control.key, whose place `wheeleg serve` prints."));
     return;
   }
   try {

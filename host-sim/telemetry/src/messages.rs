@@ -9,6 +9,7 @@ use wheeleg_interface::{Side, first_difference};
 use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::contact::{Sector, Side as FootSide};
+use wheeleg_master::dispatcher::Refusal;
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
 use wheeleg_master::finding::Finding;
 use wheeleg_protocol::param::params_at;
@@ -147,6 +148,11 @@ fn line_errors(link: &LinkQuality) -> String {
 fn master(event: &MasterEvent) -> String {
     match *event {
         MasterEvent::Done(ticket) => format!("{} done", ticket.code.name()),
+        // It may have been under way for long.
+        MasterEvent::Refused {
+            ticket,
+            reason: reason @ Refusal::Interrupted,
+        } => format!("{} ended early: {}", ticket.code.name(), refusal(&reason)),
         MasterEvent::Refused { ticket, reason } => {
             format!("{} refused: {}", ticket.code.name(), refusal(&reason))
         }

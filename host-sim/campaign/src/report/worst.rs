@@ -117,9 +117,9 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
         .take(WORST)
         .map(|(row, passed, _)| Worst {
             passed,
-            nearest: nearest(row)
-                .filter(|_| passed)
-                .map(|(column, room)| format!("{} met by {}", column.name, percent(room))),
+            nearest: nearest(row).filter(|_| passed).map(|(column, room)| {
+                format!("{} within its limit by {}", column.name, percent(room))
+            }),
             case: cases[row].clone().unwrap_or_default(),
             status: statuses[row].clone().unwrap_or_default(),
             factors: merged

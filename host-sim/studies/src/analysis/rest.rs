@@ -128,10 +128,7 @@ pub(super) fn rest_targets(rest: &RestResult) -> Vec<Target> {
     vec![
         Target::new(
             "R1",
-            format!(
-                "valve edges at rest (from {SETTLING_S} s after a reference last moved; {:.1} joint seconds)",
-                rest.rest_s
-            ),
+            format!("valve edges at rest (from {SETTLING_S} s after a reference last moved)"),
             // No time at rest means nothing was measured.
             (rest.rest_s > 0.0).then_some(f64::from(rest.edges)),
             "1",

@@ -76,7 +76,6 @@ struct Joint {
 struct Wheel {
     stopped: Reaction,
     ramp: Reaction,
-    rim_mm_s: Option<f64>,
     axis: Axis,
 }
 
@@ -122,7 +121,6 @@ impl SafeStateMeter {
             let (t_s, rim_mm_s) = (row.t_s(), v.velocity_mm_s.abs());
             wheel.stopped.sample(t_s, rim_mm_s > STANDING_MM_S);
             wheel.ramp.sample(t_s, !SAFE_MODES.contains(&v.mode));
-            wheel.rim_mm_s.get_or_insert(rim_mm_s);
         }
         let reacted = within(row, at_s + REACTION_S, f64::INFINITY);
         wheel.axis.sample(reacted, v.mode, v.faults);
@@ -163,7 +161,6 @@ impl SafeStateMeter {
         let physical = worst(joints().map(|j| j.physical.within_stage(at_s)));
         let wheels = worst(self.wheels.iter().map(|w| w.stopped.after(at_s, 0.0)));
         let moved = worst(joints().map(|j| j.held_mm.span()));
-        let rims = self.wheels.iter().filter_map(|w| w.rim_mm_s);
         let safe = self.axes().filter(|axis| axis.safe == Some(true)).count();
         let latched = self.axes().filter(|axis| axis.latched).count();
         let mut targets = vec![
@@ -185,10 +182,7 @@ impl SafeStateMeter {
             ),
             Target::new(
                 "SS3",
-                format!(
-                    "both wheels at a standstill (slower wheel; the rims ran at {:.0} mm/s at the event)",
-                    rims.fold(0.0, f64::max)
-                ),
+                "both wheels at a standstill (slower wheel)",
                 wheels.map(|s| s * 1e3),
                 "ms",
                 None,

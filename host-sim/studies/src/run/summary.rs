@@ -297,7 +297,7 @@ mod tests {
             "0.002 s: JointReference refused: the robot is moving",
             "0.003 s: joint 1: Emergency stop.",
             "0.005 s: joint 1: Emergency stop.",
-            "0.006 s: master: Arm refused: a stop or another command came between",
+            "0.006 s: master: Arm ended early: a stop or another command came between",
         ];
         let times = [
             " (2 times)",

@@ -4,7 +4,7 @@ mod print;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand, ValueEnum};
 use wheeleg_campaign::report::Report;
@@ -243,11 +243,17 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
         save_every: SAVE_EVERY,
     };
     let simulate = |case: &_| simulate(case, plan.limit_s, &stop);
+    let begun = Instant::now();
     let ran = run(&store, &cases, &options, &simulate)?;
+    let took = begun.elapsed();
     for (path, why) in &ran.aside {
         tell(&format!("set aside: {}: {why}", path.display()));
     }
-    let text = print::ran(&ran, &store, shard, args.first.is_some());
+    let pilot = args.first.map(|_| print::Took {
+        took,
+        threads: options.threads,
+    });
+    let text = print::ran(&ran, &store, shard, pilot);
     print(&text)?;
     if let Some(signal) = ran.stopped {
         tell(&format!(

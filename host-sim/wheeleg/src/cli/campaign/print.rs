@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use serde_json::json;
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
@@ -36,8 +37,17 @@ pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError>
     Ok(ExitCode::SUCCESS)
 }
 
+/// How long a pilot took.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Took {
+    /// From its begin to its end.
+    pub(super) took: Duration,
+    /// Cases that ran beside each other.
+    pub(super) threads: usize,
+}
+
 /// What a process did, and what comes next.
-pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: bool) -> String {
+pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -> String {
     let mut out = format!("cases   {} of {}", ran.found + ran.computed, ran.of);
     if shard != Shard::ALL {
         let _ = write!(out, " in shard {shard}");
@@ -51,10 +61,20 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: bool) -> String
         ran.failed, ran.computed
     );
     out.push_str(&causes(&ran.causes));
+    if let Some(Took { took, threads }) = pilot
+        && ran.computed > 0
+    {
+        let each_s = took.as_secs_f64() / ran.computed as f64;
+        let _ = writeln!(
+            out,
+            "time    {:.1} s, {each_s:.2} s a case with {threads} threads",
+            took.as_secs_f64()
+        );
+    }
     let folder = store.folder().display();
     let _ = writeln!(out, "folder  {folder}");
     if shard == Shard::ALL && ran.stopped.is_none() {
-        let partial = if pilot { " --partial" } else { "" };
+        let partial = if pilot.is_some() { " --partial" } else { "" };
         let _ = writeln!(
             out,
             "next    wheeleg campaign merge {folder}{partial} --out {folder}/cases.parquet"
@@ -104,10 +124,10 @@ pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
 
 /// How far a campaign is.
 pub(super) fn state(state: &State, store: &Store) -> String {
-    let mut out = format!(
-        "cases   {} of {}, {} of them in blocks that are not finished\n",
-        state.rows, state.cases, state.partial
-    );
+    let mut out = format!("cases   {} of {} have a result\n", state.rows, state.cases);
+    if state.partial > 0 {
+        let _ = writeln!(out, "        {} of them in blocks under way", state.partial);
+    }
     if state.begun + state.unsaved > 0 {
         let _ = writeln!(
             out,
@@ -130,7 +150,7 @@ pub(super) fn state(state: &State, store: &Store) -> String {
     out.push_str(&causes(&state.causes));
     let _ = writeln!(
         out,
-        "blocks  {} of {} without a part",
+        "blocks  {} of {} still to do",
         state.missing.len(),
         store.blocks()
     );
