@@ -251,6 +251,10 @@ const RIM_SPEED: ArgumentKind = ArgumentKind::Velocity(Limits {
     min: I16F16::lit("1"),
     max: I16F16::lit("400"),
 });
+const TOUCHDOWN: ArgumentKind = ArgumentKind::Velocity(Limits {
+    min: I16F16::ZERO,
+    max: I16F16::lit("400"),
+});
 const RIM_ACCELERATION: ArgumentKind = ArgumentKind::Acceleration(Limits {
     min: I16F16::lit("10"),
     max: I16F16::lit("5000"),
@@ -320,6 +324,7 @@ arguments! {
     PUSH_ACCELERATION = "push_acceleration", RIM_ACCELERATION, "Acceleration of the push.";
     PATTERN = "pattern", ArgumentKind::Choice(&["single", "alternate"]), "single: one leg steps every time; alternate: the legs step in turn.";
     STEPPING_LEG = "leg", SIDES, "The leg that steps, or steps first.";
+    TOUCHDOWN_SPEED = "touchdown_speed", TOUCHDOWN, "Speed at which a foot is lowered from 15 mm above where it last stood; 0: the reference jumps to the full stroke.";
     TOUCHDOWN_REFLEX = "touchdown_reflex", ArgumentKind::Flag, "Stop the lowering of a foot where its switches close.";
     LEG = "leg", SIDES, "Which leg; the one that steps first in the gait.";
     FORWARD = "forward", FULL_STROKE, "Travel of the foot over the whole arch, forward.";

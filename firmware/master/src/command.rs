@@ -15,8 +15,8 @@ use crate::argument::{
     ACCELERATION, Argument, BEHAVIOURS, BOARD, CORRECTION, FORWARD, GAIN, HEIGHT, HELD_LEG_S5,
     HELD_LEG_S6, JOINT, LEFT, LEG, LIFT, LOWER, NOSE, PARAMETER, PATTERN, PERIOD, POLE, PUSH,
     PUSH_ACCELERATION, PUSH_SPEED, RATE, REACH, SIDE, SPEED, STEP_STROKE, STEPPING_LEG, STEPS,
-    STROKE, TOUCHDOWN_REFLEX, TRAVEL, TURN, VALUE, WALK_LIFT, WALK_PATTERN, WALK_SPEED, YAW_S2,
-    ZERO,
+    STROKE, TOUCHDOWN_REFLEX, TOUCHDOWN_SPEED, TRAVEL, TURN, VALUE, WALK_LIFT, WALK_PATTERN,
+    WALK_SPEED, YAW_S2, ZERO,
 };
 use crate::behaviour::Behaviours;
 use crate::contact::Side;
@@ -297,7 +297,7 @@ commands! {
     Hold = 0x0202, [], "Freezes every joint at its measured stroke and stops the wheels.", Self::Hold =>
     StartGait = 0x0203, [], "Starts the gait from the start pose.", Self::StartGait =>
     StopGait = 0x0204, [], "Ends the gait with the step under way, or a walk with both feet down.", Self::StopGait =>
-    SetGait = 0x0205, [STEPS, PERIOD, LIFT, REACH, LOWER, PUSH, STEP_STROKE, HELD_LEG_S5, HELD_LEG_S6, YAW_S2, PUSH_SPEED, PUSH_ACCELERATION, PATTERN, STEPPING_LEG, TOUCHDOWN_REFLEX], "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
+    SetGait = 0x0205, [STEPS, PERIOD, LIFT, REACH, LOWER, PUSH, STEP_STROKE, HELD_LEG_S5, HELD_LEG_S6, YAW_S2, PUSH_SPEED, PUSH_ACCELERATION, PATTERN, STEPPING_LEG, TOUCHDOWN_SPEED, TOUCHDOWN_REFLEX], "Replaces the gait parameters; refused while a gait runs.", Self::SetGait(_) =>
     FootTrajectory = 0x0206, [LEG, FORWARD, LEFT, HEIGHT, RATE], "Moves one foot along a sinusoid through inverse kinematics.", Self::FootTrajectory { .. } =>
     Walk = 0x0207, [WALK_SPEED, TURN, WALK_PATTERN, WALK_LIFT, NOSE], "Walks, or changes the walk under way; wheels and legs go on together until StopGait or Hold.", Self::Walk(_) =>
 }

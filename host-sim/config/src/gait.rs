@@ -16,6 +16,7 @@ const STEP_STROKE: [f64; 2] = bounds(&argument::STEP_STROKE);
 const STROKE: [f64; 2] = bounds(&argument::HELD_LEG_S5);
 const PUSH_SPEED: [f64; 2] = bounds(&argument::PUSH_SPEED);
 const PUSH_ACCELERATION: [f64; 2] = bounds(&argument::PUSH_ACCELERATION);
+const TOUCHDOWN_SPEED: [f64; 2] = bounds(&argument::TOUCHDOWN_SPEED);
 
 params! {
     /// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
@@ -44,6 +45,8 @@ params! {
         push_speed_m_s: f64, "push_speed", Velocity, PUSH_SPEED[0], PUSH_SPEED[1];
         /// Acceleration of the push.
         push_acceleration_m_s2: f64, "push_acceleration", Acceleration, PUSH_ACCELERATION[0], PUSH_ACCELERATION[1];
+        /// Speed at which a foot is lowered from 15 mm above where it last stood; 0: the reference jumps.
+        touchdown_speed_m_s: f64, "touchdown_speed", Velocity, TOUCHDOWN_SPEED[0], TOUCHDOWN_SPEED[1];
         /// Stop the lowering of a foot where its switches close.
         touchdown_reflex: bool, "touchdown_reflex", Flag, 0.0, 1.0;
         /// The master leads the wheels in every cycle, as a walk needs; otherwise their boards make profiles of their own.
@@ -71,6 +74,7 @@ impl GaitParams {
             push_speed_mm_s: VelocityMmS::from_f64(self.push_speed_m_s * 1e3),
             push_acceleration_mm_s2: I16F16::from_num(self.push_acceleration_m_s2 * 1e3),
             pattern,
+            touchdown_speed_mm_s: VelocityMmS::from_f64(self.touchdown_speed_m_s * 1e3),
             touchdown_reflex: self.touchdown_reflex,
         }
     }

@@ -111,17 +111,18 @@ mod tests {
         assert!(paper.has_papers_law());
     }
 
-    /// The two robots are one machine: what differs is what their boards are told, and who leads
-    /// the wheels.
+    /// The two robots are one machine: what differs is what their boards are told, who leads the
+    /// wheels, and how fast a foot comes down.
     #[test]
     fn the_robots_differ_in_what_their_boards_are_told_alone() {
+        const LED: [&str; 2] = ["gait.stream_wheels", "gait.touchdown_speed"];
         let one = builtin::robot("wheeleg").expect("built in");
         let other = builtin::robot("wheeleg-2003").expect("built in");
         let machine = |robot: &crate::RobotConfig| -> Vec<String> {
             let of = robot
                 .parameters
                 .iter()
-                .filter(|p| !p.path.starts_with("node.") && p.path != "gait.stream_wheels");
+                .filter(|p| !p.path.starts_with("node.") && !LED.contains(&&*p.path));
             of.map(|p| format!("{} = {:?} {}", p.path, p.value, p.unit))
                 .collect()
         };

@@ -289,6 +289,7 @@ impl<'a> Arguments<'a> {
                 0 => Pattern::Single(leg),
                 _ => Pattern::Alternate { first: leg },
             },
+            touchdown_speed_mm_s: self.speed(&argument::TOUCHDOWN_SPEED)?,
             touchdown_reflex: self.flag(&argument::TOUCHDOWN_REFLEX)?,
         };
         params.validate().map_err(ArgumentError::Relation)?;

@@ -66,6 +66,9 @@ pub struct GaitParams {
     pub push_acceleration_mm_s2: I16F16,
     /// Which leg steps when.
     pub pattern: Pattern,
+    /// Speed of a foot near the ground, mm/s ([`argument::TOUCHDOWN_SPEED`]); 0: the reference of
+    /// b6 jumps to the full stroke, as in the paper.
+    pub touchdown_speed_mm_s: VelocityMmS,
     /// Stop the lowering of a foot at the stroke where its switches close.
     pub touchdown_reflex: bool,
 }
@@ -87,6 +90,7 @@ impl Default for GaitParams {
             push_speed_mm_s: VelocityMmS::from_int(180),
             push_acceleration_mm_s2: const { I16F16::lit("600") },
             pattern: Pattern::Single(Side::Left),
+            touchdown_speed_mm_s: VelocityMmS::ZERO,
             touchdown_reflex: false,
         }
     }
@@ -254,7 +258,7 @@ impl GaitParams {
     }
 
     /// The values that have a range of their own.
-    fn values(&self) -> [(&'static Argument, Value); 12] {
+    fn values(&self) -> [(&'static Argument, Value); 13] {
         [
             (&argument::STEPS, Value::Whole(i32::from(self.steps))),
             (&argument::PERIOD, Value::Micros(self.period_us)),
@@ -279,6 +283,10 @@ impl GaitParams {
             (
                 &argument::PUSH_ACCELERATION,
                 Value::Fixed(self.push_acceleration_mm_s2),
+            ),
+            (
+                &argument::TOUCHDOWN_SPEED,
+                Value::Fixed(self.touchdown_speed_mm_s.get()),
             ),
         ]
     }

@@ -10,8 +10,11 @@
 //! | reach to lower | 0 | stroke | stopped |
 //! | lower to push | stroke | stroke | stopped |
 //! | push to end | stroke | stroke reached − measured travel | trapezoid |
+//!
+//! With a touchdown speed the lowering has two parts (`touchdown`).
 
 mod ahead;
+mod touchdown;
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -23,6 +26,7 @@ use crate::setpoint::{
     Cylinder, Feedback, JointSetpoint, OnLinkLoss, Phase, Reflex, Setpoints, TravelSetpoint,
     WHEELS, WheelTravel,
 };
+use touchdown::Touchdown;
 
 /// Progress of a running square-wave gait.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +45,8 @@ pub struct SquareGait {
     segment: u16,
     /// Which legs have been lowered since they last rose.
     lowered: [bool; WHEELS],
+    /// How each foot comes down.
+    touchdown: [Touchdown; WHEELS],
 }
 
 /// Step number, time within it, and phase.
@@ -74,6 +80,7 @@ impl SquareGait {
             travel_origin_um: 0,
             segment,
             lowered: [false; WHEELS],
+            touchdown: [Touchdown::new(params.stroke_mm, params.touchdown_speed_mm_s); WHEELS],
         })
     }
 
@@ -109,6 +116,14 @@ impl SquareGait {
                 Phase::Lower | Phase::Push | Phase::Rest => *lowered = true,
                 _ => {}
             }
+        }
+        let stroke = feedback
+            .strokes_mm
+            .get(stepping.joint(Cylinder::Vertical))
+            .copied()
+            .flatten();
+        if let Some(touchdown) = self.touchdown.get_mut(stepping.index()) {
+            touchdown.update(now_us, phase, stroke);
         }
         let mut out = Setpoints::idle(now_us);
         out.phase = phase;
@@ -287,8 +302,9 @@ impl SquareGait {
             out.reference_mm = PositionMm::ZERO;
             return;
         }
+        let touchdown = self.touchdown.get(side.index());
         out.reference_mm = if lowered || side == self.params.stepping_leg(0) {
-            self.params.stroke_mm
+            touchdown.map_or(self.params.stroke_mm, Touchdown::reference)
         } else {
             self.params.held_leg_s6_mm
         };

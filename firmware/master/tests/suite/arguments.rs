@@ -142,6 +142,7 @@ fn forced(command: Command, name: &str, value: Value) -> Option<Command> {
             "held_leg_s6" => gait.held_leg_s6_mm = mm(v),
             "yaw_s2" => gait.yaw_s2_mm = mm(v),
             "push_speed" => gait.push_speed_mm_s = VelocityMmS::new(v),
+            "touchdown_speed" => gait.touchdown_speed_mm_s = VelocityMmS::new(v),
             _ => gait.push_acceleration_mm_s2 = v,
         },
         (Command::Walk(order), _, Value::Fixed(v)) => match name {

@@ -283,6 +283,69 @@ fn stop_ends_with_the_step_under_way() {
     assert_eq!(gait.steps(), 2);
 }
 
+/// The foot stood at 170 mm: it comes fast to 15 mm above that, and slowly from there on.
+#[test]
+fn a_guarded_touchdown_is_slow_from_above_the_ground_on() {
+    const SPEED_MM_S: f64 = 60.0;
+    let params = GaitParams {
+        touchdown_speed_mm_s: VelocityMmS::from_f64(SPEED_MM_S),
+        ..GaitParams::default()
+    };
+    let mut gait = SquareGait::new(params, START_US, 1).unwrap();
+    let mut feedback = Ideal::new().feedback;
+    let mut b6_at = |ms: u64, stroke_mm: Option<i16>| {
+        feedback.strokes_mm[2] = stroke_mm.map(PositionMm::from_int);
+        let out = gait.setpoints(START_US + ms * 1_000, &feedback);
+        out.joints[2].unwrap()
+    };
+    assert_eq!(b6_at(0, Some(170)).reference_mm.to_f64(), 180.0);
+    assert_eq!(b6_at(100, Some(170)).reference_mm.to_f64(), 0.0);
+    let reach = b6_at(900, Some(0));
+    let ahead = reach.ahead.unwrap();
+    assert_eq!((ahead.reference_mm.to_f64(), ahead.cycles), (155.0, 10));
+    // However long the foot takes.
+    for (ms, stroke_mm) in [
+        (1_000, Some(0)),
+        (1_300, Some(100)),
+        (1_500, Some(151)),
+        (1_510, None),
+    ] {
+        assert_eq!(b6_at(ms, stroke_mm).reference_mm.to_f64(), 155.0, "{ms}");
+    }
+    let begin_ms = 1_520;
+    for ms in (begin_ms..1_990).step_by(10) {
+        let wanted_mm = 155.0 + SPEED_MM_S * (ms - begin_ms) as f64 * 1e-3;
+        let reference_mm = b6_at(ms, Some(153)).reference_mm.to_f64();
+        assert!(
+            (reference_mm - wanted_mm.min(180.0)).abs() < 1e-3,
+            "{ms}: {reference_mm}"
+        );
+    }
+    assert_eq!(
+        b6_at(2_000, Some(160)).reference_mm.to_f64(),
+        180.0,
+        "the push needs it down"
+    );
+    // In the next step the ground is where the foot stands now.
+    assert_eq!(b6_at(3_434, Some(176)).reference_mm.to_f64(), 0.0);
+    assert_eq!(b6_at(4_340, Some(0)).reference_mm.to_f64(), 161.0);
+}
+
+/// Without a speed the reference jumps, as in the paper.
+#[test]
+fn without_a_touchdown_speed_the_lowering_is_a_jump() {
+    for s in record(GaitParams::default(), 10_000, 10) {
+        let air = matches!(s.setpoints.phase, Phase::Lift | Phase::Reach);
+        let wanted_mm = if air { 0.0 } else { 180.0 };
+        assert_eq!(
+            s.setpoints.joints[2].unwrap().reference_mm.to_f64(),
+            wanted_mm,
+            "{}",
+            s.t_s
+        );
+    }
+}
+
 #[test]
 fn touchdown_reflex_is_asked_for_from_the_lowering_on() {
     let params = GaitParams {

@@ -7,8 +7,8 @@ use wheeleg_telemetry::{JointSample, Row};
 const ARRIVED_MM: f64 = 5.0;
 /// A command that jumps by more than this is a move, mm.
 const MOVE_MM: f64 = 10.0;
-/// The last of the way down, mm, …
-const LOWERING_MM: f64 = 10.0;
+/// The last of the way to where a foot stands, mm, …
+const LOWERING_MM: usize = 10;
 /// … in which a foot that meets the ground is to be no faster than this, mm/s.
 const LOWERING_MM_S: f64 = 100.0;
 
@@ -26,8 +26,8 @@ struct JointMoves {
     squares_mm2: f64,
     worst_mm: f64,
     samples: u32,
-    /// Largest speed in the last of the way to an extended command, mm/s.
-    lowering_mm_s: f64,
+    /// Largest speed outward in each millimetre of the stroke that was reached, mm/s.
+    outward_mm_s: Vec<f64>,
     edges: Extremes,
     position_mm: Extremes,
 }
@@ -56,11 +56,23 @@ impl JointMoves {
                 self.since_s = None;
             }
         }
-        if (0.0..=LOWERING_MM).contains(&left_mm) && v.commanded_mm > MOVE_MM {
-            self.lowering_mm_s = self.lowering_mm_s.max(v.velocity_mm_s);
+        // A stroke is at most 0.5 m.
+        let millimetre = v.position_mm.max(0.0) as usize;
+        if self.outward_mm_s.len() <= millimetre {
+            self.outward_mm_s.resize(millimetre + 1, 0.0);
         }
+        let outward_mm_s = &mut self.outward_mm_s[millimetre];
+        *outward_mm_s = outward_mm_s.max(v.velocity_mm_s);
         self.edges.add(f64::from(v.valve_edges));
         self.position_mm.add(v.position_mm);
+    }
+}
+
+impl JointMoves {
+    /// Largest speed in the last of the way out, mm/s.
+    fn lowering_mm_s(&self) -> f64 {
+        let last = self.outward_mm_s.iter().rev().take(LOWERING_MM);
+        last.copied().fold(0.0, f64::max)
     }
 }
 
@@ -119,7 +131,7 @@ impl MoveMeter {
                 add(
                     "M4",
                     format!("{name} largest speed in the last {LOWERING_MM} mm down"),
-                    joint.lowering_mm_s,
+                    joint.lowering_mm_s(),
                     "mm/s",
                     Some(LOWERING_MM_S),
                 );

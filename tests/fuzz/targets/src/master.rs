@@ -149,13 +149,14 @@ fn any_service(u: &mut Unstructured<'_>, joint: u8, raw: i32) -> arbitrary::Resu
 
 fn any_gait(u: &mut Unstructured<'_>) -> arbitrary::Result<GaitParams> {
     let mut gait = GaitParams::default();
-    match u.int_in_range(0..=6_u8)? {
+    match u.int_in_range(0..=7_u8)? {
         0 => gait.steps = u.arbitrary()?,
         1 => gait.period_us = u.arbitrary()?,
         2 => gait.stroke_mm = PositionMm::from_raw(u.arbitrary()?),
         3 => gait.lift_us = u.arbitrary()?,
         4 => gait.push_us = u.arbitrary()?,
         5 => gait.held_leg_s5_mm = PositionMm::from_raw(u.arbitrary()?),
+        6 => gait.touchdown_speed_mm_s = VelocityMmS::from_raw(u.arbitrary()?),
         _ => gait.push_speed_mm_s = VelocityMmS::from_raw(u.arbitrary()?),
     }
     Ok(gait)

@@ -2,7 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
-use super::{Instant, SquareGait};
+use super::{Instant, SquareGait, Touchdown};
 use crate::contact::Side;
 use crate::layer1::CYCLE_US;
 use crate::setpoint::{Cylinder, NextReference};
@@ -31,9 +31,10 @@ impl SquareGait {
             let begun = u64::from(p.period_us).saturating_mul(u64::from(step));
             let moves: [Option<(u32, PositionMm)>; 2] = match cylinder {
                 Cylinder::Yaw => [None, None],
-                Cylinder::Vertical if side == leg => {
-                    [Some((p.lift_us, up)), Some((p.lower_us, p.stroke_mm))]
-                }
+                Cylinder::Vertical if side == leg => [
+                    Some((p.lift_us, up)),
+                    Some((p.lower_us, self.approach(side))),
+                ],
                 Cylinder::Vertical => [None, None],
                 Cylinder::Horizontal => {
                     let (reach, from) = if side == leg {
@@ -62,6 +63,12 @@ impl SquareGait {
             }
         }
         None
+    }
+
+    /// Stroke to which b6 jumps when its foot is lowered.
+    fn approach(&self, side: Side) -> PositionMm {
+        let touchdown = self.touchdown.get(side.index());
+        touchdown.map_or(self.params.stroke_mm, Touchdown::approach)
     }
 
     /// Nominal stroke of b5 at which the leg that does not step in `step` stands before its push.
