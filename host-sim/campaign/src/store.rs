@@ -248,10 +248,17 @@ impl Store {
     /// Opens a folder that there is.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] if it is none.
+    /// [`CampaignError::Refused`] if there is no plan in it, [`CampaignError::Unreadable`] if it is none.
     pub fn open(folder: &Path) -> Result<Self, CampaignError> {
+        let plan = folder.join(PLAN_FILE);
+        if !plan.exists() {
+            let what = format!("there is no campaign in `{}`", folder.display());
+            let help =
+                format!("give the folder of a `wheeleg campaign run`, which has a `{PLAN_FILE}`");
+            return Err(CampaignError::refused(what, help));
+        }
         Ok(Self {
-            plan: PlanFile::read(&folder.join(PLAN_FILE))?,
+            plan: PlanFile::read(&plan)?,
             folder: folder.to_owned(),
         })
     }
