@@ -447,6 +447,15 @@ fn a_lock_that_is_a_link_or_somebody_elses_file_is_refused() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let precious = folder.path().join("precious");
     fs::write(&precious, "of somebody").expect("written");
+    // Nobody writes to a pipe, or reads it.
+    let out = folder.path().join("pipe");
+    fs::create_dir(&out).expect("made");
+    let made = Command::new("mkfifo").arg(out.join(".lock")).status();
+    assert!(made.expect("mkfifo").success());
+    let refused = end(start(&out, &["run", "stand"], Stdio::piped));
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(said.contains(".lock") && said.contains("no file"), "{said}");
     for is_link in [true, false] {
         let out = folder.path().join(format!("link-{is_link}"));
         fs::create_dir(&out).expect("made");

@@ -18,6 +18,7 @@ mod cylinders;
 mod delay;
 #[cfg(target_os = "linux")]
 mod disks;
+mod doctored;
 mod energy;
 mod errors;
 #[cfg(unix)]

@@ -13,6 +13,7 @@ use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
+use crate::store::opened;
 use crate::{CampaignError, host};
 
 /// One line.
@@ -64,7 +65,9 @@ pub(crate) struct Attempts {
 impl Attempts {
     /// Reads what is there; a line that was cut off is none.
     pub(crate) fn read(path: PathBuf) -> Self {
-        let text = fs::read_to_string(&path).unwrap_or_default();
+        let text = opened(&path)
+            .and_then(std::io::read_to_string)
+            .unwrap_or_default();
         let mut known: BTreeMap<u64, Known> = BTreeMap::new();
         for line in text.lines() {
             let Ok(line) = serde_json::from_str::<Line>(line) else {

@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::columns::{Column, Columns, FACT, Kind};
 use crate::panics::caught;
 use crate::row::{self, Row};
+use crate::store::opened;
 use crate::table::{Data, Table, TableReader, TableWriter};
 use crate::{host, program};
 
@@ -14,6 +15,9 @@ pub(crate) const PLAN: &str = "wheeleg.plan";
 pub(crate) const PROGRAM: &str = "wheeleg.program";
 /// Key of the hash of the values: bytes that were damaged are found, wherever they are.
 const ROWS: &str = "wheeleg.rows";
+
+/// Most characters of a wrong fact in a message.
+const SHOWN: usize = 60;
 
 /// What it took to compute a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,7 +122,7 @@ pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
 }
 
 fn open(path: &Path) -> Result<File, NotAPart> {
-    File::open(path).map_err(|e| match e.kind() {
+    opened(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => NotAPart::Missing,
         _ => NotAPart::Torn(e.to_string()),
     })
@@ -129,7 +133,10 @@ fn of(reader: &TableReader<File>, plan: &str) -> Result<(), NotAPart> {
     for (key, own) in [(PLAN, plan), (PROGRAM, own.as_str())] {
         let found = reader.fact(key).unwrap_or("nothing");
         if found != own {
-            let what = format!("its {key} is {found}, not {own}");
+            // A merged table has its whole plan there.
+            let begin: String = found.chars().take(SHOWN).collect();
+            let more = if begin == found { "" } else { "…" };
+            let what = format!("its {key} is {begin}{more}, not {own}");
             return Err(NotAPart::Foreign(what));
         }
     }

@@ -1,8 +1,8 @@
 //! One case again: its row computed anew, and the whole run with log, figures and report.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use wheeleg_config::word;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::run::Run;
 use wheeleg_studies::study::{Finished, Settings, Stop};
@@ -10,9 +10,9 @@ use wheeleg_studies::study::{Finished, Settings, Stop};
 use crate::cases::Cases;
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
-use crate::row::{self, Row};
+use crate::row::{self, Row, Status};
 use crate::simulate::simulate;
-use crate::store::{PlanFile, Store};
+use crate::store::{PlanFile, Store, opened};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
 
@@ -42,13 +42,14 @@ impl Replayed {
         Some(*before == self.row && bits(before) == bits(&self.row))
     }
 
-    /// Whether the log of the full run has the hash of the row; none of a row without one.
+    /// Whether the log of the full run has the hash of the row; none of a row without one, or of a
+    /// case that was given up: its log ends before that of the full run.
     #[must_use]
     pub fn same_log(&self) -> Option<bool> {
         let run = self
             .run
             .as_ref()
-            .filter(|run| run.result.summary.complete)?;
+            .filter(|run| run.result.summary.complete && self.row.status == Status::Ok)?;
         let hash = self.row.log_hash.as_ref()?;
         Some(run.result.summary.hash == *hash)
     }
@@ -119,21 +120,23 @@ pub fn replay(
 
 /// The plan in a merged table.
 pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
-    let file = File::open(path).map_err(|e| CampaignError::unreadable(path, e))?;
+    let file = opened(path).map_err(|e| CampaignError::unreadable(path, e))?;
     let reader = TableReader::new(file).map_err(|e| CampaignError::unreadable(path, e))?;
-    let text = reader.fact(PLAN).unwrap_or_default();
-    serde_json::from_str(text).map_err(|_| CampaignError::Unreadable {
+    // A part has the hash of its plan alone.
+    let text = reader.fact(PLAN).filter(|text| text.starts_with('{'));
+    let text = text.ok_or_else(|| CampaignError::Unreadable {
         path: path.to_owned(),
         reason: "it has no plan".to_owned(),
         help: "give the table of `wheeleg campaign merge`, or the folder of a campaign".to_owned(),
-    })
+    })?;
+    PlanFile::parse(path, text)
 }
 
 /// Index of a case, and its row.
 fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>), CampaignError> {
     let missing = || {
         CampaignError::refused(
-            format!("there is no case `{case}`"),
+            format!("there is no case `{}`", word(case)),
             format!(
                 "give one of the column `case`, 32 hexadecimal digits, or a place from 0 to {}",
                 plan.cases - 1
@@ -170,7 +173,7 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             Ok(rows)
         }
         From::Table(path) => {
-            let file = File::open(path).map_err(|e| CampaignError::unreadable(path, e))?;
+            let file = opened(path).map_err(|e| CampaignError::unreadable(path, e))?;
             let read = TableReader::new(file).and_then(|reader| reader.read());
             let table = read.map_err(|e| CampaignError::unreadable(path, e))?;
             row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, "rows that are none"))

@@ -95,11 +95,16 @@ impl PlanFile {
     /// # Errors
     /// [`CampaignError::Unreadable`] if it is none.
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
-        let text = fs::read_to_string(path).map_err(|e| CampaignError::unreadable(path, e))?;
+        let text = opened(path).and_then(std::io::read_to_string);
+        let text = text.map_err(|e| CampaignError::unreadable(path, e))?;
         Self::parse(path, &text)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, CampaignError> {
+    /// Reads the text of one; `path` is where it stands.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if it is none.
+    pub(crate) fn parse(path: &Path, text: &str) -> Result<Self, CampaignError> {
         let file: Self =
             serde_json::from_str(text).map_err(|e| CampaignError::unreadable(path, e))?;
         if file.format != FORMAT {
@@ -108,6 +113,15 @@ impl PlanFile {
         }
         if file.hash != hash(&file.sources, file.block) {
             let reason = "its texts are not those of its hash".to_owned();
+            return Err(CampaignError::unreadable(path, reason));
+        }
+        // It follows from the texts; a plan that only another program reads is shown as it stands.
+        let cases = file.plan().map_or(file.cases, |plan| plan.cases());
+        if file.cases != cases || cases == 0 {
+            let reason = format!(
+                "`cases` is {}, allowed: {cases}, as in its plan",
+                file.cases
+            );
             return Err(CampaignError::unreadable(path, reason));
         }
         Ok(file)
@@ -376,6 +390,14 @@ impl Store {
         rows.retain(|row| cases.contains(&row.index));
         Ok((rows, files))
     }
+}
+
+/// Opens a file of a campaign to read it: a pipe may have no writer, a device no end.
+pub(crate) fn opened(path: &Path) -> std::io::Result<File> {
+    if fs::metadata(path)?.is_file() {
+        return File::open(path);
+    }
+    Err(std::io::Error::other("it is not a file"))
 }
 
 /// Writes a file whole: under another name, synced, renamed, and the folder synced.

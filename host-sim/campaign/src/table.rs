@@ -281,8 +281,10 @@ impl<R: ChunkReader + 'static> TableReader<R> {
             columns: Vec::new(),
         };
         let columns = reader.fact(crate::columns::FACT).unwrap_or_default();
-        reader.columns = serde_json::from_str(columns)
-            .map_err(|e| ParquetError::General(format!("no columns: {e}")))?;
+        reader.columns = serde_json::from_str(columns).map_err(|_| {
+            let other = "it is no table of a campaign: its columns are not described as there";
+            ParquetError::General(other.to_owned())
+        })?;
         let schema = reader.file.metadata().file_metadata().schema_descr();
         let names = schema.columns().iter().map(|column| column.name());
         if !names.eq(reader.columns.iter().map(|column| column.name.as_str())) {

@@ -226,7 +226,7 @@ pub(super) fn find(
             .map(|text| (name_or_path.to_owned(), text))
             .map_err(|why| {
                 let help = match why.kind() {
-                    ErrorKind::FileTooLarge => {
+                    ErrorKind::FileTooLarge if kind == "scenario" => {
                         "parts of a scenario's ground can stand in a height map"
                     }
                     _ => "give the path of a TOML file, in UTF-8, that this user may read",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use miette::Diagnostic;
 use thiserror::Error;
+use wheeleg_config::ConfigError;
 use wheeleg_sim::SimError;
 
 /// Why there is no console.
@@ -54,6 +55,11 @@ pub enum ConsoleError {
         /// What the user can do.
         help: String,
     },
+
+    /// The robot or the scenario of a recording is wrong.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Config(#[from] Box<ConfigError>),
 
     /// The simulated robot could not be built.
     #[error(transparent)]

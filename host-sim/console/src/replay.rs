@@ -18,7 +18,7 @@ use wheeleg_telemetry::{Keep, LogError, LogFile, Recorder};
 use crate::error::ConsoleError;
 use crate::live::Live;
 use crate::record::Summary;
-use crate::record::folder::{INPUTS, ROBOT, SCENARIO, opened, summary};
+use crate::record::folder::{INPUTS, ROBOT, SCENARIO, SUMMARY, opened, summary};
 use crate::record::inputs::{Input, LINE_MAX, Line};
 use crate::request::Order;
 
@@ -26,6 +26,9 @@ use crate::request::Order;
 const LONGEST_MS: u64 = 31 * 24 * 3_600_000;
 /// Largest robot or scenario file.
 const TOML_MAX: u64 = 4 << 20;
+/// What is said of a line that is none.
+const NO_INPUT: &str = "it is no input: allowed is an object of JSON with `ms`, a whole number, and one of \
+    `beat`, `stop`, `command`, `fault_begins`, `fault_ends`, `pace` and `hash`";
 /// Simulated between two looks at the progress, ms.
 const STRIDE_MS: u64 = 10;
 
@@ -60,17 +63,20 @@ impl Replayed {
     }
 }
 
-/// Repeats the recording in `folder`, as fast as it goes, and writes its log from power-up on to
-/// `log`. `progress` is told the time in ms and that of the end.
+/// A recording that can be repeated.
+#[derive(Debug)]
+pub struct Recorded {
+    summary: Summary,
+    live: Live,
+    lines: Lines,
+    end_ms: u64,
+}
+
+/// Reads the recording in `folder`.
 ///
 /// # Errors
-/// [`ConsoleError`] if the folder is no recording that can be repeated, or the log cannot be
-/// written.
-pub fn replay(
-    folder: &Path,
-    log: Option<&Path>,
-    progress: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
-) -> Result<Replayed, ConsoleError> {
+/// [`ConsoleError`] if the folder is no recording that can be repeated.
+pub fn recorded(folder: &Path) -> Result<Recorded, ConsoleError> {
     let folder = folder_of(folder);
     let summary = summary(&folder).map_err(unusable)?;
     if !summary.repeatable {
@@ -81,12 +87,43 @@ pub fn replay(
         return Err(ConsoleError::other(what, "open its log instead"));
     }
     let live = Live::of(&source(&folder, SCENARIO)?, &source(&folder, ROBOT)?);
-    let live = live.map_err(|e| unusable(format!("{}: {e}", folder.display())))?;
-    let mut lines = Lines::open(&folder.join(INPUTS))?;
+    let live = live.map_err(Box::new)?;
+    let lines = Lines::open(&folder.join(INPUTS))?;
     let end_ms = match summary.end_us {
+        Some(end_us) if end_us > LONGEST_MS * 1_000 => {
+            return Err(unusable(format!(
+                "{}: `end_us` is {end_us}, allowed: 0 to {LONGEST_MS}000",
+                folder.join(SUMMARY).display()
+            )));
+        }
         Some(end_us) => end_us.div_ceil(1_000),
         None => Lines::open(&folder.join(INPUTS))?.last_ms()?,
     };
+    Ok(Recorded {
+        summary,
+        live,
+        lines,
+        end_ms,
+    })
+}
+
+/// Repeats a recording, as fast as it goes, and writes its log from power-up on to `log`.
+/// `progress` is told the time in ms and that of the end.
+///
+/// # Errors
+/// [`ConsoleError`] if a line of its inputs is none, the robot cannot be built, or the log cannot
+/// be written.
+pub fn replay(
+    recorded: Recorded,
+    log: Option<&Path>,
+    progress: &mut dyn FnMut(u64, u64) -> ControlFlow<()>,
+) -> Result<Replayed, ConsoleError> {
+    let Recorded {
+        summary,
+        live,
+        mut lines,
+        end_ms,
+    } = recorded;
     let Live {
         scenario, robot, ..
     } = &live;
@@ -252,6 +289,7 @@ impl Repeated {
 }
 
 /// The lines of `inputs.jsonl`, read one by one.
+#[derive(Debug)]
 struct Lines {
     path: PathBuf,
     file: BufReader<File>,
@@ -300,7 +338,7 @@ impl Lines {
             }
             return Ok(Next::CutShort);
         }
-        let line: Line = serde_json::from_slice(&text).map_err(|e| self.wrong(&e.to_string()))?;
+        let line: Line = serde_json::from_slice(&text).map_err(|_| self.wrong(NO_INPUT))?;
         if line.ms < self.last_ms || line.ms > LONGEST_MS {
             let allowed = format!("{} to {LONGEST_MS}", self.last_ms);
             return Err(self.wrong(&format!("`ms` is {}, allowed: {allowed}", line.ms)));

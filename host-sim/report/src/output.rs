@@ -128,9 +128,16 @@ fn lock(path: &Path) -> Result<File, ReportError> {
         )))
     };
     let open = || {
-        // What a link leads to belongs to somebody else.
-        if path.is_symlink() {
-            return Err(foreign("it is a link"));
+        // What a link leads to belongs to somebody else, and a pipe would be waited for.
+        if let Ok(about) = std::fs::symlink_metadata(path)
+            && !about.is_file()
+        {
+            let what = if about.is_symlink() {
+                "a link"
+            } else {
+                "no file"
+            };
+            return Err(foreign(&format!("it is {what}")));
         }
         let mut options = OpenOptions::new();
         options.create(true).truncate(false).read(true).write(true);

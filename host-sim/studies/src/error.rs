@@ -61,7 +61,9 @@ pub enum StudyError {
     #[error("cannot write to standard output: {0}")]
     #[diagnostic(
         code(wheeleg::output),
-        help("what a study writes into its folder is there; send standard output somewhere else")
+        help(
+            "what was done is done, and what a study writes into its folder is there; send standard output somewhere else"
+        )
     )]
     Stdout(std::io::Error),
 

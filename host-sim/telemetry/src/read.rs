@@ -182,7 +182,10 @@ fn each(
 }
 
 /// Reads once, whatever signals come.
-fn uninterrupted(source: &mut dyn std::io::Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+pub(super) fn uninterrupted(
+    source: &mut dyn std::io::Read,
+    buffer: &mut [u8],
+) -> std::io::Result<usize> {
     loop {
         match source.read(buffer) {
             Err(e) if e.kind() == ErrorKind::Interrupted => {}

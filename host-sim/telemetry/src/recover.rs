@@ -1,15 +1,18 @@
 //! A whole log from one whose writer was killed.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Seek as _};
 use std::path::Path;
 
 use mcap::McapError;
 use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
+use mcap::records::{MessageHeader, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::attachments::attachments;
 use super::log_file::{attach, begins_as_log, opened, options};
+use super::read::uninterrupted;
 use crate::LogError;
 
 /// What [`recover`] made.
@@ -86,26 +89,40 @@ fn copy(
     for file in attachments(from)? {
         attach(&mut log, file)?;
     }
-    let mut recovered = Recovered {
-        messages: 0,
-        last_ns: 0,
-        was_whole: true,
+    let mut copy = Copy {
+        log,
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+        recovered: Recovered {
+            messages: 0,
+            last_ns: 0,
+            was_whole: true,
+        },
     };
-    for message in MessageReader::new_with_options(BufReader::new(source), checked()) {
-        match message {
-            Ok(message) => {
-                log.write(&message)?;
-                recovered.messages += 1;
-                recovered.last_ns = recovered.last_ns.max(message.log_time);
+    let mut source = BufReader::new(source);
+    let mut reader = LinearReader::new_with_options(checked());
+    while let Some(event) = reader.next_event() {
+        match event {
+            Ok(LinearReadEvent::ReadRequest(need)) => {
+                let read = uninterrupted(&mut source, reader.insert(need));
+                reader.notify_read(read.map_err(|e| LogError::read(from, e))?);
+            }
+            Ok(LinearReadEvent::Record { opcode, data }) => {
+                copy.take(opcode, data)?;
                 if stop() {
                     return Ok(None);
                 }
             }
-            Err(McapError::Io(e)) => return Err(LogError::read(from, e)),
             // The place where it breaks off.
-            Err(_) => recovered.was_whole = false,
+            Err(_) => {
+                copy.recovered.was_whole = false;
+                break;
+            }
         }
     }
+    let Copy {
+        mut log, recovered, ..
+    } = copy;
     if recovered.messages == 0 {
         return Err(LogError::Empty { path: from.into() });
     }
@@ -116,6 +133,54 @@ fn copy(
         .map_err(|e| McapError::Io(e.into_error()))?;
     file.sync_all().map_err(McapError::Io)?;
     Ok(Some(recovered))
+}
+
+/// A log as it is written anew.
+struct Copy {
+    log: mcap::Writer<BufWriter<File>>,
+    /// Numbers of schemas and channels there, by those of the old log.
+    schemas: BTreeMap<u16, u16>,
+    channels: BTreeMap<u16, u16>,
+    recovered: Recovered,
+}
+
+impl Copy {
+    /// Takes a record of the old log. A damaged one, such as a picture, costs nothing but itself.
+    fn take(&mut self, opcode: u8, data: &[u8]) -> Result<(), McapError> {
+        match mcap::parse_record(opcode, data) {
+            Ok(Record::Schema { header, data }) => {
+                let id = self.log.add_schema(&header.name, &header.encoding, &data)?;
+                self.schemas.insert(header.id, id);
+            }
+            Ok(Record::Channel(channel)) => {
+                let schema = self.schemas.get(&channel.schema_id).copied();
+                self.recovered.was_whole &= channel.schema_id == 0 || schema.is_some();
+                let id = self.log.add_channel(
+                    schema.unwrap_or(0),
+                    &channel.topic,
+                    &channel.message_encoding,
+                    &channel.metadata,
+                )?;
+                self.channels.insert(channel.id, id);
+            }
+            Ok(Record::Message { header, data }) => {
+                let Some(channel_id) = self.channels.get(&header.channel_id).copied() else {
+                    self.recovered.was_whole = false;
+                    return Ok(());
+                };
+                let header = MessageHeader {
+                    channel_id,
+                    ..header
+                };
+                self.log.write_to_known_channel(&header, &data)?;
+                self.recovered.messages += 1;
+                self.recovered.last_ns = self.recovered.last_ns.max(header.log_time);
+            }
+            Ok(_) => {}
+            Err(_) => self.recovered.was_whole = false,
+        }
+        Ok(())
+    }
 }
 
 /// Messages of a whole log; a log with any defect is an error.

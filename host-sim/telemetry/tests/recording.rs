@@ -202,6 +202,34 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
     }
 }
 
+/// A damaged file in a log, such as the robot's picture, costs nothing but itself.
+#[test]
+fn a_log_with_a_damaged_attachment_keeps_every_message() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let log = LogFile::create(&path("log.mcap")).expect("writable");
+    let log = log.with(Echo).expect("writable");
+    let mut recorder = Recorder::in_memory().with(log);
+    fill(&mut recorder, 10.0);
+    recorder.finish().expect("no I/O error");
+    let bytes = std::fs::read(path("log.mcap")).expect("written");
+    let count = |name: &str| {
+        let read = std::fs::read(path(name)).expect("written");
+        let strict = mcap::MessageStream::new(&read).expect("an MCAP file");
+        strict.inspect(|m| assert!(m.is_ok())).count() as u64
+    };
+    let whole = count("log.mcap");
+    let at = bytes.windows(8).position(|part| part == b"<robot/>");
+    let mut damaged = bytes;
+    damaged[at.expect("it carries a file") + 3] ^= 1;
+    std::fs::write(path("damaged.mcap"), &damaged).expect("written");
+    let recovered = recover(&path("damaged.mcap"), &path("new.mcap"), &|| false);
+    let recovered = recovered.expect("a log").expect("to the end");
+    assert_eq!((recovered.messages, recovered.was_whole), (whole, false));
+    assert_eq!(count("new.mcap"), whole);
+    assert!(attachments(&path("new.mcap")).expect("a log").is_empty());
+}
+
 #[test]
 fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     let folder = tempfile::tempdir().expect("temporary folder");

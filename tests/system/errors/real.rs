@@ -177,6 +177,10 @@ fn robots(folder: &Path, all: &mut Vec<Driven>) {
     ));
     let of_robot = wheeleg_console::ConsoleError::from(fallen());
     all.push(("ConsoleError::Sim", Box::new(of_robot), words()));
+    let no_file = Box::new(builtin::robot("none.toml").expect_err("there is none"));
+    let no_file = wheeleg_console::ConsoleError::from(no_file);
+    let words = vec!["none.toml"];
+    all.push(("ConsoleError::Config", Box::new(no_file), words));
     let (scenario, exploding) = crate::explosion::drives_without_torque();
     let exploded = failure(&scenario, &exploding, &folder.join("exploded"));
     let words = vec![

@@ -7,14 +7,13 @@ mod pairs;
 mod shares;
 mod worst;
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use wheeleg_studies::export::write_new;
+use wheeleg_studies::export::{same_file, write_new};
 
 use crate::columns::Columns;
 use crate::part::PROGRAM;
-use crate::store::PlanFile;
+use crate::store::{PlanFile, opened};
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
@@ -44,7 +43,7 @@ impl Merged {
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
         let failed = |e: &dyn std::fmt::Display| CampaignError::unreadable(path, e);
         let plan = replay::plan_of_table(path)?;
-        let file = File::open(path).map_err(|e| failed(&e))?;
+        let file = opened(path).map_err(|e| failed(&e))?;
         let reader = TableReader::new(file).map_err(|e| failed(&e))?;
         let program = reader.fact(PROGRAM).unwrap_or_default().to_owned();
         let table = reader.read().map_err(|e| failed(&e))?;
@@ -65,14 +64,26 @@ pub struct Report {
     /// Of both.
     pub pairs: Option<Pairs>,
     page: String,
+    /// What it was made of.
+    tables: Vec<PathBuf>,
 }
 
 impl Report {
     /// Writes the page.
     ///
     /// # Errors
-    /// [`CampaignError::Study`] with the path and what the operating system said.
+    /// [`CampaignError::Refused`] if a table stands there, else [`CampaignError::Study`] with the
+    /// path and what the operating system said.
     pub fn write(&self, out: &Path) -> Result<(), CampaignError> {
+        if let Some(table) = self.tables.iter().find(|table| same_file(table, out)) {
+            return Err(CampaignError::refused(
+                format!(
+                    "the page would take the place of the table {}",
+                    table.display()
+                ),
+                "give another file with --out FILE",
+            ));
+        }
         Ok(write_new(out, &self.page)?)
     }
 
@@ -93,6 +104,11 @@ impl Report {
             findings,
             pairs,
             page,
+            tables: [Some(path), against]
+                .into_iter()
+                .flatten()
+                .map(Path::to_owned)
+                .collect(),
         })
     }
 }

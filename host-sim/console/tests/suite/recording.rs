@@ -6,9 +6,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use miette::Diagnostic as _;
 use serde_json::{Value, json};
+use wheeleg_console::ConsoleError;
 use wheeleg_console::client::http;
-use wheeleg_console::replay::{Replayed, replay};
+use wheeleg_console::replay::{Replayed, recorded, replay};
 use wheeleg_telemetry::{Derived, attachments, first_difference, read_derived};
 
 use crate::common::{TestRig, done, refusal};
@@ -17,13 +19,24 @@ fn folder(rig: &TestRig, id: &str) -> PathBuf {
     rig.home.path().join("recordings").join(id)
 }
 
-fn repeated(folder: &Path) -> Replayed {
-    replay(folder, None, &mut |_, _| ControlFlow::Continue(())).expect("a recording")
+fn told(folder: &Path, log: Option<&Path>) -> Result<Replayed, ConsoleError> {
+    replay(
+        recorded(folder)?,
+        log,
+        &mut |_, _| ControlFlow::Continue(()),
+    )
 }
 
+fn repeated(folder: &Path) -> Replayed {
+    told(folder, None).expect("a recording")
+}
+
+/// What is told of it, with the problems of a file.
 fn error(folder: &Path) -> String {
-    let told = replay(folder, None, &mut |_, _| ControlFlow::Continue(()));
-    told.expect_err("no recording").to_string()
+    let told = told(folder, None).expect_err("no recording");
+    let related = told.related().into_iter().flatten();
+    let problems: Vec<String> = related.map(|problem| problem.to_string()).collect();
+    format!("{told} {}", problems.join(" "))
 }
 
 fn copied(folder: &Path) -> tempfile::TempDir {
@@ -63,8 +76,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     let TestRig { server, home, .. } = rig;
     drop(server);
     let log = home.path().join("again.mcap");
-    let told = replay(&folder, Some(&log), &mut |_, _| ControlFlow::Continue(()));
-    let told = told.expect("a recording");
+    let told = told(&folder, Some(&log)).expect("a recording");
     assert!(told.is_same() && !told.cut_short, "{told:?}");
     // One hash per second, and that of the end.
     assert!(told.compared > told.end_ms / 1_000, "{told:?}");
@@ -196,6 +208,8 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
         ),
         ("{\"ms\":99999999999999,\"stop\":1}\n", "line 1: `ms`"),
         ("{\"ms\":1,\"fly\":1}\n", "line 1"),
+        ("{\"ms\":-1,\"stop\":1}\n", "`ms`, a whole number"),
+        ("[]\n", "line 1: it is no input"),
         ("\u{0}\u{1}\n", "line 1"),
         (
             "{\"ms\":1,\"command\":{\"id\":1,\"deadline_us\":9,\"spoken\":{\"cmd\":\"Fly\",\"args\":{}}}}\n",
@@ -223,6 +237,28 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
     fs::remove_file(&inputs).expect("removed");
     assert!(error(folder.path()).contains("inputs.jsonl"));
     let summary = folder.path().join("recording.json");
+    // A time after which nobody waits, and a robot that is none.
+    let sound = fs::read_to_string(&summary).expect("read");
+    fs::write(&inputs, "").expect("written");
+    let mut late: Value = serde_json::from_str(&sound).expect("JSON");
+    late["end_us"] = json!(u64::MAX);
+    fs::write(&summary, late.to_string()).expect("written");
+    let told = error(folder.path());
+    let wanted = [
+        "recording.json",
+        "`end_us` is 18446744073709551615",
+        "0 to 2678400000000",
+    ];
+    assert!(wanted.iter().all(|word| told.contains(word)), "{told}");
+    fs::write(&summary, sound).expect("written");
+    let robot = folder.path().join("robot.toml");
+    let text = fs::read_to_string(&robot).expect("read");
+    fs::write(&robot, format!("{text}\nwings = 2\n")).expect("written");
+    let told = error(folder.path());
+    assert!(
+        told.contains("robot.toml") && told.contains("`wings`"),
+        "{told}"
+    );
     fs::write(&summary, "x".repeat(100_000)).expect("written");
     assert!(error(folder.path()).contains("100000 bytes"));
     fs::write(&summary, "{}").expect("written");

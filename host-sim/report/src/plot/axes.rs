@@ -1,6 +1,8 @@
 //! From values to pixels, and what lines, rasters and maps have in common: frame,
 //! grid, numbers and marks.
 
+use std::collections::BTreeSet;
+
 use super::svg::{Anchor, SMALL, Stroke, Svg};
 use super::{LEFT, Panel, WIDTH, colour};
 
@@ -99,9 +101,8 @@ impl Axes {
 
     /// Marks the panel's times.
     pub(super) fn marks(&self, svg: &mut Svg, marks: &[f64]) {
-        let (x0, x1) = self.x.values;
-        for mark in marks.iter().filter(|m| (x0..=x1).contains(*m)) {
-            self.upright(svg, *mark, Stroke::new(colour::LIMIT, 1));
+        for mark in seen(marks, self.x.values) {
+            self.upright(svg, mark, Stroke::new(colour::LIMIT, 1));
         }
     }
 
@@ -137,6 +138,21 @@ impl Axes {
     }
 }
 
+/// The marks that can be told apart: inside `range`, and the first of each pixel. A run may have
+/// a hundred thousand.
+pub(super) fn seen(marks: &[f64], range: (f64, f64)) -> Vec<f64> {
+    let scale = Scale {
+        values: range,
+        pixels: (0.0, f64::from(WIDTH - 15 - LEFT)),
+    };
+    let (from, to) = range;
+    let inside = marks.iter().copied().filter(|m| (from..=to).contains(m));
+    let mut pixels = BTreeSet::new();
+    inside
+        .filter(|mark| pixels.insert(scale.at(*mark).round() as u32))
+        .collect()
+}
+
 fn tick(v: f64) -> String {
     let rounded = (v * 1e6).round() / 1e6;
     // No minus sign on zero.
@@ -166,6 +182,18 @@ mod tests {
         );
         assert_eq!(ticks((3.31, 3.37), 3), ["3.32", "3.34", "3.36"]);
         assert_eq!(ticks((1e-7, 2.0), 3), ["1", "2"]);
+    }
+
+    #[test]
+    fn marks_are_drawn_once_a_pixel_and_few_are_all_kept() {
+        let few = [-1.0, 0.0, 2.5, 2.6, 10.0, 11.0];
+        assert_eq!(seen(&few, (0.0, 10.0)), [0.0, 2.5, 2.6, 10.0]);
+        let many: Vec<f64> = (0..100_000).map(|k| f64::from(k) * 1e-4).collect();
+        let drawn = seen(&many, (0.0, 10.0));
+        assert!((800..=900).contains(&drawn.len()), "{}", drawn.len());
+        let gaps = drawn.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(gaps.fold(0.0, f64::max) < 0.013);
+        assert_eq!(seen(&many, (1.0, 1.0)), [1.0]);
     }
 
     #[test]

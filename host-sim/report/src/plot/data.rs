@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::axes::seen;
 use super::simplify::simplified;
 use super::{Content, Panel, Series};
 
@@ -23,7 +24,7 @@ pub(crate) struct PanelData<'a> {
     y: (f64, f64),
     series: Vec<SeriesData<'a>>,
     limits: &'a [f64],
-    marks: &'a [f64],
+    marks: Vec<f64>,
     height: u32,
 }
 
@@ -56,7 +57,7 @@ impl<'a> PanelData<'a> {
             y: lines.y_range,
             series: series.collect(),
             limits: &lines.limits,
-            marks: &panel.marks,
+            marks: seen(&panel.marks, panel.x_range),
             height: panel.height,
         })
     }

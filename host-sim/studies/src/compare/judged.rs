@@ -2,14 +2,14 @@
 //! one version against another, pair by pair.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use wheeleg_config::builtin::text_of;
 use wheeleg_report::stats;
 
-use super::{Comparison, Row, Variation};
+use super::{Comparison, Options, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
 
@@ -83,6 +83,7 @@ pub type Before = BTreeMap<String, bool>;
 
 /// The part of a row that says whether its bars are kept, as it is read again.
 #[derive(Deserialize)]
+#[serde(expecting = "a case")]
 struct Told {
     id: String,
     variation: String,
@@ -93,6 +94,7 @@ struct Told {
 }
 
 #[derive(Deserialize)]
+#[serde(expecting = "an object with `schema` and `cases`")]
 struct ToldCases {
     schema: String,
     cases: Vec<Told>,
@@ -120,20 +122,31 @@ impl Row {
     }
 }
 
-/// Reads which combinations another version kept, from its `summary.json`.
+/// Reads which combinations another version kept, from its `summary.json`; `None` if nothing is to
+/// be compared with one.
 ///
 /// # Errors
-/// [`StudyError`] if the file cannot be read, is no summary of a comparison or has no combination.
-pub(super) fn read(path: &Path) -> Result<Before, StudyError> {
+/// [`StudyError`] if the file cannot be read, is no summary of a comparison or has none of the
+/// combinations that are to be played.
+pub(super) fn read(options: &Options) -> Result<Option<Before>, StudyError> {
+    let against = options.against.as_deref();
+    against.map(|path| read_from(path, options)).transpose()
+}
+
+fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
     let help = "give the summary.json that `wheeleg compare --root N` of the other version wrote";
     let named = |what: String| StudyError::refused(format!("`{}` {what}", path.display()), help);
-    let text = fs::read_to_string(path).map_err(|e| named(format!("cannot be read: {e}")))?;
+    let text = text_of(path).map_err(|e| named(format!("cannot be read: {e}")))?;
     let told: ToldCases = serde_json::from_str(&text)
         .map_err(|e| named(format!("is no summary of a comparison: {e}")))?;
     if !told.schema.starts_with("wheeleg.compare/") {
         return Err(named(format!("is a `{}`, no comparison", told.schema)));
     }
-    let drawn = |row: &Told| matches!(row.variation.parse(), Ok(Variation::Drawn(_)));
+    let (root, combinations) = (options.root, options.combinations);
+    let drawn = |row: &Told| match row.variation.parse() {
+        Ok(Variation::Drawn(number)) => number.wrapping_sub(root) < combinations,
+        _ => false,
+    };
     let before: Before = told
         .cases
         .into_iter()
@@ -149,7 +162,9 @@ pub(super) fn read(path: &Path) -> Result<Before, StudyError> {
         })
         .collect();
     if before.is_empty() {
-        return Err(named("has no random combinations".to_owned()));
+        let what =
+            format!("has none of the {combinations} random combinations from --root {root} on");
+        return Err(named(what));
     }
     Ok(before)
 }

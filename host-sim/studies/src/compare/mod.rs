@@ -141,7 +141,7 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
 /// [`StudyError`] if an axis cannot be read or used, or something not be drawn or written.
 pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
     let configs = configs(options)?;
-    let before = options.against.as_deref().map(judged::read).transpose()?;
+    let before = judged::read(options)?;
     let job = Job::begin("compare", settings)?;
     let comparison = Comparison::play(options, configs, before, &job.progress)?;
     Ok(comparison.write(job))
@@ -169,7 +169,7 @@ impl Comparison {
     /// # Errors
     /// [`StudyError`] if an axis cannot be read or used.
     pub fn run(options: &Options, progress: &Progress) -> Result<Self, StudyError> {
-        let before = options.against.as_deref().map(judged::read).transpose()?;
+        let before = judged::read(options)?;
         Self::play(options, configs(options)?, before, progress)
     }
 

@@ -20,6 +20,13 @@ fn free_place(path: &Path) -> PathBuf {
         .unwrap_or_else(|| named(".previous"))
 }
 
+/// Whether two paths lead to one file that there is.
+#[must_use]
+pub fn same_file(one: &Path, other: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(one).is_some_and(|one| real(other) == Some(one))
+}
+
 /// Writes a file. One of the same name that says something else is set aside first, as the results
 /// of a run are; a missing folder is created.
 ///

@@ -20,7 +20,7 @@ use self::content::{Content, Span};
 pub use self::plain::plain;
 use self::signals::Signal;
 use crate::StudyError;
-use crate::export::write_new;
+use crate::export::{same_file, write_new};
 use crate::study::Progress;
 
 /// What to look at.
@@ -112,7 +112,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         ));
     }
     // The page of a log is made anew; somebody's own file is kept.
-    if options.out.is_none() {
+    if options.out.is_none() && page::is_ours(&page) {
         let _ = std::fs::remove_file(&page);
     }
     write_new(&page, &text)?;
@@ -124,12 +124,6 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         verdict: page::verdict(&logs, &differences),
         broken_off: broken_off.map(|(path, _)| path.clone()).collect(),
     }))
-}
-
-/// Whether two paths lead to one file.
-fn same_file(one: &Path, other: &Path) -> bool {
-    let real = |path: &Path| path.canonicalize().ok();
-    real(one).is_some_and(|one| real(other) == Some(one))
 }
 
 /// The part that is looked at.

@@ -1,5 +1,9 @@
 //! The page of one log, or of two.
 
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
 use serde::Serialize;
 use wheeleg_config::Drawing;
 use wheeleg_report::plot::{Content as Drawn, Figure, Panel, line};
@@ -16,6 +20,17 @@ const TIME: &str = "time of the log [s]";
 const MARKS: usize = 20;
 /// Share of an axis that stays free above and below.
 const MARGIN: f64 = 0.05;
+
+/// By this a page of a log is known, near its begin.
+const OURS: &str = "<meta name=\"generator\" content=\"wheeleg view\">";
+
+/// Whether a file is such a page, which is made anew.
+pub(super) fn is_ours(page: &Path) -> bool {
+    let mut begin = [0; 256];
+    let read = File::open(page).and_then(|mut file| file.read(&mut begin));
+    let begin = begin.get(..read.unwrap_or(0)).unwrap_or_default();
+    String::from_utf8_lossy(begin).contains(OURS)
+}
 
 #[derive(Serialize)]
 struct Line {

@@ -8,7 +8,7 @@ use clap::Args;
 use super::print;
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
-use wheeleg_config::faults::FaultSpec;
+use wheeleg_config::faults::{FaultSpec, KINDS};
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
 use wheeleg_sim as sil;
@@ -22,7 +22,7 @@ pub(super) struct CommissionArgs {
     #[arg(default_value = "wheeleg-2003")]
     robot: String,
     /// Injects a fault, as for `wheeleg run`; only those that a board is built with.
-    #[arg(long = "fault", value_name = "FAULT")]
+    #[arg(long = "fault", value_name = "FAULT", value_parser = built_in)]
     faults: Vec<FaultSpec>,
     /// Where the nodes run, as for `wheeleg run`.
     #[arg(long, value_name = "KIND", default_value = "sil")]
@@ -30,6 +30,21 @@ pub(super) struct CommissionArgs {
     /// Where one node runs, instead, as for `wheeleg run`.
     #[arg(long = "node", value_name = "NODE=KIND")]
     node: Vec<NodeChoice>,
+}
+
+/// A fault that a board is built with: no other is there while the boards are asked who they are.
+fn built_in(text: &str) -> Result<FaultSpec, String> {
+    let fault: FaultSpec = text.parse().map_err(|e| format!("{e}"))?;
+    if fault.kind.is_built_in() {
+        return Ok(fault);
+    }
+    let known = KINDS.iter().filter(|info| info.kind.is_built_in());
+    let known: Vec<&str> = known.map(|info| info.name).collect();
+    Err(format!(
+        "`{}` begins later than this command asks; allowed: {}",
+        fault.kind.name(),
+        known.join(", ")
+    ))
 }
 
 /// Powers the robot up and prints the section for its file.

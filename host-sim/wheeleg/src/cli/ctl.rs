@@ -1,7 +1,7 @@
 //! `wheeleg ctl`: the console for the command line.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{ErrorKind, Write as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -12,6 +12,7 @@ use wheeleg_console::keys::{self, CONTROL_FILE, VIEW_FILE};
 use wheeleg_console::request::FRAME_MAX;
 use wheeleg_console::{ADDRESS, Fingerprint, Key, SPEED};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::view::plain;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
 use super::exit::{self, LOST, REFUSED};
@@ -163,6 +164,10 @@ fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
         Value::Null => "none".to_owned(),
         other => other.to_string(),
     };
+    let pace = match &state["pace"]["speed"] {
+        Value::Null => "max".to_owned(),
+        speed => speed.to_string(),
+    };
     let mut text = String::new();
     let _ = writeln!(
         text,
@@ -175,7 +180,7 @@ fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
         state["step"],
         word(&state["hold"]),
         word(&state["control"]["holder"]),
-        state["pace"]["speed"],
+        pace,
         state["pace"]["paused"],
     );
     if let Value::Object(recording) = &state["recording"] {
@@ -226,7 +231,7 @@ fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
 fn stop_by_session(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
     let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
     let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
-    Ok(print_outcome(args, &client.outcome(n)))
+    print_outcome(args, &client.outcome(n))
 }
 
 fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
@@ -235,7 +240,7 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
         let n = client.send(frame).map_err(refused)?;
         if let end @ (Outcome::Refused { .. } | Outcome::Lost) = client.outcome(n) {
-            return Ok(print_outcome(args, &end));
+            return print_outcome(args, &end);
         }
     }
     loop {
@@ -266,9 +271,11 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
             _ => continue,
         };
         let mut out = std::io::stdout().lock();
-        if writeln!(out, "{line}").and_then(|()| out.flush()).is_err() {
+        match writeln!(out, "{line}").and_then(|()| out.flush()) {
+            Ok(()) => {}
             // The reader has gone away (`| head`).
-            return Ok(ExitCode::SUCCESS);
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => return Ok(ExitCode::SUCCESS),
+            Err(e) => return Err(StudyError::Stdout(e)),
         }
     }
 }
@@ -363,7 +370,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
     };
     let taken = give("TakeControl", &json!({}))?;
     if taken != Outcome::Done {
-        return Ok(print_outcome(args, &taken));
+        return print_outcome(args, &taken);
     }
     let end = give(name, &arguments)?;
     if end != Outcome::Lost {
@@ -372,7 +379,7 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
             tell("the control is not released: the robot will hold");
         }
     }
-    Ok(print_outcome(args, &end))
+    print_outcome(args, &end)
 }
 
 /// Bytes of a frame beside the command in it.
@@ -398,11 +405,11 @@ fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, Study
     let end = client
         .carry_out(name, arguments, VALID_MS)
         .map_err(refused)?;
-    Ok(print_outcome(args, &end))
+    print_outcome(args, &end)
 }
 
 /// Prints how a request ended; its exit code.
-fn print_outcome(args: &CtlArgs, end: &Outcome) -> ExitCode {
+fn print_outcome(args: &CtlArgs, end: &Outcome) -> Result<ExitCode, StudyError> {
     let (status, code, reason, text) = match end {
         Outcome::Done => ("done", 0, "", ""),
         Outcome::Refused { reason, text } => ("refused", REFUSED, reason.as_str(), text.as_str()),
@@ -411,13 +418,14 @@ fn print_outcome(args: &CtlArgs, end: &Outcome) -> ExitCode {
     };
     if args.json {
         let end = json!({ "status": status, "reason": reason, "text": text });
-        let _ = print(&format!("{end}\n"));
+        print(&format!("{end}\n"))?;
     } else if text.is_empty() {
-        let _ = print(&format!("{status}\n"));
+        print(&format!("{status}\n"))?;
     } else {
-        tell(&format!("{status}: {text}"));
+        // It may quote what was given.
+        tell(&plain(&format!("{status}: {text}")));
     }
-    ExitCode::from(code)
+    Ok(ExitCode::from(code))
 }
 
 #[cfg(test)]

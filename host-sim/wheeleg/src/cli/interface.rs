@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use clap::Args;
+use wheeleg_config::word;
 use wheeleg_protocol::{SCHEMA_HASH, VERSION};
 
 use super::print;
@@ -72,8 +73,12 @@ fn parse(given: &str) -> Result<u64, StudyError> {
     let hash = u64::from_str_radix(digits, 16).ok();
     // `from_str_radix` takes a sign, too.
     let whole = digits.len() == 16 && digits.bytes().all(|b| b.is_ascii_hexdigit());
-    hash.filter(|_| whole)
-        .ok_or_else(|| refused(format!("`{given}` is no hash: 16 hexadecimal digits")))
+    hash.filter(|_| whole).ok_or_else(|| {
+        refused(format!(
+            "`{}` is no hash: 16 hexadecimal digits",
+            word(given)
+        ))
+    })
 }
 
 /// An error that names what is known.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use serde_json::json;
-use wheeleg_console::replay::{Replayed, replay};
+use wheeleg_console::replay::{Replayed, recorded, replay};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Progress;
@@ -56,10 +56,14 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     let progress = Progress::new("replay", stop.clone());
     if let Some(log) = &args.log {
         outside(log, &args.folder)?;
+    }
+    let recorded = recorded(&args.folder).map_err(refused)?;
+    // What cannot be repeated costs no earlier log.
+    if let Some(log) = &args.log {
         make_room(log)?;
     }
     let mut begun = false;
-    let replayed = replay(&args.folder, args.log.as_deref(), &mut |ms, of_ms| {
+    let replayed = replay(recorded, args.log.as_deref(), &mut |ms, of_ms| {
         if !begun {
             begun = true;
             progress.begin(format!("{:.0} s", of_ms as f64 * 1e-3), of_ms);

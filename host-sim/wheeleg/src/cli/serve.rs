@@ -225,6 +225,7 @@ fn tell_cut_short(failure: Option<String>, told: &mut Option<String>) {
 pub(super) fn refused(error: ConsoleError) -> StudyError {
     match error {
         ConsoleError::Sim(error) => StudyError::Sim(error),
+        ConsoleError::Config(error) => StudyError::Config(error),
         other => StudyError::Console(other),
     }
 }

@@ -1,6 +1,6 @@
 //! What is said of a command line that cannot be read.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Parser};
@@ -13,10 +13,15 @@ const COMMANDS: usize = 3;
 /// scenario or an axis of that name.
 ///
 /// # Errors
-/// As [`Parser::try_parse_from`].
+/// As [`Parser::try_parse_from`]; also if a word is longer than any path.
 pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C, clap::Error> {
     let line: Vec<OsString> = line.collect();
-    C::try_parse_from(line).map_err(|mut wrong| {
+    let too_long = line.iter().find(|word| word.len() > LONGEST);
+    let parsed = C::try_parse_from(&line).and_then(|parsed| match too_long {
+        Some(word) => Err(C::command().error(ErrorKind::ValueValidation, refusal(word))),
+        None => Ok(parsed),
+    });
+    parsed.map_err(|mut wrong| {
         let option = match wrong.get(ContextKind::InvalidArg) {
             Some(ContextValue::String(text)) => text.clone(),
             _ => return wrong,
@@ -37,6 +42,18 @@ pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C
         }
         wrong
     })
+}
+
+/// Longest word of a command line, bytes: no path, and no name, is longer.
+const LONGEST: usize = 4096;
+
+/// What is said of a longer one.
+fn refusal(word: &OsStr) -> String {
+    format!(
+        "an argument has {} bytes: allowed are {LONGEST}. It begins with `{}`",
+        word.len(),
+        wheeleg_config::word(&word.to_string_lossy())
+    )
 }
 
 /// Longest line of a refusal, characters.

@@ -10,6 +10,7 @@ mod types;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use mcap::records::MessageHeader;
@@ -93,6 +94,8 @@ pub fn export(log: &Path, folder: &Path, progress: &Progress) -> Result<Option<B
     let filling = Filling::begin(folder)?;
     let files = attachments(log)?;
     let Some(urdf) = files.into_iter().find(|file| file.name == "robot.urdf") else {
+        // Of a log that breaks off at once, that is what is told.
+        wheeleg_telemetry::read(log, &mut |_| ControlFlow::Break(()))?;
         return Err(without(log, "the robot's URDF"));
     };
     let urdf = String::from_utf8_lossy(&urdf.data).into_owned();
@@ -105,6 +108,7 @@ pub fn export(log: &Path, folder: &Path, progress: &Progress) -> Result<Option<B
         return Ok(None);
     }
     let Some((first_ns, last_ns)) = bag.times else {
+        wheeleg_telemetry::read(log, &mut |_| ControlFlow::Break(()))?;
         return Err(without(log, "the channel /tf"));
     };
     let counts = bag.counts;

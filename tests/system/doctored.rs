@@ -1,0 +1,357 @@
+//! Files of this program that somebody changed, of another version, or in each other's place, and
+//! words that are longer than any: refused at once, by name, and nothing is lost.
+
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+use tempfile::TempDir;
+
+use crate::program;
+
+/// Longest refusal that somebody reads, bytes.
+const READ: usize = 3_000;
+
+/// A folder in which the program is run.
+struct Place(TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("written");
+    }
+
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).expect("read")
+    }
+
+    /// Runs the program; exit code and what it says, without line breaks of a terminal.
+    fn said(&self, arguments: &[&str]) -> (Option<i32>, String) {
+        let mut command = assert_cmd::Command::new(program::path());
+        command.current_dir(self.0.path());
+        command.env("NO_COLOR", "1").args(arguments);
+        let told = command.timeout(Duration::from_secs(60));
+        let told = told.output().expect("start");
+        let text = String::from_utf8_lossy(&[told.stderr, told.stdout].concat()).into_owned();
+        let text = text.replace("\n  │ ", " ").replace("\n        ", " ");
+        (told.status.code(), text)
+    }
+
+    /// What is said of something that is refused with this code.
+    fn refusal(&self, arguments: &[&str], code: i32, words: &[&str]) {
+        let (found, text) = self.said(arguments);
+        assert_eq!(found, Some(code), "{arguments:?}: {text}");
+        for word in words {
+            assert!(text.contains(word), "{arguments:?}: no `{word}` in {text}");
+        }
+        assert!(text.len() < READ, "{arguments:?}: {} bytes", text.len());
+    }
+
+    /// A campaign of six cases that are given up after `limit`, and its table.
+    fn campaign(&self, limit: &str) {
+        let plan = format!(
+            "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nsamples = 6\n[base]\nscenario = \"stand\"\n"
+        );
+        self.write("plan.toml", &plan);
+        for arguments in [
+            &["campaign", "run", "plan.toml", "--out", "six"][..],
+            &["campaign", "merge", "six", "--out", "six.parquet"],
+        ] {
+            let (code, text) = self.said(arguments);
+            assert_eq!(code, Some(0), "{text}");
+        }
+    }
+}
+
+/// A `plan.json` that claims more or fewer cases than its plan has is answered by every command that
+/// reads it: none counts to the end of all numbers, and none says that nothing is missing.
+#[test]
+fn a_folder_that_claims_other_cases_than_its_plan_has_is_refused() {
+    let place = Place::new();
+    place.campaign("0.05 s");
+    let sound = place.text("six/plan.json");
+    for cases in ["0", "7", "18446744073709551615"] {
+        let doctored = sound.replace("\"cases\": 6", &format!("\"cases\": {cases}"));
+        assert_ne!(doctored, sound);
+        place.write("six/plan.json", &doctored);
+        let claimed = format!("`cases` is {cases}, allowed: 6");
+        for arguments in [
+            &["campaign", "status", "six"][..],
+            &["campaign", "merge", "six", "--out", "other.parquet"],
+            &[
+                "campaign",
+                "merge",
+                "six",
+                "--partial",
+                "--out",
+                "other.parquet",
+            ],
+            &["campaign", "replay", "six", "0", "--out", "again"],
+            &["campaign", "run", "six/plan.json", "--out", "six"],
+            &["campaign", "run", "six/plan.json", "--list"],
+        ] {
+            place.refusal(arguments, 2, &["six/plan.json", &claimed]);
+        }
+    }
+    assert!(!place.path("other.parquet").exists() && !place.path("again").exists());
+    // A pipe that nobody writes to, in the place of each file that a command reads.
+    #[cfg(target_os = "linux")]
+    for (pipe, arguments) in [
+        ("six/plan.json", &["campaign", "status", "six"][..]),
+        ("pipe", &["campaign", "report", "pipe"]),
+        ("pipe", &["campaign", "replay", "pipe", "0"]),
+    ] {
+        let _ = fs::remove_file(place.path(pipe));
+        let made = Command::new("mkfifo").arg(place.path(pipe)).status();
+        assert!(made.expect("mkfifo").success());
+        place.refusal(arguments, 2, &[pipe, "not a file"]);
+        fs::remove_file(place.path(pipe)).expect("removed");
+    }
+    place.write("six/plan.json", &sound);
+    assert_eq!(place.said(&["campaign", "status", "six"]).0, Some(0));
+}
+
+/// A case that was given up at the limit of its plan has a log that ends there; the full run that a
+/// replay makes goes on, and is no other case for that.
+#[test]
+fn a_case_that_was_given_up_is_not_told_to_differ() {
+    let place = Place::new();
+    place.campaign("0.05 s");
+    let (code, text) = place.said(&["campaign", "replay", "six", "0", "--out", "again"]);
+    assert_eq!(code, Some(0), "{text}");
+    for line in [
+        "status  limit",
+        "row     the same to the bit",
+        "log     not compared",
+    ] {
+        assert!(text.contains(line), "{text}");
+    }
+    assert!(place.path("again/report.html").exists());
+    // One that was not has the same log.
+    let whole = Place::new();
+    whole.campaign("600 s");
+    let (code, text) = whole.said(&["campaign", "replay", "six.parquet", "0", "--out", "again"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("log     the same to the bit"), "{text}");
+}
+
+#[test]
+fn tables_in_each_others_place_are_told_in_few_words() {
+    let place = Place::new();
+    place.campaign("0.05 s");
+    // The page in the place of the table it is made of.
+    let table = fs::read(place.path("six.parquet")).expect("a table");
+    let page = ["campaign", "report", "six.parquet", "--out", "six.parquet"];
+    place.refusal(
+        &page,
+        2,
+        &["take the place of the table six.parquet", "--out FILE"],
+    );
+    assert_eq!(fs::read(place.path("six.parquet")).expect("kept"), table);
+    assert!(!place.path("six.parquet.previous").exists());
+    // A part in the place of a table, and a table in the place of a part.
+    let part = "six/parts/000000.parquet";
+    place.refusal(&["campaign", "report", part], 2, &[part, "it has no plan"]);
+    fs::copy(place.path("six.parquet"), place.path(part)).expect("copied");
+    let merge = ["campaign", "merge", "six", "--out", "other.parquet"];
+    place.refusal(&merge, 3, &[part, "wheeleg.plan", "…", "computes them"]);
+    let (code, text) = place.said(&["campaign", "status", "six"]);
+    assert!(code == Some(3) && text.len() < READ, "{code:?} {text}");
+    // A table of another kind.
+    fs::create_dir(place.path("run")).expect("created");
+    let (code, text) = place.said(&["run", "estop", "--out", "run"]);
+    assert_eq!(code, Some(0), "{text}");
+    let (code, text) = place.said(&["export", "parquet", "run", "--out", "log"]);
+    assert_eq!(code, Some(0), "{text}");
+    let other = ["campaign", "report", "log/body.parquet"];
+    place.refusal(&other, 2, &["log/body.parquet", "no table of a campaign"]);
+}
+
+/// What another version kept is compared with what is played: a file of other combinations, or one
+/// without an end, is refused before anything is.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
+    let place = Place::new();
+    let id = "bench-vq110u/pwm-p/step-100/drawn=7/1";
+    let case = format!("{{\"id\":\"{id}\",\"variation\":\"drawn=7\"}}");
+    let summary = |cases: &str| format!("{{\"schema\":\"wheeleg.compare/1\",\"cases\":[{cases}]}}");
+    place.write("other.json", &summary(&case));
+    place.write("none.json", &summary(""));
+    place.write("list.json", "[]");
+    let against = |file: &str, words: &[&str]| {
+        let arguments = [
+            "compare",
+            "--against",
+            file,
+            "--root",
+            "8",
+            "--combinations",
+            "3",
+            "--out",
+            "out",
+        ];
+        place.refusal(&arguments, 2, words);
+        assert!(!place.path("out").exists(), "{file}");
+    };
+    let none = "none of the 3 random combinations from --root 8 on";
+    against("other.json", &["other.json", none]);
+    against("none.json", &["none.json", none]);
+    against("list.json", &["list.json", "`schema` and `cases`"]);
+    against("/dev/zero", &["/dev/zero", "more than 64 MiB"]);
+}
+
+/// A page beside a log may be somebody's own; that of an earlier `view` is made anew.
+#[test]
+fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
+    let place = Place::new();
+    let (code, text) = place.said(&["run", "estop", "--out", "run"]);
+    assert_eq!(code, Some(0), "{text}");
+    fs::copy(place.path("run/log.mcap"), place.path("notes.mcap")).expect("copied");
+    place.write("notes.html", "mine");
+    for _ in 0..2 {
+        let (code, text) = place.said(&["view", "notes.mcap"]);
+        assert_eq!(code, Some(0), "{text}");
+        assert!(place.text("notes.html").contains("<!doctype html>"));
+    }
+    let (code, text) = place.said(&["view", "notes.mcap", "--to", "1"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(place.text("notes.html.previous"), "mine");
+    assert!(!place.path("notes.html.previous-2").exists());
+    // A log without a message is told as such by every command, not as one of another version.
+    let log = fs::read(place.path("notes.mcap")).expect("a log");
+    fs::write(place.path("head.mcap"), &log[..300]).expect("written");
+    for command in [
+        &["view"][..],
+        &["log", "recover"],
+        &["export", "parquet"],
+        &["export", "ros2"],
+    ] {
+        let arguments = [command, &["head.mcap", "--out", "new"]].concat();
+        place.refusal(&arguments, 2, &["head.mcap", "no message"]);
+        assert!(!place.path("new").exists(), "{command:?}");
+    }
+    // A replay that is refused costs no earlier log.
+    place.refusal(
+        &["replay", "run", "--log", "notes.mcap"],
+        2,
+        &["run/recording.json"],
+    );
+    assert!(!place.path("notes.mcap.previous").exists());
+    assert_eq!(fs::read(place.path("notes.mcap")).expect("kept"), log);
+}
+
+/// Whatever is given, of a word that is longer than any path the begin is told.
+#[test]
+fn words_that_are_longer_than_any_are_told_in_short() {
+    let place = Place::new();
+    let long = "a".repeat(20_000);
+    for arguments in [
+        &["interface", "LONG"][..],
+        &["view", "LONG"],
+        &["view", "log.mcap", "--signal", "LONG"],
+        &["log", "recover", "LONG"],
+        &["replay", "LONG"],
+        &["export", "parquet", "LONG"],
+        &["export", "urdf", "--out", "LONG"],
+        &["campaign", "status", "LONG"],
+        &["campaign", "replay", "six", "LONG"],
+        &["campaign", "report", "LONG"],
+        &["check", "vectors", "LONG"],
+        &["identify", "LONG", "--axis", "bench-vq110u"],
+        &["compare", "--against", "LONG", "--root", "1"],
+        &["run", "stand", "--out", "LONG"],
+        &["run", "stand", "--law", "LONG"],
+        &["figures", "--out", "LONG"],
+        &["delay", "--robot", "LONG"],
+        &["ctl", "--key", "LONG", "status"],
+    ] {
+        let given: Vec<&str> = arguments
+            .iter()
+            .map(|word| if *word == "LONG" { long.as_str() } else { word })
+            .collect();
+        place.refusal(&given, 2, &["aaaa"]);
+    }
+    let board = ["commission", "--fault", "pot-open:joint3@1s"];
+    place.refusal(&board, 2, &["`pot-open` begins later", "other-interface"]);
+}
+
+/// Twenty thousand events in a second are a page that a browser opens: marks that cannot be told
+/// apart are drawn once.
+#[test]
+fn a_run_with_very_many_events_has_a_page_that_opens() {
+    let place = Place::new();
+    let mut scenario = String::from(
+        "name = \"many\"\ndescription = \"\"\nrobot = \"wheeleg-2003\"\nduration = \"2 s\"\nseed = 1\n\
+         targets = \"none\"\n[motion]\nkind = \"stand\"\n",
+    );
+    for k in 0..20_000 {
+        let at = 0.5 + f64::from(k) * 5e-5;
+        scenario += &format!("[[events]]\nat = \"{at:.6} s\"\naction = \"e-stop\"\n");
+    }
+    place.write("many.toml", &scenario);
+    let (code, text) = place.said(&["run", "many.toml", "--out", "many"]);
+    assert_eq!(code, Some(0), "{text}");
+    let (code, text) = place.said(&["view", "many"]);
+    assert_eq!(code, Some(0), "{text}");
+    let size = |name: &str| fs::metadata(place.path(name)).expect("there").len();
+    for page in ["many/report.html", "many/log.html"] {
+        assert!(
+            (100_000..8_000_000).contains(&size(page)),
+            "{page}: {}",
+            size(page)
+        );
+    }
+    let figures = fs::read_dir(place.path("many/figures")).expect("figures");
+    for figure in figures.flatten() {
+        let bytes = figure.metadata().expect("there").len();
+        assert!(bytes < 1_000_000, "{}: {bytes}", figure.path().display());
+    }
+}
+
+/// What is read as it comes says that standard output is full, and is done without a word where
+/// nobody reads on.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_is_told_by_every_list() {
+    for arguments in [
+        &["commands"][..],
+        &["commands", "--json"],
+        &["channels"],
+        &["interface"],
+        &["params"],
+        &["faults", "rows"],
+        &["export", "urdf"],
+        &["export", "layout"],
+        &["commission"],
+    ] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full");
+        let output = Command::new(program::path())
+            .args(arguments)
+            .stdout(full.expect("a device"))
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains("standard output"), "{arguments:?}: {said}");
+        let shell = format!(
+            "\"$0\" {} | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}",
+            arguments.join(" ")
+        );
+        let output = Command::new("bash")
+            .args(["-c", &shell])
+            .arg(program::path())
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
+        assert!(said.is_empty(), "{arguments:?}: {said}");
+    }
+}
