@@ -355,3 +355,65 @@ fn a_full_standard_output_is_told_by_every_list() {
         assert!(said.is_empty(), "{arguments:?}: {said}");
     }
 }
+
+/// A server that answers every connection so, byte by byte, with a pause after each.
+fn server(answer: &'static [u8], pause: Duration) -> String {
+    use std::io::{Read as _, Write as _};
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            std::thread::spawn(move || {
+                let mut stream = stream;
+                let _ = stream.read(&mut [0; 4096]);
+                for byte in answer {
+                    if stream.write_all(&[*byte]).is_err() {
+                        return;
+                    }
+                    std::thread::sleep(pause);
+                }
+                std::thread::sleep(Duration::from_secs(30));
+            });
+        }
+    });
+    address
+}
+
+/// Who stops a robot is told that nobody confirms, whatever answers in its place: nothing, something
+/// else, or something that does not end.
+#[cfg(unix)]
+#[test]
+fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let place = Place::new();
+    place.write("key", &"7".repeat(64));
+    let mode = fs::Permissions::from_mode(0o600);
+    fs::set_permissions(place.path("key"), mode).expect("for its owner");
+    let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let nobody = free.local_addr().expect("an address").to_string();
+    drop(free);
+    let none = Duration::ZERO;
+    let drip = Duration::from_millis(300);
+    let page = b"HTTP/1.1 200 OK\r\nContent-Length: 4000\r\n\r\n{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{";
+    for (address, words) in [
+        (nobody, "refused"),
+        (server(b"", none), "no answer within 3 s"),
+        (server(page, none), "no answer within 3 s"),
+        (server(page, drip), "no answer within 3 s"),
+    ] {
+        let ctl = ["ctl", "--url", &address, "--key", "key"];
+        let stop = [&ctl[..], &["stop"]].concat();
+        place.refusal(&stop, 3, &["NOT CONFIRMED: CUT THE AIR", words]);
+        let status = [&ctl[..], &["status"]].concat();
+        place.refusal(&status, 2, &[&address, words]);
+    }
+    // Over a session, too, another server is told as one.
+    for answer in [&b"\x00\xff\x00\xff\r\n\r\n"[..], page] {
+        let address = server(answer, none);
+        let ctl = ["ctl", "--url", &address, "--key", "key", "pause"];
+        place.refusal(&ctl, 2, &[&address, "no console of Wheeleg"]);
+    }
+    let silent = server(b"", none);
+    let ctl = ["ctl", "--url", &silent, "--key", "key", "pause"];
+    place.refusal(&ctl, 2, &[&silent, "no answer within 3 s"]);
+}

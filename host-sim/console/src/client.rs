@@ -1,176 +1,31 @@
 //! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
 
-use std::io::{ErrorKind, Read, Write};
-use std::net::{IpAddr, Ipv6Addr, TcpStream, ToSocketAddrs as _};
+mod url;
+
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::time::{Duration, Instant};
 
-use rustls::pki_types::ServerName;
-use rustls::{ClientConnection, StreamOwned};
 use serde_json::{Value, json};
 use tungstenite::client::ClientRequestBuilder;
+use tungstenite::handshake::HandshakeError;
 use tungstenite::http::Uri;
 use tungstenite::{Message, WebSocket};
 
+use self::url::{PATIENCE, Stream};
+pub use self::url::Url;
 use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
 use crate::hex;
 use crate::mac::{Key, Transcript};
-use crate::tls::{self, Fingerprint};
 
-/// Time for a connection, and for an answer over HTTP.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Largest answer over HTTP, bytes.
+const LARGEST_ANSWER: usize = 1 << 20;
+/// What is said of another server.
+const NO_CONSOLE: &str = "this is no console of Wheeleg";
 /// How often the control is kept by a beat.
 const BEAT: Duration = Duration::from_millis(50);
 /// How long a look for a message lasts.
 const LOOK: Duration = Duration::from_millis(10);
-
-/// Address of a server, as people write it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Url {
-    /// Name or address and port.
-    host: String,
-    /// Certificate of the server; without one it is reached by plain HTTP.
-    certificate: Option<Fingerprint>,
-    /// It is to be reached with TLS.
-    tls: bool,
-}
-
-impl Url {
-    /// Reads `http://HOST:PORT`, `https://HOST:PORT`, the same with `ws` and `wss`, or `HOST:PORT`.
-    ///
-    /// # Errors
-    /// What is wrong with it.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let plain = ["http://", "ws://"]
-            .iter()
-            .find_map(|s| text.strip_prefix(s));
-        let tls = ["https://", "wss://"]
-            .iter()
-            .find_map(|s| text.strip_prefix(s));
-        let host = plain.or(tls).unwrap_or(text).trim_end_matches('/');
-        let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
-        let name = host.rsplit_once(':').map_or("", |(name, _)| name);
-        // The numbers of IPv6 stand in brackets.
-        let whole = match name.strip_prefix('[') {
-            Some(name) => name
-                .strip_suffix(']')
-                .is_some_and(|a| a.parse::<Ipv6Addr>().is_ok()),
-            None => !name.is_empty() && !name.contains([':', ']', '@']),
-        };
-        if !matches!(port, Some(Ok(_))) || host.contains('/') || !whole {
-            return Err(
-                "an address of a server is http://HOST:PORT or https://HOST:PORT".to_owned(),
-            );
-        }
-        Ok(Self {
-            host: host.to_owned(),
-            certificate: None,
-            tls: tls.is_some(),
-        })
-    }
-
-    /// The same, of the server that has the certificate with this fingerprint.
-    #[must_use]
-    pub fn with_certificate(self, certificate: Fingerprint) -> Self {
-        Self {
-            certificate: Some(certificate),
-            ..self
-        }
-    }
-
-    /// Whether others on the way could read what is sent: neither TLS, nor this computer's own.
-    #[must_use]
-    pub fn is_exposed(&self) -> bool {
-        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
-        let address = name.trim_matches(['[', ']']).parse::<IpAddr>();
-        let own = address.map_or(name == "localhost", |address| address.is_loopback());
-        !self.tls && !own
-    }
-
-    fn error(&self, what: impl ToString) -> ConsoleError {
-        ConsoleError::Link {
-            url: format!("http{}://{}", if self.tls { "s" } else { "" }, self.host),
-            what: what.to_string(),
-            help: "start a server with `wheeleg serve`; give its address with --url and its key with --key"
-                .to_owned(),
-        }
-    }
-
-    fn stream(&self) -> Result<Stream, ConsoleError> {
-        let tcp = self.tcp()?;
-        if !self.tls {
-            return Ok(Stream::Plain(tcp));
-        }
-        let certificate = self.certificate.ok_or_else(|| {
-            self.error("the certificate of the server is not known: give its --fingerprint, which `wheeleg serve` prints")
-        })?;
-        let config = tls::client(certificate).map_err(|e| self.error(e))?;
-        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
-        let name = name.trim_matches(['[', ']']).to_owned();
-        let name = ServerName::try_from(name).map_err(|e| self.error(e))?;
-        let connection = ClientConnection::new(config, name).map_err(|e| self.error(e))?;
-        let mut stream = StreamOwned::new(connection, tcp);
-        // The handshake, while a read still waits: later ones are short looks.
-        while stream.conn.is_handshaking() {
-            let done = stream.conn.complete_io(&mut stream.sock);
-            done.map_err(|e| self.error(format!("no TLS to the server of that certificate: {e}")))?;
-        }
-        Ok(Stream::Tls(Box::new(stream)))
-    }
-
-    fn tcp(&self) -> Result<TcpStream, ConsoleError> {
-        let mut addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
-        let address = addresses.next().ok_or_else(|| self.error("no such host"))?;
-        let stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e))?;
-        let set = stream
-            .set_nodelay(true)
-            .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
-            .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
-        set.map_err(|e| self.error(e))?;
-        Ok(stream)
-    }
-}
-
-/// A connection.
-enum Stream {
-    Plain(TcpStream),
-    Tls(Box<StreamOwned<ClientConnection, TcpStream>>),
-}
-
-impl Stream {
-    fn set_read_timeout(&self, time: Duration) -> std::io::Result<()> {
-        let tcp = match self {
-            Self::Plain(tcp) => tcp,
-            Self::Tls(tls) => &tls.sock,
-        };
-        tcp.set_read_timeout(Some(time))
-    }
-}
-
-impl Read for Stream {
-    fn read(&mut self, buf: &mut [u8]) -> std::io::Result<usize> {
-        match self {
-            Self::Plain(tcp) => tcp.read(buf),
-            Self::Tls(tls) => tls.read(buf),
-        }
-    }
-}
-
-impl Write for Stream {
-    fn write(&mut self, buf: &[u8]) -> std::io::Result<usize> {
-        match self {
-            Self::Plain(tcp) => tcp.write(buf),
-            Self::Tls(tls) => tls.write(buf),
-        }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        match self {
-            Self::Plain(tcp) => tcp.flush(),
-            Self::Tls(tls) => tls.flush(),
-        }
-    }
-}
 
 /// Asks a path of the HTTP API; status and JSON of the answer.
 ///
@@ -186,19 +41,38 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
         url.host,
         key.to_hex()
     );
-    let mut answer = String::new();
     let asked = stream.write_all(request.as_bytes());
-    let read = asked.and_then(|()| stream.flush()).and_then(|()| {
-        let read = stream.take(1 << 20).read_to_string(&mut answer);
-        // The end of the answer is known; some servers leave TLS without a word.
-        read.or_else(|e| (e.kind() == ErrorKind::UnexpectedEof).then_some(0).ok_or(e))
-    });
-    read.map_err(|e| url.error(e))?;
-    let odd = || url.error("this is no console of Wheeleg");
+    let read = asked
+        .and_then(|()| stream.flush())
+        .and_then(|()| whole(&mut stream));
+    let answer = read.map_err(|e| url.broken(e))?;
+    let odd = || url.error(NO_CONSOLE);
+    let answer = String::from_utf8(answer).map_err(|_| odd())?;
     let (head, body) = answer.split_once("\r\n\r\n").ok_or_else(odd)?;
     let status = head.split(' ').nth(1).and_then(|code| code.parse().ok());
     let body = serde_json::from_str(body).map_err(|_| odd())?;
     Ok((status.ok_or_else(odd)?, body))
+}
+
+/// Reads an answer to its end, which comes within [`PATIENCE`], however slowly a server writes.
+fn whole(stream: &mut Stream) -> std::io::Result<Vec<u8>> {
+    let begin = Instant::now();
+    let mut answer = Vec::new();
+    let mut part = [0; 4096];
+    while answer.len() < LARGEST_ANSWER {
+        if begin.elapsed() >= PATIENCE {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        match stream.read(&mut part) {
+            Ok(0) => break,
+            Ok(n) => answer.extend_from_slice(&part[..n]),
+            // The end of the answer is known; some servers leave TLS without a word.
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => break,
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(answer)
 }
 
 /// What came from the server.
@@ -263,10 +137,13 @@ impl Client {
             .parse()
             .map_err(|e| url.error(e))?;
         let request = ClientRequestBuilder::new(uri).with_sub_protocol(SUBPROTOCOL);
-        let (mut socket, _) =
-            tungstenite::client(request, url.stream()?).map_err(|e| url.error(e))?;
+        let (mut socket, _) = tungstenite::client(request, url.stream()?).map_err(|e| match e {
+            HandshakeError::Interrupted(_) => url.broken(ErrorKind::TimedOut.into()),
+            HandshakeError::Failure(tungstenite::Error::Io(e)) => url.broken(e),
+            HandshakeError::Failure(_) => url.error(NO_CONSOLE),
+        })?;
         let hello = text(url, &mut socket)?;
-        let odd = || url.error("this is no console of Wheeleg");
+        let odd = || url.error(NO_CONSOLE);
         let nonce_s = hello["nonce"].as_str().and_then(hex::decode::<32>);
         let nonce_s = nonce_s.ok_or_else(odd)?;
         let mut nonce_c = [0; 32];
@@ -428,7 +305,19 @@ impl Client {
 
     /// Waits for the end of the request with this number.
     pub fn outcome(&mut self, n: u64) -> Outcome {
+        self.outcome_until(n, None)
+    }
+
+    /// The same of a request that is answered at once: unknown if it is not.
+    pub fn prompt_outcome(&mut self, n: u64) -> Outcome {
+        self.outcome_until(n, Some(Instant::now() + PATIENCE))
+    }
+
+    fn outcome_until(&mut self, n: u64, end: Option<Instant>) -> Outcome {
         loop {
+            if end.is_some_and(|end| Instant::now() >= end) {
+                return Outcome::Unknown;
+            }
             let answer = match self.read() {
                 Some(Incoming::Json(answer)) if answer["op"] == "answer" && answer["n"] == n => {
                     answer
@@ -455,9 +344,13 @@ impl Client {
 /// The next JSON of a handshake.
 fn text(url: &Url, socket: &mut WebSocket<Stream>) -> Result<Value, ConsoleError> {
     loop {
-        match socket.read().map_err(|e| url.error(e))? {
+        let message = socket.read().map_err(|e| match e {
+            tungstenite::Error::Io(e) => url.broken(e),
+            other => url.error(other),
+        })?;
+        match message {
             Message::Text(text) => {
-                let odd = |_| url.error("this is no console of Wheeleg");
+                let odd = |_| url.error(NO_CONSOLE);
                 return serde_json::from_str(&text).map_err(odd);
             }
             Message::Close(_) => return Err(url.error("the server closes")),

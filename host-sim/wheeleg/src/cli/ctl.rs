@@ -128,7 +128,17 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
     match &args.command {
         CtlCommand::Status => status(args, &key(VIEW_FILE)?),
         CtlCommand::Watch { channels, hz } => watch(args, &key(VIEW_FILE)?, channels, *hz),
-        CtlCommand::Stop => stop(args, &key(VIEW_FILE)?),
+        CtlCommand::Stop => {
+            let key = key(VIEW_FILE)?;
+            stop(args, &key).or_else(|why| match why {
+                StudyError::Stdout(_) => Err(why),
+                // Whatever kept the answer away, nobody knows of a stop.
+                _ => {
+                    tell(&format!("{:?}", miette::Report::new(why)));
+                    Ok(not_confirmed())
+                }
+            })
+        }
         CtlCommand::Take { command } => take(args, &key(CONTROL_FILE)?, command),
         CtlCommand::Inject { fault } => host(args, "Inject", &json!({ "fault": fault })),
         CtlCommand::EndFault { fault } => host(args, "EndFault", &json!({ "fault": fault })),
@@ -218,10 +228,7 @@ fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
     match code {
         200 if args.json => print(&format!("{answer}\n")),
         200 => print("stopped: the stop is in SYNC, and latched\n"),
-        504 => {
-            tell("NOT CONFIRMED: CUT THE AIR");
-            Ok(ExitCode::from(LOST))
-        }
+        504 => Ok(not_confirmed()),
         403 => stop_by_session(args, key),
         _ => Ok(not_answered(&answer)),
     }
@@ -231,7 +238,16 @@ fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
 fn stop_by_session(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
     let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
     let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
-    print_outcome(args, &client.outcome(n))
+    match client.prompt_outcome(n) {
+        Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
+        end => print_outcome(args, &end),
+    }
+}
+
+/// Nobody knows of a stop that was asked for.
+fn not_confirmed() -> ExitCode {
+    tell("NOT CONFIRMED: CUT THE AIR");
+    ExitCode::from(LOST)
 }
 
 fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {

@@ -1,0 +1,172 @@
+//! The address of a server, and the connection to it.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{IpAddr, Ipv6Addr, TcpStream, ToSocketAddrs as _};
+use std::time::Duration;
+
+use rustls::pki_types::ServerName;
+use rustls::{ClientConnection, StreamOwned};
+
+use crate::error::ConsoleError;
+use crate::tls::{self, Fingerprint};
+
+/// Time for a connection, and for an answer over HTTP.
+pub(super) const PATIENCE: Duration = Duration::from_secs(3);
+
+/// Address of a server, as people write it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Url {
+    /// Name or address and port.
+    pub(super) host: String,
+    /// Certificate of the server; without one it is reached by plain HTTP.
+    certificate: Option<Fingerprint>,
+    /// It is to be reached with TLS.
+    tls: bool,
+}
+
+impl Url {
+    /// Reads `http://HOST:PORT`, `https://HOST:PORT`, the same with `ws` and `wss`, or `HOST:PORT`.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let plain = ["http://", "ws://"]
+            .iter()
+            .find_map(|s| text.strip_prefix(s));
+        let tls = ["https://", "wss://"]
+            .iter()
+            .find_map(|s| text.strip_prefix(s));
+        let host = plain.or(tls).unwrap_or(text).trim_end_matches('/');
+        let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
+        let name = host.rsplit_once(':').map_or("", |(name, _)| name);
+        // The numbers of IPv6 stand in brackets.
+        let whole = match name.strip_prefix('[') {
+            Some(name) => name
+                .strip_suffix(']')
+                .is_some_and(|a| a.parse::<Ipv6Addr>().is_ok()),
+            None => !name.is_empty() && !name.contains([':', ']', '@']),
+        };
+        if !matches!(port, Some(Ok(_))) || host.contains('/') || !whole {
+            return Err(
+                "an address of a server is http://HOST:PORT or https://HOST:PORT".to_owned(),
+            );
+        }
+        Ok(Self {
+            host: host.to_owned(),
+            certificate: None,
+            tls: tls.is_some(),
+        })
+    }
+
+    /// The same, of the server that has the certificate with this fingerprint.
+    #[must_use]
+    pub fn with_certificate(self, certificate: Fingerprint) -> Self {
+        Self {
+            certificate: Some(certificate),
+            ..self
+        }
+    }
+
+    /// Whether others on the way could read what is sent: neither TLS, nor this computer's own.
+    #[must_use]
+    pub fn is_exposed(&self) -> bool {
+        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
+        let address = name.trim_matches(['[', ']']).parse::<IpAddr>();
+        let own = address.map_or(name == "localhost", |address| address.is_loopback());
+        !self.tls && !own
+    }
+
+    pub(super) fn error(&self, what: impl ToString) -> ConsoleError {
+        ConsoleError::Link {
+            url: format!("http{}://{}", if self.tls { "s" } else { "" }, self.host),
+            what: what.to_string(),
+            help: "start a server with `wheeleg serve`; give its address with --url and its key with --key"
+                .to_owned(),
+        }
+    }
+
+    /// A connection that broke, or over which nothing came in time.
+    pub(super) fn broken(&self, e: std::io::Error) -> ConsoleError {
+        match e.kind() {
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                self.error(format!("no answer within {} s", PATIENCE.as_secs()))
+            }
+            _ => self.error(e),
+        }
+    }
+
+    pub(super) fn stream(&self) -> Result<Stream, ConsoleError> {
+        let tcp = self.tcp()?;
+        if !self.tls {
+            return Ok(Stream::Plain(tcp));
+        }
+        let certificate = self.certificate.ok_or_else(|| {
+            self.error("the certificate of the server is not known: give its --fingerprint, which `wheeleg serve` prints")
+        })?;
+        let config = tls::client(certificate).map_err(|e| self.error(e))?;
+        let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
+        let name = name.trim_matches(['[', ']']).to_owned();
+        let name = ServerName::try_from(name).map_err(|e| self.error(e))?;
+        let connection = ClientConnection::new(config, name).map_err(|e| self.error(e))?;
+        let mut stream = StreamOwned::new(connection, tcp);
+        // The handshake, while a read still waits: later ones are short looks.
+        while stream.conn.is_handshaking() {
+            let done = stream.conn.complete_io(&mut stream.sock);
+            done.map_err(|e| self.error(format!("no TLS to the server of that certificate: {e}")))?;
+        }
+        Ok(Stream::Tls(Box::new(stream)))
+    }
+
+    fn tcp(&self) -> Result<TcpStream, ConsoleError> {
+        let mut addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
+        let address = addresses.next().ok_or_else(|| self.error("no such host"))?;
+        let stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e))?;
+        let set = stream
+            .set_nodelay(true)
+            .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
+            .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+        set.map_err(|e| self.error(e))?;
+        Ok(stream)
+    }
+}
+
+/// A connection.
+pub(super) enum Stream {
+    Plain(TcpStream),
+    Tls(Box<StreamOwned<ClientConnection, TcpStream>>),
+}
+
+impl Stream {
+    pub(super) fn set_read_timeout(&self, time: Duration) -> std::io::Result<()> {
+        let tcp = match self {
+            Self::Plain(tcp) => tcp,
+            Self::Tls(tls) => &tls.sock,
+        };
+        tcp.set_read_timeout(Some(time))
+    }
+}
+
+impl Read for Stream {
+    fn read(&mut self, buf: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(tcp) => tcp.read(buf),
+            Self::Tls(tls) => tls.read(buf),
+        }
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, buf: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(tcp) => tcp.write(buf),
+            Self::Tls(tls) => tls.write(buf),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(tcp) => tcp.flush(),
+            Self::Tls(tls) => tls.flush(),
+        }
+    }
+}
