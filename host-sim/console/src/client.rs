@@ -11,8 +11,8 @@ use tungstenite::handshake::HandshakeError;
 use tungstenite::http::Uri;
 use tungstenite::{Message, WebSocket};
 
-use self::url::{PATIENCE, Stream};
 pub use self::url::Url;
+use self::url::{PATIENCE, Stream};
 use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
 use crate::hex;
