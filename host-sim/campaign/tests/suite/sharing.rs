@@ -196,5 +196,5 @@ fn another_plan_is_refused_and_the_difference_named() {
     let error = Store::open(folder.path()).expect_err("changed by hand");
     assert!(error.to_string().contains("hash"), "{error}");
     let error = Store::open(&folder.path().join("none")).expect_err("no folder");
-    assert!(matches!(error, CampaignError::Unreadable { .. }) && error.exit_code() == 2);
+    assert!(matches!(error, CampaignError::Refused { .. }) && error.exit_code() == 2);
 }
