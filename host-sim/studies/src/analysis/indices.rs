@@ -85,15 +85,13 @@ fn extreme_singular_values(matrix: &Matrix3<f64>) -> [f64; 2] {
 }
 
 /// Salisbury and Craig's condition number: 1 for an isotropic pose, infinite for a singular one.
-#[must_use]
-pub fn condition_number(jacobian: &Matrix3<f64>) -> f64 {
+fn condition_number(jacobian: &Matrix3<f64>) -> f64 {
     let [most, least] = extreme_singular_values(jacobian);
     most / least
 }
 
 /// Yoshikawa's manipulability: volume of the ellipsoid of foot velocities against that of a sphere.
-#[must_use]
-pub fn manipulability(jacobian: &Matrix3<f64>) -> f64 {
+fn manipulability(jacobian: &Matrix3<f64>) -> f64 {
     jacobian.determinant().abs()
 }
 
@@ -102,8 +100,7 @@ pub fn manipulability(jacobian: &Matrix3<f64>) -> f64 {
 ///
 /// With J = U Σ Vᵀ and equal forces F the half-axes are F/σ: f = J⁻ᵀ diag(F) u, so they are the
 /// inverse singular values of J diag(1/F).
-#[must_use]
-pub fn least_force_n(jacobian: &Matrix3<f64>, forces_n: [f64; 3]) -> f64 {
+fn least_force_n(jacobian: &Matrix3<f64>, forces_n: [f64; 3]) -> f64 {
     let weakness = Vector3::from(forces_n.map(f64::recip));
     let [most, _] = extreme_singular_values(&(jacobian * Matrix3::from_diagonal(&weakness)));
     most.recip()
