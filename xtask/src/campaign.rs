@@ -41,7 +41,7 @@ const SHIPPED: [Shipped; 3] = [
         plan: "leg-design",
         cuts: &[
             ("samples = 3 ", "samples = 1 "),
-            ("grid = [30]", "grid = [8]"),
+            ("grid = [20]", "grid = [8]"),
             (
                 r#""walk", "turn", "sand-slope-10", "rock-slope","#,
                 r#""walk", "turn","#,
