@@ -143,7 +143,7 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
             "[[bars]]\nmeasure = \"conditoning\"\ninfo = true\n",
             "conditoning",
         ),
-        ("[[bars]]\nmeasure = \"speed\"\nmin = \"20 kg\"\n", "20 kg"),
+        ("[[bars]]\nmeasure = \"speed\"\nmin = \"20 kg\"\n", "\"kg\""),
     ] {
         let error = walks(bars).expect_err(bars);
         let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
