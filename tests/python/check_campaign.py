@@ -30,6 +30,33 @@ def check_steep(rows, failed, climbed, ends) -> None:
         assert sum(reasons) >= lost, ends
 
 
+def check_leg(rows, failed, *answers) -> None:
+    # Macros and views answer nothing.
+    *_, legs, sets, ratios, terrains, told = answers
+    crank, radius, hip, bore, paper, conditioning = range(6)
+    assert len(legs) == 4 and sum(leg[paper] for leg in legs) == 1, legs
+    by_leg = {(leg[radius], leg[bore]): leg for leg in legs}
+    # A foot farther out is better conditioned, a smaller bore leaves that as it is and pushes less.
+    assert by_leg[60, 1][conditioning] > 1.2 * by_leg[10, 1][conditioning], legs
+    assert by_leg[10, 0.8][conditioning] == by_leg[10, 1][conditioning], legs
+    force = [by_leg[10, bore][8] for bore in (0.8, 1)]
+    assert abs(force[0] / force[1] - 0.64) < 1e-9, legs
+    # The picked leg is the first of those that it may be, on either set; so is the paper's.
+    met = max(leg[10] for leg in legs)
+    best = min(leg[11] for leg in legs if leg[10] == met)
+    picked = [row for row in sets if row[1] == "picked"]
+    assert {row[:2] for row in sets} <= {
+        (terrains, leg) for terrains in ("design", "held out") for leg in ("paper", "picked")
+    }, sets
+    assert all(row[8] <= 100 * row[7] / row[6] <= row[9] for row in sets), sets
+    if picked:
+        assert abs(picked[0][10] - best) < 0.006, (picked, best)
+        assert all(low <= ratio <= high for _, _, ratio, low, high in ratios), ratios
+        assert [row[1] for row in ratios] == [2, 2], ratios
+    assert sum(row[3] for row in terrains) == sum(row[6] for row in sets), terrains
+    assert len(told) == 1 and all(-1 <= r <= 1 for r in told[0] if r is not None), told
+
+
 def main() -> int:
     table, sql, rows = sys.argv[1], sys.argv[2], int(sys.argv[3])
     connection = duckdb.connect()
@@ -56,7 +83,11 @@ def main() -> int:
     failed = connection.execute(
         "SELECT count(*) FROM read_parquet(?) WHERE NOT coalesce(passed, false)", [table]
     ).fetchone()[0]
-    check = {"three-step-spread": check_spread, "how-steep": check_steep}[Path(sql).stem]
+    check = {
+        "three-step-spread": check_spread,
+        "how-steep": check_steep,
+        "leg-design": check_leg,
+    }[Path(sql).stem]
     check(rows, failed, *answers)
     print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {answers[0]}")
     return 0

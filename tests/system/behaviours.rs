@@ -3,7 +3,7 @@
 //! twenty, with a sign test.
 
 mod every_walk;
-mod metrics;
+pub(crate) mod metrics;
 mod pairs;
 
 use crate::sil;

@@ -1,8 +1,9 @@
 //! The robot walks: wheels and legs together, on the level, in turns, over rocks.
 
+use crate::behaviours::metrics::drag_of;
 use crate::sil;
 use wheeleg_config::{Bar, Measure, Motion, Scenario, builtin};
-use wheeleg_master::layer1::walk::WalkOrder;
+use wheeleg_master::layer1::walk::{WalkGeometry, WalkOrder};
 use wheeleg_studies::analysis::{Target, analyse};
 use wheeleg_units::VelocityMmS;
 
@@ -88,6 +89,44 @@ fn the_robot_walks_backward_and_turns_on_the_spot() {
         (Measure::Distance, -0.05, 0.05),
     ];
     met(&walk(spin, &bars), [1]);
+}
+
+/// The master is told the leg's dimensions: led by those of the paper's leg, the feet would go ahead
+/// of the ground in a turn, or lag, and the wheels slip.
+#[test]
+fn a_robot_with_another_leg_walks_and_turns_as_it_is_told() {
+    let mut robot = builtin::robot("wheeleg").expect("built in");
+    let plant = &mut robot.plant;
+    (plant.body.crank_m, plant.body.p4_m[0], plant.body.o4_m[0]) = (0.232, 0.232, 0.50);
+    for leg in [0, 3] {
+        plant.stroke_zero_m[leg + 1] = 0.11;
+    }
+    let order = WalkOrder {
+        speed_mm_s: VelocityMmS::from_int(60),
+        turn_rad_s: "0.05".parse().expect("a number"),
+        ..WalkOrder::default()
+    };
+    let bars = [
+        (Measure::Heading, 0.85, 1.02),
+        (Measure::Radius, 1.08, 1.32),
+        (Measure::Slip, -0.02, 0.02),
+        (Measure::Faults, 0.0, 0.0),
+    ];
+    let scenario = walk(order, &bars);
+    let recording = sil::run(&scenario, &robot, 1);
+    for t in analyse(&scenario, &robot, &recording).targets {
+        println!("another leg: {} {:?} {}", t.id, t.value, t.unit);
+        assert!(t.pass, "{}: {:?}", t.id, t.value);
+    }
+    let mut geometry = WalkGeometry {
+        hip_x_m: 0.50,
+        ..WalkGeometry::default()
+    };
+    (geometry.leg.crank_m, geometry.leg.p4_m[0]) = (0.232, 0.232);
+    geometry.leg.stroke_zero_m[1] = 0.11;
+    let drag_mm = drag_of(&recording, &geometry);
+    println!("another leg: feet slide {drag_mm:.0} mm");
+    assert!(drag_mm < 100.0, "{drag_mm}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ struct Shipped {
     rows: u32,
 }
 
-const SHIPPED: [Shipped; 2] = [
+const SHIPPED: [Shipped; 3] = [
     Shipped {
         plan: "three-step-spread",
         cuts: &[("samples = 100", "samples = 5")],
@@ -36,6 +36,26 @@ const SHIPPED: [Shipped; 2] = [
             ("[15, 60]", "[60]"),
         ],
         rows: 8,
+    },
+    Shipped {
+        plan: "leg-design",
+        cuts: &[
+            ("samples = 3 ", "samples = 1 "),
+            ("grid = [20]", "grid = [8]"),
+            (
+                r#""walk", "turn", "sand-slope-10", "rock-slope","#,
+                r#""walk", "turn","#,
+            ),
+            (
+                r#""sand-flat", "sand-to-rock", "rocks-20", "rocks-30","#,
+                r#""sand-flat", "rocks-20","#,
+            ),
+            ("grid = [1.0, 0.8]\n", "grid = [1.0]\n"),
+            ("grid = [10, 60, 110]", "grid = [10, 60]"),
+            ("grid = [600, 500]", "grid = [600]"),
+            ("grid = [1.0, 0.8, 1.25]", "grid = [1.0, 0.8]"),
+        ],
+        rows: 16,
     },
 ];
 

@@ -62,6 +62,7 @@ impl Master {
             layer1: Layer1::new(
                 config.gait,
                 config.homing,
+                config.walk.leg,
                 (config.wheel_drive == WheelDrive::Stream).then_some(config.walk),
             )?,
             layer1_enabled: true,

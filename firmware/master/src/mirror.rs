@@ -25,9 +25,9 @@ pub fn leg_y(side: Side, y: f32) -> f32 {
 }
 
 /// The leg in `f32`. The foot may be as close to the yaw axis as the
-/// drawn-back horizontal cylinder puts it (0.01 m), less rounding.
-fn geometry() -> Option<LegGeometry<f32>> {
-    let mut parameters = LegParameters::<f32>::wheeleg_2003();
+/// drawn-back horizontal cylinder puts it, less rounding.
+fn geometry(leg: &LegParameters<f32>) -> Option<LegGeometry<f32>> {
+    let mut parameters = *leg;
     parameters.min_foot_radius_m -= ROUNDING_M;
     LegGeometry::new(parameters).ok()
 }
@@ -35,8 +35,12 @@ fn geometry() -> Option<LegGeometry<f32>> {
 /// Foot from strokes (s2, s5, s6) in m: position in the robot's axes from O4, m.
 /// `None` if the loop of the yaw cylinder does not close.
 #[must_use]
-pub fn foot_of_strokes(side: Side, strokes_m: [f32; 3]) -> Option<[f32; 3]> {
-    let geometry = geometry()?;
+pub fn foot_of_strokes(
+    leg: &LegParameters<f32>,
+    side: Side,
+    strokes_m: [f32; 3],
+) -> Option<[f32; 3]> {
+    let geometry = geometry(leg)?;
     let posture = geometry
         .posture(&geometry.lengths_from_strokes(strokes_m))
         .ok()?;
@@ -49,11 +53,12 @@ pub fn foot_of_strokes(side: Side, strokes_m: [f32; 3]) -> Option<[f32; 3]> {
 /// of its range or the foot on the yaw axis.
 #[must_use]
 pub fn strokes_of_foot(
+    leg: &LegParameters<f32>,
     side: Side,
     position: [f32; 3],
     velocity: [f32; 3],
 ) -> Option<([f32; 3], [f32; 3])> {
-    let geometry = geometry()?;
+    let geometry = geometry(leg)?;
     let own = |[x, y, z]: [f32; 3]| Vector3::new(x, leg_y(side, y), z);
     let state = FootState {
         position: own(position),

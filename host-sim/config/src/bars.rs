@@ -69,6 +69,20 @@ measures! {
     StuckAfter = "stuck-after", Time, "s";
     /// Faults that boards have latched.
     Faults = "faults", Count, "1";
+    /// Mean time from one swing to the next, of both legs, from 3 s on.
+    StepTime = "step-time", Time, "s";
+    /// Air (ANR) that is taken from the source from 3 s on, for each swing.
+    AirPerStep = "air-per-step", Volume, "dm3";
+    /// The same for each metre forward.
+    AirPerMetre = "air-per-metre", VolumePerLength, "dm3/m";
+    /// Index of the leg's design: mean over its workspace of the smallest over the largest singular value of its Jacobian; 1 is isotropic.
+    Conditioning = "conditioning", Number, "1";
+    /// Index of the leg's design: mean over its workspace of the product of these singular values (Yoshikawa's manipulability).
+    Manipulability = "manipulability", Number, "1";
+    /// Index of the leg's design: volume that its foot reaches within the strokes.
+    Workspace = "workspace", Volume, "dm3";
+    /// Index of the leg's design: smallest half-axis of its force ellipsoid in the workspace, each cylinder with its force at the pressure of the supply.
+    FootForce = "foot-force", Force, "N";
 }
 
 impl Measure {
@@ -79,7 +93,7 @@ impl Measure {
     }
 }
 
-/// A measure and the band in which it is to be, SI; at least one end is there.
+/// A measure and the band in which it is to be, SI; one that is required has an end at least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
     /// What is measured.
@@ -119,8 +133,9 @@ fn bar(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Bar> {
         };
         r.required(entry, &spec)
     });
+    let informs = info.is_some_and(|value| value != Some(0.0));
     let problem = match (min, max) {
-        (None, None) => "a bar needs `min`, `max` or both",
+        (None, None) if !informs => "a bar needs `min`, `max` or both, or `info = true`",
         (Some(Some(min)), Some(Some(max))) if min > max => "`min` is above `max`",
         _ => "",
     };

@@ -37,7 +37,8 @@ pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
 );
 
 /// Plans of campaigns: name, file name for messages, text.
-pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread", "how-steep");
+pub const PLANS: &[(&str, &str, &str)] =
+    embedded!("campaigns": "three-step-spread", "how-steep", "leg-design");
 
 /// Data files of scenarios: name, content.
 pub const DATA: &[(&str, &[u8])] = &[(

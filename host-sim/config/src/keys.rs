@@ -135,5 +135,9 @@ pub const BAR: [Key; 4] = [
     key("measure", "one of the measures below", "what is measured"),
     key("min", "in the unit of the measure", "smallest allowed"),
     key("max", "in the unit of the measure", "largest allowed"),
-    key("info", "0 or 1", "1: it informs only; 0 where left out"),
+    key(
+        "info",
+        "true or false",
+        "true: it informs only, and may be without an end; false where left out",
+    ),
 ];

@@ -1,6 +1,6 @@
 //! Another value in the text of a file: the file's own reader checks it then.
 
-use toml_edit::{DocumentMut, InlineTable, Item, Table, Value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 use crate::params::ParameterInfo;
 use crate::quantity::Dimension;
@@ -100,6 +100,16 @@ pub(crate) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str>
         }
     }
     item.as_str()
+}
+
+/// Puts bars in place of those of a scenario.
+pub(crate) fn set_bars(document: &mut DocumentMut, bars: &ArrayOfTables) {
+    // Tables remember where they stood, and among those of another file would come between.
+    let mut bars = bars.clone();
+    for table in bars.iter_mut() {
+        table.set_position(None);
+    }
+    document.insert("bars", Item::ArrayOfTables(bars));
 }
 
 /// Adds a fault to a scenario.

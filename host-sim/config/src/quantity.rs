@@ -17,6 +17,8 @@ pub enum Dimension {
     Area,
     /// Volume.
     Volume,
+    /// Volume for each length of way.
+    VolumePerLength,
     /// Time.
     Time,
     /// Bits per second.
@@ -81,6 +83,7 @@ impl Dimension {
             Self::Length => &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)],
             Self::Area => &[("m2", 1.0), ("cm2", 1e-4), ("mm2", 1e-6)],
             Self::Volume => &[("m3", 1.0), ("dm3", 1e-3), ("cm3", 1e-6), ("mm3", 1e-9)],
+            Self::VolumePerLength => &[("m3/m", 1.0), ("dm3/m", 1e-3)],
             Self::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)],
             Self::BitRate => &[("bit/s", 1.0), ("kbit/s", 1e3), ("Mbit/s", 1e6)],
             Self::Velocity => &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3)],

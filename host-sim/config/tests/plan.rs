@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 
+use wheeleg_config::Measure;
 use wheeleg_config::builtin::PLANS;
 use wheeleg_config::plan::{Plan, Resolver, Sources, Text, Value};
 
@@ -109,6 +110,48 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
     assert_eq!(case.scenario.faults[0].to_string(), "pot-open:joint3@1.5s");
     assert_eq!(case.scenario_json["motion"]["leg"], "right");
     assert!(case.scenario_json.get("seed").is_none());
+}
+
+#[test]
+fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
+    let bars = "[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n\
+                [[bars]]\nmeasure = \"conditioning\"\ninfo = true\n";
+    let walks = |bars: &str| {
+        let head = "name = \"test\"\nroot = 1\n[base]\nscenario = \"walk\"\n";
+        let factors =
+            "[factor.ground]\nparameter = \"scenario\"\ngrid = [\"walk\", \"rocks-20\"]\n";
+        Plan::of(sources(&format!("{head}{bars}{factors}")))
+    };
+    let plan = walks(bars).unwrap_or_else(|e| panic!("{:?}", e.problems()));
+    let resolver = Resolver::new(&plan).expect("usable");
+    for ground in ["walk", "rocks-20"] {
+        let case = resolver.resolve(&[Value::Text(ground.to_owned())]);
+        let bars = case.expect("it can be").scenario.bars;
+        assert_eq!(bars.len(), 2, "{ground}");
+        assert_eq!((bars[0].measure, bars[0].min), (Measure::Speed, Some(0.02)));
+        assert!(bars[0].required && !bars[1].required);
+        assert_eq!((bars[1].min, bars[1].max), (None, None));
+    }
+    // Without any, each has its own.
+    let plan = walks("").expect("usable");
+    let resolver = Resolver::new(&plan).expect("usable");
+    let own = resolver.resolve(&[Value::Text("walk".to_owned())]);
+    assert_eq!(own.expect("it can be").scenario.bars.len(), 8);
+    for (bars, told) in [
+        ("[[bars]]\nmeasure = \"conditioning\"\n", "`info = true`"),
+        (
+            "[[bars]]\nmeasure = \"conditoning\"\ninfo = true\n",
+            "conditoning",
+        ),
+        ("[[bars]]\nmeasure = \"speed\"\nmin = \"20 kg\"\n", "\"kg\""),
+    ] {
+        let error = walks(bars).expect_err(bars);
+        let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
+        assert!(
+            all.iter().any(|line| line.contains(told)),
+            "{bars}: {all:?}"
+        );
+    }
 }
 
 /// Each with a word of the field, of the value and of what is allowed.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use wheeleg_kinematics::LegParameters;
 
 use crate::assembly::{Assembly, AssemblyState, CylinderOutputs};
 use crate::axis::{TICK_NS, TICK_US};
@@ -64,6 +65,23 @@ pub struct SpatialParams {
 }
 
 impl PlantParams {
+    /// Dimensions and strokes of the left (0) or right (1) leg. A foot counts as reachable down to
+    /// where b5 drawn back puts it, but no closer to the yaw axis than that of the paper.
+    ///
+    /// # Panics
+    /// If there is no such leg.
+    #[must_use]
+    pub fn leg_parameters(&self, leg: usize) -> LegParameters<f64> {
+        let body = self.body.leg_parameters();
+        let stroke_zero_m = [0, 1, 2].map(|k| self.stroke_zero_m[3 * leg + k]);
+        LegParameters {
+            stroke_zero_m,
+            stroke_m: [0, 1, 2].map(|k| self.cylinders[3 * leg + k].stroke_m),
+            min_foot_radius_m: body.min_foot_radius_m.max(stroke_zero_m[1]),
+            ..body
+        }
+    }
+
     /// Parameters of the floating robot.
     #[must_use]
     pub fn floating(&self) -> FloatingParams {

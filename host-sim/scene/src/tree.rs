@@ -45,12 +45,7 @@ pub(super) fn geometry_of(
     robot: &RobotConfig,
     leg: usize,
 ) -> Result<LegGeometry<f64>, KinematicsError<f64>> {
-    let plant = &robot.plant;
-    LegGeometry::new(wheeleg_kinematics::LegParameters {
-        stroke_zero_m: [0, 1, 2].map(|k| plant.stroke_zero_m[3 * leg + k]),
-        stroke_m: [0, 1, 2].map(|k| plant.cylinders[3 * leg + k].stroke_m),
-        ..plant.body.leg_parameters()
-    })
+    LegGeometry::new(robot.plant.leg_parameters(leg))
 }
 
 /// Turn of the joints `theta1`, `theta4` and `theta3` over the length of the yaw cylinder \[rad/m\].

@@ -91,7 +91,6 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
 pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
     let cycles = |s: f64| (s / robot.bus.cycle_s).round() as u16;
     let motor = &robot.plant.motors[0];
-    let body = &robot.plant.body;
     let counts = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
     let circumference_um = robot.plant.body.wheel_radius_m * TAU * 1e6;
     MasterConfig {
@@ -114,12 +113,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         } else {
             WheelDrive::Profile
         },
-        walk: WalkGeometry {
-            hip_x_m: body.o4_m[0] as f32,
-            hip_y_m: body.o4_m[1] as f32,
-            track_m: robot.plant.spatial.track_m as f32,
-            nail_m: robot.plant.contacts.foot.nails.length_m as f32,
-        },
+        walk: walk_geometry(robot),
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
         behaviours: scenario.behaviours,
@@ -127,6 +121,28 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         parameters: sums(robot),
         ..MasterConfig::default()
     }
+}
+
+/// Dimensions as the master is told them. It cannot be told strokes: its commands are limited to
+/// those of the paper's leg.
+fn walk_geometry(robot: &RobotConfig) -> WalkGeometry {
+    let single = |m: f64| m as f32;
+    let plant = &robot.plant;
+    let [hip_x_m, hip_y_m, _] = plant.body.o4_m.map(single);
+    let mut geometry = WalkGeometry {
+        hip_x_m,
+        hip_y_m,
+        track_m: single(plant.spatial.track_m),
+        nail_m: single(plant.contacts.foot.nails.length_m),
+        ..WalkGeometry::default()
+    };
+    let (leg, told) = (&mut geometry.leg, plant.leg_parameters(0));
+    leg.crank_m = single(told.crank_m);
+    leg.p4_m = told.p4_m.map(single);
+    leg.stroke_zero_m = told.stroke_zero_m.map(single);
+    leg.min_foot_radius_m = single(told.min_foot_radius_m);
+    leg.min_cos_theta3 = single(told.min_cos_theta3);
+    geometry
 }
 
 /// Sample time of the wheel boards with the robot's parameters, µs: both ends count speeds per

@@ -1,6 +1,7 @@
 //! What is measured of a run, each the metric of a behaviour.
 
 use wheeleg_master::contact::Side;
+use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_master::mirror;
 use wheeleg_master::setpoint::Cylinder;
 use wheeleg_telemetry::{BehaviourSample, FootSample, Recording, Row};
@@ -134,8 +135,13 @@ pub(super) fn pull_n_s(recording: &Recording) -> f64 {
     pull
 }
 
-/// How far loaded feet slide over level ground, mm.
+/// How far loaded feet of the paper's leg slide over level ground, mm.
 pub(super) fn drag_mm(recording: &Recording) -> f64 {
+    drag_of(recording, &WalkGeometry::default())
+}
+
+/// The same of a robot of these dimensions.
+pub(crate) fn drag_of(recording: &Recording, geometry: &WalkGeometry) -> f64 {
     let mut drag = 0.0;
     for (side, foot) in [Side::Left, Side::Right].into_iter().zip(&recording.feet) {
         let first = side.joint(Cylinder::Yaw);
@@ -147,11 +153,14 @@ pub(super) fn drag_mm(recording: &Recording) -> f64 {
             }
             let strokes =
                 [0, 1, 2].map(|j| (1e-3 * recording.joints[first + j][i].v.position_mm) as f32);
-            let Some([x, y, _]) = mirror::foot_of_strokes(side, strokes) else {
+            let Some([x, y, _]) = mirror::foot_of_strokes(&geometry.leg, side, strokes) else {
                 continue;
             };
-            let hip_y = if side == Side::Left { 0.2 } else { -0.2 };
-            let (x, y) = (0.6 + f64::from(x), hip_y + f64::from(y));
+            let hip_y_m = match side {
+                Side::Left => geometry.hip_y_m,
+                Side::Right => -geometry.hip_y_m,
+            };
+            let (x, y) = (f64::from(geometry.hip_x_m + x), f64::from(hip_y_m + y));
             let body = &recording.body[i].v;
             let (sin, cos) = body.yaw_deg.to_radians().sin_cos();
             let here = [

@@ -89,8 +89,8 @@ impl Layer1 {
                 if side != self.params.stepping_leg(0) {
                     return Err(Refusal::NotAtStart);
                 }
-                let trajectory =
-                    FootTrajectory::new(shape, side, start, now_us).map_err(Refusal::Parameter)?;
+                let trajectory = FootTrajectory::new(shape, self.leg, side, start, now_us)
+                    .map_err(Refusal::Parameter)?;
                 self.mode = Mode::Foot(trajectory);
             }
             // Commands of layer 0 are never routed here.

@@ -10,6 +10,7 @@
 //! metres over 3.5 s.
 
 use fixed::types::I16F16;
+use wheeleg_kinematics::LegParameters;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::{ParamError, STROKE_MM, in_stroke};
@@ -130,6 +131,7 @@ impl FootShape {
 pub struct FootTrajectory {
     shape: FootShape,
     side: Side,
+    leg: LegParameters<f32>,
     start: Setpoints,
     start_us: u64,
     /// Foot at the start, robot's axes from O4, m.
@@ -146,6 +148,7 @@ impl FootTrajectory {
     /// A parameter out of range, or [`ParamError::OutOfReach`].
     pub fn new(
         shape: FootShape,
+        leg: LegParameters<f32>,
         side: Side,
         start: Setpoints,
         start_us: u64,
@@ -160,11 +163,12 @@ impl FootTrajectory {
                 .map_or(PositionMm::ZERO, |joint| joint.reference_mm)
         };
         let strokes = [Cylinder::Yaw, Cylinder::Horizontal, Cylinder::Vertical].map(stroke);
-        let origin_m = mirror::foot_of_strokes(side, strokes.map(metres))
+        let origin_m = mirror::foot_of_strokes(&leg, side, strokes.map(metres))
             .ok_or(ParamError::OutOfReach { at_ms: 0 })?;
         let path = Self {
             shape,
             side,
+            leg,
             start,
             start_us,
             origin_m,
@@ -185,7 +189,7 @@ impl FootTrajectory {
         let (moved, velocity) = self.shape.at(t_s);
         let [x, y, z] = self.origin_m;
         let [dx, dy, dz] = moved;
-        mirror::strokes_of_foot(self.side, [x + dx, y + dy, z + dz], velocity)
+        mirror::strokes_of_foot(&self.leg, self.side, [x + dx, y + dy, z + dz], velocity)
     }
 
     /// References at `now_us`. The other leg and the wheels stay as they were.

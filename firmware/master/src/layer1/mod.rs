@@ -15,6 +15,7 @@ pub(crate) mod units;
 pub mod walk;
 
 use heapless::spsc::{Consumer, Producer};
+use wheeleg_kinematics::LegParameters;
 use wheeleg_units::PositionMm;
 
 use crate::behaviour::Tally;
@@ -58,6 +59,8 @@ enum Mode {
 pub struct Layer1 {
     params: GaitParams,
     homing: HomingConfig,
+    /// Dimensions of a leg.
+    leg: LegParameters<f32>,
     /// What a walk needs to know of the robot; `None`: its wheels cannot be led in a walk.
     walks: Option<WalkGeometry>,
     mode: Mode,
@@ -81,12 +84,14 @@ impl Layer1 {
     pub fn new(
         params: GaitParams,
         homing: HomingConfig,
+        leg: LegParameters<f32>,
         walks: Option<WalkGeometry>,
     ) -> Result<Self, params::ParamError> {
         params.validate()?;
         Ok(Self {
             params,
             homing,
+            leg,
             walks,
             mode: Mode::Idle,
             feedback: Feedback::default(),

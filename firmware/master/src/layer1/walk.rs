@@ -120,7 +120,7 @@ impl Walk {
         let leg = |side: Side| {
             let bumps = feedback.acts.bumps.get(side.index());
             let bumps = bumps.copied().unwrap_or_default();
-            Sensed::of(feedback, side).map(|sensed| Leg::new(side, &sensed, bumps))
+            Sensed::of(&geometry, feedback, side).map(|sensed| Leg::new(side, &sensed, bumps))
         };
         let (Some(left), Some(right)) = (leg(Side::Left), leg(Side::Right)) else {
             return Ok(None);
@@ -201,7 +201,7 @@ impl Walk {
         let mut progress_m = 0.0;
         for leg in &mut self.legs {
             leg.follow(moved, &self.geometry);
-            let Some(sensed) = Sensed::of(feedback, leg.side) else {
+            let Some(sensed) = Sensed::of(&self.geometry, feedback, leg.side) else {
                 continue;
             };
             let foothold = stance(wanted, &self.geometry, leg.side).begin_m;

@@ -9,6 +9,7 @@ use wheeleg_units::PositionMm;
 
 const START_US: u64 = 7_000_000;
 
+use crate::common::leg;
 use nalgebra::Vector3;
 use wheeleg_kinematics::{FootState, LegGeometry, LegParameters};
 use wheeleg_master::layer1::foot::FootTrajectory;
@@ -45,7 +46,7 @@ fn exact(x: [f64; 3], v: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 }
 
 fn check(shape: FootShape, side: Side, path: impl Fn(f64) -> ([f64; 3], [f64; 3])) {
-    let mut trajectory = FootTrajectory::new(shape, side, start(), START_US).unwrap();
+    let mut trajectory = FootTrajectory::new(shape, leg(), side, start(), START_US).unwrap();
     let duration = f64::from(shape.duration_s());
     let mut worst: f64 = 0.0;
     let mut moved: f64 = 0.0;
@@ -132,23 +133,59 @@ fn literal_variant_rises_to_179_5_mm_in_3_5_s() {
 fn mirror_flips_the_side_and_nothing_else() {
     // The leg yawed to its own outside: b2 short, foot at +Y of the leg's frame.
     let strokes = [0.02, 0.12, 0.10];
-    let left = foot_of_strokes(Side::Left, strokes).unwrap();
-    let right = foot_of_strokes(Side::Right, strokes).unwrap();
+    let left = foot_of_strokes(&leg(), Side::Left, strokes).unwrap();
+    let right = foot_of_strokes(&leg(), Side::Right, strokes).unwrap();
     assert!(
         left[1] > 0.02,
         "b2 short turns the left leg to the left: {left:?}"
     );
     assert_eq!([right[0], -right[1], right[2]], left);
     for side in [Side::Left, Side::Right] {
-        let foot = foot_of_strokes(side, strokes).unwrap();
-        let (back, _) = strokes_of_foot(side, foot, [0.0; 3]).unwrap();
+        let foot = foot_of_strokes(&leg(), side, strokes).unwrap();
+        let (back, _) = strokes_of_foot(&leg(), side, foot, [0.0; 3]).unwrap();
         for (a, b) in strokes.iter().zip(back) {
             assert!((a - b).abs() < 1e-6);
         }
         // Moving to the robot's left shortens the left leg's yaw cylinder and
         // lengthens the right leg's.
-        let (_, rates) = strokes_of_foot(side, foot, [0.0, 0.1, 0.0]).unwrap();
+        let (_, rates) = strokes_of_foot(&leg(), side, foot, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(rates[0] < 0.0, side == Side::Left, "{rates:?}");
+    }
+}
+
+/// A shorter crank, a foot farther out, and a vertical cylinder that begins lower.
+#[test]
+fn a_leg_of_other_dimensions_is_led_by_its_own() {
+    let mut other = leg();
+    (other.crank_m, other.p4_m) = (0.25, [0.25, 0.40]);
+    other.stroke_zero_m = [0.31, 0.06, 0.20];
+    other.min_foot_radius_m = 0.06;
+    let exact = LegGeometry::new(LegParameters::<f64> {
+        crank_m: 0.25,
+        p4_m: [0.25, 0.40],
+        stroke_zero_m: [0.31, 0.06, 0.20],
+        min_foot_radius_m: 0.06,
+        ..LegParameters::wheeleg_2003()
+    })
+    .unwrap();
+    for strokes in [[0.09, 0.0, 0.18], [0.02, 0.12, 0.10], [0.16, 0.18, 0.0]] {
+        let lengths = exact.lengths_from_strokes(strokes);
+        let expected = exact.posture(&lengths).unwrap().foot();
+        let strokes = strokes.map(|m| m as f32);
+        let foot = foot_of_strokes(&other, Side::Left, strokes).unwrap();
+        for (found, expected) in foot.into_iter().zip(expected.iter()) {
+            assert!(
+                (f64::from(found) - expected).abs() < 1e-6,
+                "{strokes:?} {foot:?}"
+            );
+        }
+        let (back, _) = strokes_of_foot(&other, Side::Left, foot, [0.0; 3]).unwrap();
+        for (back, stroke) in back.into_iter().zip(strokes) {
+            assert!((back - stroke).abs() < 1e-6, "{strokes:?} {back}");
+        }
+        // Led by the paper's dimensions the foot would go elsewhere, or nowhere.
+        let wrong = strokes_of_foot(&leg(), Side::Left, foot, [0.0; 3]);
+        assert!(wrong.is_none_or(|(wrong, _)| (wrong[1] - strokes[1]).abs() > 0.04));
     }
 }
 
@@ -160,7 +197,7 @@ fn paths_out_of_reach_are_refused() {
         height_mm: PositionMm::from_int(100),
         rate_rad_s,
     };
-    let new = |shape| FootTrajectory::new(shape, Side::Left, start(), 0).map(|_| ());
+    let new = |shape| FootTrajectory::new(shape, leg(), Side::Left, start(), 0).map(|_| ());
     assert_eq!(new(arch(180, 0, 0.125)), Ok(()));
     let range = OutOfRange {
         argument: &argument::FORWARD,

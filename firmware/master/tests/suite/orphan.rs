@@ -1,7 +1,7 @@
 //! A walk whose layer 1 stands still, with eight boards on the bus: what goes on, how it ends, and
 //! what can never begin again.
 
-use crate::common::{CYCLE_US, TestRig};
+use crate::common::{CYCLE_US, TestRig, leg};
 use wheeleg_master::MasterConfig;
 use wheeleg_master::behaviour::{Act, Behaviour, Behaviours};
 use wheeleg_master::command::Command;
@@ -11,6 +11,7 @@ use wheeleg_master::dispatcher::{Refusal, Request};
 use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::layer0::operator::OPERATOR_CLIENT;
 use wheeleg_master::layer1::walk::WalkOrder;
+use wheeleg_master::mirror::foot_of_strokes;
 use wheeleg_master::setpoint::{LegPlan, Phase};
 use wheeleg_protocol::{Address, FaultBits, InputBits, NodeMode, Sync};
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -150,7 +151,7 @@ fn standing_feet_of_a_stalled_walk_go_with_the_ground_in_a_turn_too() {
             [Side::Left, Side::Right].map(|side| {
                 let first = side.index() * 3;
                 let m = [0, 1, 2].map(|i| (1e-3 * strokes[first + i]) as f32);
-                let [x, y, _] = wheeleg_master::mirror::foot_of_strokes(side, m).unwrap();
+                let [x, y, _] = foot_of_strokes(&leg(), side, m).unwrap();
                 let y_hip = if side == Side::Left { 0.2 } else { -0.2 };
                 [0.6 + f64::from(x), y_hip + f64::from(y)]
             })

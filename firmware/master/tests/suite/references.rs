@@ -2,6 +2,7 @@
 //! meanwhile.
 
 use crate::behaviours::{Robot, geometry, mm};
+use crate::common::leg;
 use wheeleg_master::behaviour::{Act, Behaviour, Behaviours};
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer0::behaviours::{Behaving, WheelSense};
@@ -60,14 +61,14 @@ fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     for (side, first) in [(Side::Left, 0), (Side::Right, 3)] {
         let strokes = [0, 1, 2].map(|i| robot.joint(first + i).stroke_mm.to_f64());
         let m = strokes.map(|mm| (1e-3 * mm) as f32);
-        let [x, y, z] = mirror::foot_of_strokes(side, m).expect("closes");
+        let [x, y, z] = mirror::foot_of_strokes(&leg(), side, m).expect("closes");
         let y_hip = if side == Side::Left { 200.0 } else { -200.0 };
         let (rx, ry) = (600.0 + 1e3 * f64::from(x), y_hip + 1e3 * f64::from(y));
         let share = 1.0 - slip;
         let dx = share * (turn * ry - forward);
         let dy = share * (-turn * rx);
         let foot = [x + (1e-3 * dx) as f32, y + (1e-3 * dy) as f32, z];
-        if let Some((strokes, _)) = mirror::strokes_of_foot(side, foot, [0.0; 3]) {
+        if let Some((strokes, _)) = mirror::strokes_of_foot(&leg(), side, foot, [0.0; 3]) {
             for (i, stroke) in strokes.into_iter().enumerate() {
                 robot.joint(first + i).stroke_mm = mm(1e3 * f64::from(stroke));
             }
@@ -88,7 +89,8 @@ fn gone(
     robot.behaving = Behaving::new(Behaviours::ALL, geometry);
     for (side, first) in [(Side::Left, 0), (Side::Right, 3)] {
         let [x, y] = foot_mm.map(|mm| (1e-3 * mm) as f32);
-        let strokes = mirror::strokes_of_foot(side, [x, y, -0.1], [0.0; 3]).expect("in reach");
+        let strokes = mirror::strokes_of_foot(&geometry.leg, side, [x, y, -0.1], [0.0; 3]);
+        let strokes = strokes.expect("in reach");
         for (i, stroke) in strokes.0.into_iter().take(2).enumerate() {
             robot.joint(first + i).stroke_mm = mm(1e3 * f64::from(stroke));
         }

@@ -2,6 +2,7 @@
 //! that follow theirs, and a nose that lies on the feet: what reaches as far down as the other leg,
 //! within what the air gives way, touches the ground.
 
+use crate::common::leg;
 use fixed::types::I16F16;
 use wheeleg_master::behaviour::{Act, Behaviours};
 use wheeleg_master::contact::{FootSwitches, Side};
@@ -71,7 +72,7 @@ impl Robot {
     fn foot_m(&self, side: Side) -> [f64; 2] {
         let first = side.joint(Cylinder::Yaw);
         let strokes = [0, 1, 2].map(|i| (self.strokes[first + i] * 1e-3) as f32);
-        let [x, y, _] = mirror::foot_of_strokes(side, strokes).expect("closes");
+        let [x, y, _] = mirror::foot_of_strokes(&leg(), side, strokes).expect("closes");
         [x.into(), y.into()]
     }
 

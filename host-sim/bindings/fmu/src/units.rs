@@ -7,7 +7,7 @@ pub(crate) const fn exponents(dimension: Dimension) -> &'static [(&'static str, 
     match dimension {
         Dimension::Number | Dimension::Count | Dimension::Flag | Dimension::Lsb => &[],
         Dimension::Length => &[("m", "1")],
-        Dimension::Area => &[("m", "2")],
+        Dimension::Area | Dimension::VolumePerLength => &[("m", "2")],
         Dimension::Volume => &[("m", "3")],
         Dimension::Time => &[("s", "1")],
         Dimension::BitRate => &[("s", "-1")],

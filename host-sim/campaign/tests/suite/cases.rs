@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use wheeleg_campaign::{Case, Cases, Options, PlanFile, Shard, Store, run, status};
-use wheeleg_config::plan::Value;
+use wheeleg_config::plan::{Plan, Value};
+use wheeleg_config::{RobotConfig, builtin};
+use wheeleg_studies::analysis::{Analyser, LegIndices};
 
 use crate::common::{BASE, HEAD, SPREAD, computed, options, plan_of, spread};
 
@@ -34,6 +36,44 @@ fn paired_cells_share_their_seed_and_nothing_else_does() {
     let cases = Cases::new(&plan).expect("a plan");
     assert_ne!(cases.case(0).seed, cases.case(1).seed);
     assert_eq!(cases.case(0).id, all[0].id, "pairing is no content");
+}
+
+/// Every leg of the shipped plan closes and stands, meets the same noise, and has the indices of its
+/// own dimensions in its row; the first is the paper's.
+#[test]
+fn legs_of_the_shipped_plan_are_all_there_with_their_own_indices() {
+    let plan = Plan::load("leg-design").expect("built in");
+    let cases = Cases::new(&plan).expect("a plan");
+    let index = |robot: &RobotConfig| LegIndices::of(&robot.plant).expect("a leg");
+    let paper = index(&builtin::robot("wheeleg-field").expect("built in"));
+    let columns = &cases.columns().targets;
+    let mut found = BTreeSet::new();
+    for number in 0..36 {
+        let case = cases.case(number);
+        let (scenario, robot) = case.setup.as_ref().expect("it can be");
+        assert_eq!((scenario.name.as_str(), case.place.sample), ("walk", 0));
+        assert_eq!(case.seed, cases.case(0).seed);
+        let leg = index(robot);
+        assert!(leg.conditioning >= paper.conditioning * (1.0 - 1e-12));
+        if number == 0 {
+            assert_eq!(leg, paper);
+        }
+        for target in Analyser::new(scenario, robot).finish().targets {
+            assert!(columns.contains(&target.id));
+            match target.id.as_str() {
+                "conditioning" => assert_eq!(target.value, Some(leg.conditioning)),
+                "workspace" => {
+                    let dm3 = 1e3 * leg.workspace_m3;
+                    assert!((target.value.expect("a leg has it") - dm3).abs() < 1e-9);
+                }
+                "foot-force" => assert_eq!(target.value, Some(leg.foot_force_n)),
+                _ => {}
+            }
+        }
+        found.insert([leg.conditioning, leg.foot_force_n].map(f64::to_bits));
+    }
+    // Crank and radius change the one, the bore the other; the place of the hip neither.
+    assert_eq!(found.len(), 18);
 }
 
 #[test]

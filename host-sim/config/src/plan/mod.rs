@@ -22,6 +22,8 @@ pub use resolve::{Resolved, Resolver};
 pub use sources::{Sources, Text};
 pub use value::Value;
 
+use toml_edit::{ArrayOfTables, DocumentMut};
+
 use crate::error::ConfigError;
 use crate::params::FieldSpec;
 use crate::quantity::Dimension;
@@ -91,6 +93,8 @@ pub struct Plan {
     pub keep: KeepLogs,
     /// Simulated time after which a case is given up, s.
     pub limit_s: Option<f64>,
+    /// Bars in place of those of every scenario; `None`: they keep theirs.
+    pub bars: Option<ArrayOfTables>,
     /// What every case begins with.
     pub base: Base,
     /// What differs, in the order of the file.
@@ -99,7 +103,7 @@ pub struct Plan {
     pub sources: Sources,
 }
 
-const TOP: [&str; 10] = [
+const TOP: [&str; 11] = [
     "name",
     "root",
     "samples",
@@ -108,6 +112,7 @@ const TOP: [&str; 10] = [
     "block",
     "keep",
     "limit",
+    "bars",
     "base",
     "factor",
 ];
@@ -201,6 +206,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         Some(_) => r.quantity(&top, &limit).map(|s| s.first().copied()),
         None => Some(None),
     };
+    let bars = bars(r, sources);
     let base = base(r);
     let factors = factor::read_all(r);
     let plan = Plan {
@@ -212,6 +218,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         block: block?,
         keep: keep?,
         limit_s: limit_s?,
+        bars,
         base: base?,
         factors: factors?,
         sources: sources.clone(),
@@ -242,6 +249,15 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         );
     }
     Some(plan)
+}
+
+/// The bars as they stand in the plan, once they are known to be right.
+fn bars(r: &mut Reader, sources: &Sources) -> Option<ArrayOfTables> {
+    if crate::bars::read(r, &TOP).is_empty() {
+        return None;
+    }
+    let document = sources.plan.text.parse::<DocumentMut>().ok()?;
+    document.get("bars")?.as_array_of_tables().cloned()
 }
 
 fn base(r: &mut Reader) -> Option<Base> {

@@ -93,7 +93,12 @@ impl<'a> Resolver<'a> {
             let data = plan.sources.data.get(name).cloned().unwrap_or_default();
             let files = Files::Held(&data);
             let (_, listing) = Scenario::parse_with(&source.file, &source.text, &files)?;
-            let base = Base::read(source, listing)?;
+            let mut base = Base::read(source, listing)?;
+            if let Some(bars) = &plan.bars {
+                overlay::set_bars(&mut base.document, bars);
+                let text = base.document.to_string();
+                (_, base.listing) = Scenario::parse_with(&source.file, &text, &files)?;
+            }
             scenarios.insert(name.as_str(), Base { data, ..base });
         }
         for (name, source) in &plan.sources.robots {

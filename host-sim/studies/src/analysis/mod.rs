@@ -3,6 +3,7 @@
 
 mod contact;
 mod delay;
+mod indices;
 mod moves;
 mod reference;
 mod rest;
@@ -20,6 +21,7 @@ pub use contact::Contact;
 use contact::ContactMeter;
 use delay::{DelayMeter, ShiftMeter};
 pub use delay::{Fit, StartDelay};
+pub use indices::LegIndices;
 pub use reference::{ReferenceModel, ReferencePoint};
 use rest::StandMeter;
 use safe_state::SafeStateMeter;
@@ -33,7 +35,7 @@ use travel::TravelMeter;
 use wheeleg_config::{EventAction, LegChoice, Motion, RobotConfig, Scenario, TargetSet};
 use wheeleg_telemetry::{
     BodySample, Event, FootSample, JointSample, MasterSample, Recording, Row, SampleRef, Sink,
-    Taken, WheelSample,
+    SupplySample, Taken, WheelSample,
 };
 
 /// What the analysis found.
@@ -158,7 +160,7 @@ impl<'a> Analyser<'a> {
     /// The motion began when the master was in a step for the first time.
     fn master(&mut self, t_s: f64, master: &MasterSample) {
         if let Some(travel) = &mut self.travel {
-            travel.master(master);
+            travel.master(t_s, master);
         }
         if self.start_s.is_some() || master.step == 0 {
             return;
@@ -253,6 +255,15 @@ impl<'a> Analyser<'a> {
         }
     }
 
+    fn supply(&mut self, row: &Row<SupplySample>) {
+        if let Meter::SafeState(meter) = &mut self.meter {
+            meter.supply(row);
+        }
+        if let Some(travel) = &mut self.travel {
+            travel.supply(row.t_s(), &row.v);
+        }
+    }
+
     /// What was found.
     #[must_use]
     pub fn finish(self) -> Analysis {
@@ -284,7 +295,9 @@ impl<'a> Analyser<'a> {
             Meter::None => Vec::new(),
         };
         if let Some(travel) = self.travel {
-            analysis.targets.extend(travel.targets(&self.scenario.bars));
+            analysis
+                .targets
+                .extend(travel.targets(self.robot, &self.scenario.bars));
         }
         analysis
     }
@@ -303,11 +316,7 @@ impl Sink for Analyser<'_> {
             SampleRef::Master(v) => self.master(t_ns as f64 * 1e-9, v),
             SampleRef::Wheel(v) => self.wheel(number, &row(t_ns, v)),
             SampleRef::Body(v) => self.body(t_ns as f64 * 1e-9, v),
-            SampleRef::Supply(v) => {
-                if let Meter::SafeState(meter) = &mut self.meter {
-                    meter.supply(&row(t_ns, v));
-                }
-            }
+            SampleRef::Supply(v) => self.supply(&row(t_ns, v)),
             _ => {}
         }
     }
@@ -359,9 +368,7 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
     for (foot, rows) in feet.into_iter().enumerate() {
         rows.for_each(|r| analyser.foot(foot, r.t_ns, &r.v));
     }
-    if let Meter::SafeState(meter) = &mut analyser.meter {
-        recording.supply.iter().for_each(|r| meter.supply(r));
-    }
+    recording.supply.iter().for_each(|r| analyser.supply(r));
     analyser.finish()
 }
 

@@ -1,15 +1,18 @@
 //! The whole robot's way over the ground, against the bars of the scenario.
 
-use wheeleg_config::{Bar, Measure};
+use wheeleg_config::{Bar, Measure, RobotConfig};
 use wheeleg_master::behaviour::Act;
 use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_telemetry::event::BoardChange;
-use wheeleg_telemetry::{BodySample, Cause, Event, FootSample, MasterSample, WheelSample};
+use wheeleg_telemetry::{
+    BodySample, Cause, Event, FootSample, MasterSample, SupplySample, WheelSample,
+};
 
 use super::Extremes;
+use super::indices::LegIndices;
 use super::target::Target;
 
-/// Speed, slip and radius count from here on, s: the robot has begun to move.
+/// Speed, slip, radius, steps in time and air count from here on, s: the robot has begun to move.
 const FROM_S: f64 = 3.0;
 /// A foot is loaded above this force, N.
 const LOADED_N: f64 = 1.0;
@@ -62,6 +65,8 @@ pub(super) struct TravelMeter {
     foot_n: [f64; 2],
     supported_s: f64,
     steps: u32,
+    later_steps: Ends,
+    later_air_m3: Ends,
     gives_up_s: Option<f64>,
     faults: u32,
 }
@@ -102,8 +107,17 @@ impl TravelMeter {
         }
     }
 
-    pub(super) fn master(&mut self, v: &MasterSample) {
+    pub(super) fn master(&mut self, t_s: f64, v: &MasterSample) {
         self.steps = self.steps.max(v.step);
+        if t_s >= FROM_S {
+            self.later_steps.add(f64::from(self.steps));
+        }
+    }
+
+    pub(super) fn supply(&mut self, t_s: f64, v: &SupplySample) {
+        if t_s >= FROM_S {
+            self.later_air_m3.add(1e-3 * v.air_used_dm3);
+        }
     }
 
     pub(super) fn event(&mut self, t_s: f64, event: &Event) {
@@ -120,7 +134,9 @@ impl TravelMeter {
     }
 
     /// A measure, SI; `None` where the run was too short or the measure has no meaning.
-    fn value(&self, measure: Measure) -> Option<f64> {
+    fn value(&self, measure: Measure, robot: &RobotConfig) -> Option<f64> {
+        let steps = || self.later_steps.change().filter(|steps| *steps > 0.0);
+        let leg = || LegIndices::of(&robot.plant);
         let largest = |(_, Extremes(range)): &(Option<f64>, Extremes)| {
             range.map(|(low, high)| low.abs().max(high.abs()).to_radians())
         };
@@ -149,10 +165,21 @@ impl TravelMeter {
             Measure::Steps => Some(f64::from(self.steps)),
             Measure::StuckAfter => self.gives_up_s,
             Measure::Faults => Some(f64::from(self.faults)),
+            Measure::StepTime => Some(self.later_time_s / steps()?),
+            Measure::AirPerStep => Some(self.later_air_m3.change()? / steps()?),
+            Measure::AirPerMetre => {
+                // A robot that stands has no such figure.
+                let way_m = Some(self.later_way_m).filter(|way_m| *way_m > 0.1)?;
+                Some(self.later_air_m3.change()? / way_m)
+            }
+            Measure::Conditioning => Some(leg()?.conditioning),
+            Measure::Manipulability => Some(leg()?.manipulability),
+            Measure::Workspace => Some(leg()?.workspace_m3),
+            Measure::FootForce => Some(leg()?.foot_force_n),
         }
     }
 
-    pub(super) fn targets(&self, bars: &[Bar]) -> Vec<Target> {
+    pub(super) fn targets(&self, robot: &RobotConfig, bars: &[Bar]) -> Vec<Target> {
         let target = |bar: &Bar| {
             let (measure, scale) = (bar.measure, bar.measure.per_si());
             // Bands are written in other units than SI: their ends back, without its rounding.
@@ -160,7 +187,7 @@ impl TravelMeter {
             let target = Target::new(
                 measure.name(),
                 measure.meaning().trim_end_matches('.'),
-                self.value(measure).map(|si| si * scale),
+                self.value(measure, robot).map(|si| si * scale),
                 measure.unit(),
                 bar.min.map(shown),
                 bar.max.map(shown),
@@ -174,6 +201,10 @@ impl TravelMeter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn robot() -> RobotConfig {
+        wheeleg_config::builtin::robot("wheeleg").expect("built in")
+    }
 
     fn driven(speed_mm_s: f64, turn_deg_s: f64, rim_mm_s: f64) -> TravelMeter {
         let mut meter = TravelMeter::default();
@@ -198,6 +229,21 @@ mod tests {
                     ..BodySample::default()
                 },
             );
+            // A swing every 2 s, and 3 dm3 of air for it; start-up has used 50 dm3.
+            meter.master(
+                t_s,
+                &MasterSample {
+                    step: i / 2000,
+                    ..MasterSample::default()
+                },
+            );
+            meter.supply(
+                t_s,
+                &SupplySample {
+                    air_used_dm3: 50.0 + 1.5 * t_s,
+                    ..SupplySample::default()
+                },
+            );
             for wheel in 0..2 {
                 meter.wheel(
                     wheel,
@@ -214,9 +260,9 @@ mod tests {
 
     #[test]
     fn a_steady_turn_is_measured_as_it_is() {
-        let meter = driven(100.0, 40.0, 125.0);
+        let (meter, robot) = (driven(100.0, 40.0, 125.0), robot());
         let near = |measure, wanted: f64| {
-            let value = meter.value(measure).expect("measured");
+            let value = meter.value(measure, &robot).expect("measured");
             assert!(
                 (value - wanted).abs() < 1e-3,
                 "{measure:?}: {value}, {wanted}"
@@ -230,6 +276,15 @@ mod tests {
         near(Measure::Radius, 0.1 / 40.0_f64.to_radians());
         near(Measure::Pitch, 10.0_f64.to_radians());
         near(Measure::Roll, 0.0);
+        // From 3 to 10 s: swings 2 to 5, 10.5 dm3, 0.7 m.
+        near(Measure::StepTime, 7.0 / 4.0);
+        near(Measure::AirPerStep, 10.5e-3 / 4.0);
+        near(Measure::AirPerMetre, 10.5e-3 / 0.7);
+        let leg = LegIndices::of(&robot.plant).expect("a leg");
+        near(Measure::Conditioning, leg.conditioning);
+        near(Measure::FootForce, leg.foot_force_n);
+        let stands = driven(0.0, 0.0, 0.0);
+        assert_eq!(stands.value(Measure::AirPerMetre, &robot), None);
     }
 
     /// A robot that does not give up has no time at which it did: the bar is missed.
@@ -242,22 +297,23 @@ mod tests {
             max: Some(20.0),
             required: true,
         };
-        assert!(!meter.targets(&[bar])[0].pass);
+        let robot = robot();
+        assert!(!meter.targets(&robot, &[bar])[0].pass);
         let gives_up = || Event::from(Cause::Master(MasterEvent::Behaviour(Act::Stuck)));
         meter.event(12.5, &gives_up());
         meter.event(30.0, &gives_up());
-        let target = &meter.targets(&[bar])[0];
+        let target = &meter.targets(&robot, &[bar])[0];
         assert_eq!(
             (target.value, target.unit, target.pass),
             (Some(12.5), "s", true)
         );
-        assert_eq!(meter.value(Measure::Faults), Some(0.0));
+        assert_eq!(meter.value(Measure::Faults, &robot), Some(0.0));
         for node in 1..=2 {
             let board = wheeleg_protocol::Address::joint(node).expect("a joint");
             let change = BoardChange::FaultLatched(wheeleg_protocol::Fault::NoMotion);
             meter.event(1.0, &Cause::Board { board, change }.into());
         }
-        assert_eq!(meter.value(Measure::Faults), Some(2.0));
+        assert_eq!(meter.value(Measure::Faults, &robot), Some(2.0));
     }
 
     #[test]
@@ -269,7 +325,7 @@ mod tests {
             max: Some(0.126),
             required: true,
         };
-        let target = &meter.targets(&[bar])[0];
+        let target = &meter.targets(&robot(), &[bar])[0];
         assert_eq!((target.min, target.max), (Some(114.0), Some(126.0)));
         assert!(!target.pass && target.required);
         // No turn: no radius, and what cannot be measured is not met.
@@ -277,6 +333,6 @@ mod tests {
             measure: Measure::Radius,
             ..bar
         };
-        assert!(!meter.targets(&[radius])[0].pass);
+        assert!(!meter.targets(&robot(), &[radius])[0].pass);
     }
 }

@@ -31,16 +31,25 @@ pub(super) fn moved(geometry: &WalkGeometry, ways_um: [i64; WHEELS]) -> Twist {
 }
 
 /// Foot of a leg whose yaw cylinder and b5 have these strokes, forward and left of its yaw axis, m.
-pub(super) fn foot_m(side: Side, [yaw, b5]: [PositionMm; 2]) -> Option<[f32; 2]> {
+pub(super) fn foot_m(
+    geometry: &WalkGeometry,
+    side: Side,
+    [yaw, b5]: [PositionMm; 2],
+) -> Option<[f32; 2]> {
     // Height does not enter: the vertical cylinder is parallel to the yaw axis.
-    let [x, y, _] = mirror::foot_of_strokes(side, [metres(yaw), metres(b5), 0.1])?;
+    let [x, y, _] = mirror::foot_of_strokes(&geometry.leg, side, [metres(yaw), metres(b5), 0.1])?;
     Some([x, y])
 }
 
 /// The same as the boards tell it; `None` if one was never heard.
-pub(super) fn sensed_foot_m(senses: &Senses, side: Side) -> Option<[f32; 2]> {
+pub(super) fn sensed_foot_m(
+    geometry: &WalkGeometry,
+    senses: &Senses,
+    side: Side,
+) -> Option<[f32; 2]> {
     let stroke = |cylinder| Some(senses.joint(side, cylinder)?.stroke_mm);
     foot_m(
+        geometry,
         side,
         [stroke(Cylinder::Yaw)?, stroke(Cylinder::Horizontal)?],
     )

@@ -137,10 +137,10 @@ fn follow(
         joint.unwrap_or_default().reference_mm
     });
     // A robot that stands would creep by the rounding of every cycle.
-    let led = foot_m(side, strokes).filter(|_| moved != Twist::default());
+    let led = foot_m(geometry, side, strokes).filter(|_| moved != Twist::default());
     let led = led.and_then(|foot| {
         let ([x, y], [dx, dy]) = (foot, moved.ground_m_s(geometry, side, foot));
-        in_plane(side, [x + dx, y + dy], [0.0; 2])
+        in_plane(geometry, side, [x + dx, y + dy], [0.0; 2])
     });
     for (cylinder, at) in cylinders.into_iter().zip(0_usize..) {
         change(joints.get_mut(side.joint(cylinder)), |joint| {

@@ -170,7 +170,7 @@ impl Slip {
         let legs = self.foot_m.iter_mut().zip(&mut self.stood);
         for (side, (foot, stood)) in SIDES.into_iter().zip(legs) {
             let stands = plan.leg(side) == LegPlan::Stance;
-            let here = sensed_foot_m(senses, side).filter(|_| stands);
+            let here = sensed_foot_m(geometry, senses, side).filter(|_| stands);
             *stood = if here.is_some() {
                 stood.saturating_add(1)
             } else {

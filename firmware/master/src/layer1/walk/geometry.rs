@@ -3,6 +3,7 @@
 //! Lengths in m, angles in rad, `f32`; X forward and Y left. A foot's place is told from the yaw
 //! axis O4 of its leg, in the robot's axes.
 
+use wheeleg_kinematics::LegParameters;
 use wheeleg_units::VelocityMmS;
 
 use crate::argument::{TURNS, WALK_SPEEDS};
@@ -19,6 +20,9 @@ pub struct WalkGeometry {
     pub track_m: f32,
     /// Length of the nails below a sole, m: a foot moves ahead when they are out of the ground.
     pub nail_m: f32,
+    /// Dimensions of a leg. Its strokes are those that commands are limited to
+    /// ([`crate::layer1::params::STROKE_MM`]), whatever stands here.
+    pub leg: LegParameters<f32>,
 }
 
 impl Default for WalkGeometry {
@@ -29,6 +33,7 @@ impl Default for WalkGeometry {
             hip_y_m: 0.20,
             track_m: 0.56,
             nail_m: 0.0,
+            leg: LegParameters::wheeleg_2003(),
         }
     }
 }
@@ -40,21 +45,43 @@ impl WalkGeometry {
         let outward_mm_s = 1e3 * 0.5 * self.track_m * turn_rad_s;
         VelocityMmS::from_f64(f64::from(WALK_SPEEDS.max.to_num::<f32>() + outward_mm_s))
     }
+
+    /// Distance of a foot from its yaw axis with b5 drawn back, m.
+    fn radius_min_m(&self) -> f32 {
+        let [_, b5, _] = self.leg.stroke_zero_m;
+        b5
+    }
+
+    /// Distance of a foot from its yaw axis with b5 half out, m.
+    pub(super) fn middle_m(&self) -> f32 {
+        self.radius_min_m() + 0.5 * STROKE_M
+    }
+
+    /// Nearest distance of a planned foothold from the yaw axis, m.
+    fn in_m(&self) -> f32 {
+        self.radius_min_m() + MARGIN_M
+    }
+
+    /// Farthest distance of a planned foothold from the yaw axis, m.
+    fn out_m(&self) -> f32 {
+        self.radius_min_m() + STROKE_M - MARGIN_M
+    }
+
+    /// Tangent of the farthest planned yaw of a leg: the same share of the stroke of the yaw
+    /// cylinder with any crank.
+    fn yaw_tangent(&self) -> f32 {
+        YAW_TANGENT * (CRANK_M / self.leg.crank_m)
+    }
 }
 
-/// Distance of a foot from its yaw axis with b5 drawn back, m (`LegParameters`, ASSUMED).
-const RADIUS_MIN_M: f32 = 0.01;
 /// Stroke of b5, m.
 const STROKE_M: f32 = 0.18;
 /// Stroke kept free at either end of b5, m: what a stance may stray.
 const MARGIN_M: f32 = 0.0075;
-/// Tangent of the farthest planned yaw of a leg: 14.6° of the 18° that its cylinder turns, because
-/// the way of a foot in a turn is bent.
+/// Tangent of the farthest planned yaw of a leg with this crank, m: 14.6° of the 18° that its
+/// cylinder turns, because the way of a foot in a turn is bent.
 const YAW_TANGENT: f32 = 0.26;
-
-/// Farthest and nearest distance of a planned foothold from the yaw axis, m.
-pub(super) const OUT_M: f32 = RADIUS_MIN_M + STROKE_M - MARGIN_M;
-const IN_M: f32 = RADIUS_MIN_M + MARGIN_M;
+const CRANK_M: f32 = 0.29;
 
 /// Speed of the robot over the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -118,27 +145,28 @@ pub(super) struct Stance {
 
 /// Plans the longest stance of a leg: over the whole stroke, yawed equally far to both sides.
 pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stance {
-    let middle = 0.5 * (OUT_M + IN_M);
+    let (near, far, yaw_tangent) = (geometry.in_m(), geometry.out_m(), geometry.yaw_tangent());
+    let middle = 0.5 * (far + near);
     let [ux, uy] = twist.ground_m_s(geometry, side, [middle, 0.0]);
     let longest_s = |out: f32| {
-        let along = (out - IN_M) / libm::fabsf(ux);
+        let along = (out - near) / libm::fabsf(ux);
         // Both ends at the farthest yaw: |uy| T = tan ψ (x_begin + x_end), one of them far out.
-        let across = 2.0 * YAW_TANGENT * out / (libm::fabsf(uy) + YAW_TANGENT * libm::fabsf(ux));
+        let across = 2.0 * yaw_tangent * out / (libm::fabsf(uy) + yaw_tangent * libm::fabsf(ux));
         if uy == 0.0 { along } else { along.min(across) }
     };
     let tangent = |out: f32, duration_s: f32| {
         // Yawed equally far to both sides.
         uy * duration_s / (2.0 * out - libm::fabsf(ux) * duration_s)
     };
-    if !longest_s(OUT_M).is_finite() {
+    if !longest_s(far).is_finite() {
         return Stance {
             begin_m: [middle, 0.0],
             duration_s: f32::INFINITY,
         };
     }
     // A yawed leg reaches less far forward.
-    let yaw = tangent(OUT_M, longest_s(OUT_M));
-    let out = OUT_M / libm::sqrtf(1.0 + yaw * yaw);
+    let yaw = tangent(far, longest_s(far));
+    let out = far / libm::sqrtf(1.0 + yaw * yaw);
     let duration_s = longest_s(out);
     let dx = ux * duration_s;
     // Drawn towards the robot it begins far out; pushed away from it, it ends there.
@@ -159,18 +187,19 @@ pub(super) fn time_left_s(
     let [x, y] = foot;
     let [ux, uy] = twist.ground_m_s(geometry, side, foot);
     let along = if ux < 0.0 {
-        (x - IN_M) / -ux
+        (x - geometry.in_m()) / -ux
     } else if ux > 0.0 {
-        (OUT_M - x) / ux
+        (geometry.out_m() - x) / ux
     } else {
         f32::INFINITY
     };
     // The foot meets the line of the farthest yaw: ±(y + uy t) = tan ψ (x + ux t).
-    let closing = libm::fabsf(uy) - YAW_TANGENT * ux;
+    let yaw_tangent = geometry.yaw_tangent();
+    let closing = libm::fabsf(uy) - yaw_tangent * ux;
     let across = if uy == 0.0 || closing <= 0.0 {
         f32::INFINITY
     } else {
-        (YAW_TANGENT * x - libm::copysignf(y, y * uy)) / closing
+        (yaw_tangent * x - libm::copysignf(y, y * uy)) / closing
     };
     along.min(across).max(0.0)
 }
@@ -184,7 +213,26 @@ mod tests {
         hip_y_m: 0.20,
         track_m: 0.56,
         nail_m: 0.0,
+        leg: LegParameters {
+            crank_m: 0.29,
+            p4_m: [0.29, 0.40],
+            stroke_zero_m: [0.31, 0.01, 0.01],
+            stroke_m: [STROKE_M; 3],
+            min_foot_radius_m: 0.01,
+            min_cos_theta3: 0.05,
+        },
     };
+
+    /// The robot with another crank, its yaw cylinder moved with it, and the feet so far out with
+    /// b5 drawn back.
+    fn with_leg(crank_m: f32, radius_m: f32) -> WalkGeometry {
+        let mut other = G;
+        other.leg.crank_m = crank_m;
+        other.leg.p4_m[0] = crank_m;
+        other.leg.stroke_zero_m[1] = radius_m;
+        other.leg.min_foot_radius_m = radius_m;
+        other
+    }
 
     #[test]
     fn straight_ahead_a_stance_takes_the_stroke_and_stays_in_line() {
@@ -196,11 +244,14 @@ mod tests {
             let plan = stance(twist, &G, side);
             assert!((plan.duration_s - 0.165 / 0.12).abs() < 1e-4);
             assert_eq!(plan.begin_m[1], 0.0);
-            assert!((plan.begin_m[0] - OUT_M).abs() < 1e-6);
+            assert!((plan.begin_m[0] - 0.1825).abs() < 1e-6);
             assert_eq!(twist.wheel_m_s(&G, side), 0.12);
         }
         let back = stance(twist.scaled(-1.0), &G, Side::Left);
-        assert!((back.begin_m[0] - IN_M).abs() < 1e-6);
+        assert!((back.begin_m[0] - 0.0175).abs() < 1e-6);
+        let long = stance(twist, &with_leg(0.29, 0.08), Side::Left);
+        assert!((long.begin_m[0] - 0.2525).abs() < 1e-6);
+        assert!((long.duration_s - 0.165 / 0.12).abs() < 1e-4);
     }
 
     #[test]
@@ -231,8 +282,19 @@ mod tests {
                 forward_m_s: speed,
                 turn_rad_s: turn,
             };
-            for side in [Side::Left, Side::Right] {
-                let plan = stance(twist, &G, side);
+            // The leg of the paper, then others: the cylinder turns a leg by asin(0.09 m / crank)
+            // and a little more to one side.
+            let legs = [
+                (0.29, 0.01),
+                (0.23, 0.01),
+                (0.35, 0.01),
+                (0.23, 0.08),
+                (0.35, 0.08),
+            ];
+            let cases = legs.map(|leg| [(leg, Side::Left), (leg, Side::Right)]);
+            for ((crank_m, radius_m), side) in cases.into_iter().flatten() {
+                let geometry = with_leg(crank_m, radius_m);
+                let plan = stance(twist, &geometry, side);
                 let mut foot = plan.begin_m;
                 let steps = 200_u16;
                 for _ in 0..=steps {
@@ -240,12 +302,12 @@ mod tests {
                     let reach = libm::hypotf(x, y);
                     let yaw = libm::atan2f(y, x);
                     assert!(
-                        yaw.abs() < 18.0_f32.to_radians(),
-                        "{speed} {turn} {side:?} {yaw}"
+                        yaw.abs() < libm::asinf(0.0896 / crank_m),
+                        "{speed} {turn} {side:?} {crank_m} {radius_m} {yaw}"
                     );
-                    assert!(reach < RADIUS_MIN_M + STROKE_M, "{speed} {turn} {reach}");
-                    assert!(reach > RADIUS_MIN_M, "{speed} {turn} {reach}");
-                    let [ux, uy] = twist.ground_m_s(&G, side, foot);
+                    assert!(reach < radius_m + STROKE_M, "{speed} {turn} {reach}");
+                    assert!(reach > radius_m, "{speed} {turn} {reach}");
+                    let [ux, uy] = twist.ground_m_s(&geometry, side, foot);
                     let dt = plan.duration_s / f32::from(steps);
                     foot = [x + ux * dt, y + uy * dt];
                 }

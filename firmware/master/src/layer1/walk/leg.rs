@@ -73,14 +73,14 @@ pub(super) struct Sensed {
 
 impl Sensed {
     /// From the measurements of a cycle; `None` if a board or the foot was not heard.
-    pub(super) fn of(feedback: &Feedback, side: Side) -> Option<Self> {
+    pub(super) fn of(geometry: &WalkGeometry, feedback: &Feedback, side: Side) -> Option<Self> {
         let stroke = |cylinder| -> Option<PositionMm> {
             feedback.strokes_mm.get(side.joint(cylinder)).copied()?
         };
         let plane = [stroke(Cylinder::Yaw)?, stroke(Cylinder::Horizontal)?];
         let [s2, s5] = plane.map(metres);
         let s6 = metres(stroke(Cylinder::Vertical)?);
-        let [x, y, _] = mirror::foot_of_strokes(side, [s2, s5, s6])?;
+        let [x, y, _] = mirror::foot_of_strokes(&geometry.leg, side, [s2, s5, s6])?;
         let switches = feedback.feet.get(side.index()).copied()?;
         Some(Self {
             foot_m: [x, y],
@@ -258,13 +258,13 @@ impl Leg {
                 let hard = CLEAR_MM.min(0.5 * lift_mm);
                 let clear = hard.max((1e3 * geometry.nail_m).min(NAILS_OUT * lift_mm));
                 if sensed.height_mm <= from_mm - clear {
-                    let foothold = self.nearer(foothold);
+                    let foothold = self.nearer(geometry, foothold);
                     self.state = LegState::Reach(distance(sensed.foot_m, foothold));
                 }
             }
             LegState::Reach(_) if held_plane => self.lower(),
             LegState::Reach(way_m) => {
-                let foothold = self.nearer(foothold);
+                let foothold = self.nearer(geometry, foothold);
                 self.foot_m = self.before_m.unwrap_or(foothold);
                 let left_m = distance(sensed.foot_m, self.foot_m);
                 if left_m <= (1.0 - LOWER_FROM) * way_m {
@@ -321,8 +321,8 @@ impl Leg {
     }
 
     /// A foothold, set nearer to the middle of the reach for each one that had no ground.
-    fn nearer(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        let middle = 0.1;
+    fn nearer(&self, geometry: &WalkGeometry, [x, y]: [f32; 2]) -> [f32; 2] {
+        let middle = geometry.middle_m();
         let nearer = (NEARER_M * f32::from(self.tries)).min(libm::fabsf(x - middle));
         [x - libm::copysignf(nearer, x - middle), y]
     }
@@ -369,7 +369,7 @@ impl Leg {
         };
         let [[x, y], [ux, uy]] = [self.foot_m, velocity];
         let ahead = [x + LEAD_S * ux, y + LEAD_S * uy];
-        if let Some(plane) = in_plane(self.side, ahead, velocity) {
+        if let Some(plane) = in_plane(geometry, self.side, ahead, velocity) {
             self.last = plane;
         } else {
             // At the edge of the reach: where it was, without a speed.
@@ -406,13 +406,16 @@ impl Leg {
 
 /// Yaw and b5 for a foot at `foot` moving with `velocity`, both m from O4.
 pub(crate) fn in_plane(
+    geometry: &WalkGeometry,
     side: Side,
     [x, y]: [f32; 2],
     [ux, uy]: [f32; 2],
 ) -> Option<[JointSetpoint; 2]> {
     // Height does not enter: the vertical cylinder is parallel to the yaw axis.
-    let z = -0.1;
-    let (strokes, rates) = mirror::strokes_of_foot(side, [x, y, z], [ux, uy, 0.0])?;
+    let leg = &geometry.leg;
+    let [_, _, b6] = leg.stroke_zero_m;
+    let z = -(b6 + 0.09);
+    let (strokes, rates) = mirror::strokes_of_foot(leg, side, [x, y, z], [ux, uy, 0.0])?;
     let ([s2, s5, _], [v2, v5, _]) = (strokes, rates);
     let joint = |stroke: f32, rate: f32| JointSetpoint {
         reference_mm: stroke_mm(stroke * 1e3),

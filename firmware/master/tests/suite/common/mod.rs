@@ -1,6 +1,7 @@
 //! Eight fake nodes on an in-memory bus, built from the protocol crate.
 #![allow(dead_code)]
 
+use wheeleg_kinematics::LegParameters;
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event;
@@ -14,6 +15,11 @@ use wheeleg_protocol::{
 use wheeleg_units::{PositionMm, VelocityMmS, WheelCount};
 
 pub(crate) const CYCLE_US: u64 = 10_000;
+
+/// The leg of the paper.
+pub(crate) fn leg() -> LegParameters<f32> {
+    LegParameters::wheeleg_2003()
+}
 
 /// A node with a perfect axis: it moves towards its reference at a limited speed.
 #[derive(Clone)]
