@@ -27,6 +27,10 @@
 //! * **predictive law**: law 5: plans single valve pulses from estimated pressures, with no PWM
 //! * **observer**: estimate of pressures, motion and load from the potentiometer and the valve
 //!   commands
+//! * **told**: given by the axis data, not learnt
+//! * **external**: sent by somebody other than the law: exhaust, precharge, hold
+//! * **choked speed**: C ρ0 R T0 / A: speed of the piston at which an open outlet holds the pressure of its chamber
+//! * **power**: in the observer, of a valve or of the piston over its area: pressure times speed
 //! * **period**: four ticks, in the last of which observer and predictive law work; pulses are planned for
 //!   the next one
 //! * **moment**: the time in a period for which the observer's estimates hold
@@ -35,7 +39,9 @@
 //! * **pressure swap**: the drive chamber makes up for a counter chamber that cannot vent any faster
 //! * **patience**: how long the servo acts near a target before a wider band of rest is accepted
 //! * **break-away ramp**: a force that grows while the piston sticks: the integral term of this law
+//! * **committed**: opening that cannot be taken back, of pulses that are under way
 //! * **expected**: at the end of the dead time, with the pulses that are under way
+//! * **oscillation**: of the mass on the air of both chambers, with the valves shut
 //! * **band**: error within which a piston rests
 //! * **seat**: a piston pressed against the end stop that is its target
 //! * **preload**: the force at the edge of slipping, ahead of an announced move

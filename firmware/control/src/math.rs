@@ -13,10 +13,15 @@ pub(crate) fn mul_shr_sat(a: i32, b: i32, shift: u32) -> i32 {
     high.wrapping_shl(left) | low as i32
 }
 
-/// `a × b / 2^shift`, rounded down, of a quotient that is known to fit.
+/// `a × b / 2^shift`, rounded down, of a quotient that is known to fit. Builds of the host check that; images do not.
 #[inline]
 pub(crate) const fn mul_shr(a: i32, b: i32, shift: u32) -> i32 {
-    (a as i64).wrapping_mul(b as i64).wrapping_shr(shift) as i32
+    let quotient = (a as i64).wrapping_mul(b as i64).wrapping_shr(shift);
+    debug_assert!(
+        quotient as i32 as i64 == quotient,
+        "a product that does not fit"
+    );
+    quotient as i32
 }
 
 /// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 for a `b` of 0. Two

@@ -4,9 +4,9 @@ use super::data::{AxisData, AxisField};
 use crate::observer::flow::FlowCurve;
 use crate::observer::valve_delay::ValveTimes;
 use crate::tuning::{
-    AMBIENT_PA, BRAKE_PERCENT, DAMPING_PERCENT, EXPONENT_PERCENT, LOAD_PERCENT, MEMORY,
-    NIMBLE_PERCENT, PRESSURE_HIGH_PERMILLE, PRESSURE_LOW_PERCENT, RAMP_PER_SECOND, SLOPE_PERCENT,
-    TOP_SPEED_HALVES,
+    AMBIENT_PA, BRAKE_PERCENT, DAMPING_PERCENT, EXPONENT_PERCENT, FILL_FLOW_PERCENT, LOAD_PERCENT,
+    MEMORY, NIMBLE_PERCENT, PRESSURE_HIGH_PERMILLE, PRESSURE_LOW_PERCENT, RAMP_PER_SECOND,
+    SLOPE_PERCENT, TOP_SPEED_HALVES,
 };
 use wheeleg_units::{Micros, PositionMm, divide};
 
@@ -24,17 +24,17 @@ pub struct AxisModel {
     pub ambient: i32,
     /// Full stroke.
     pub stroke: i32,
-    /// Dead length of A and of B.
+    /// Dead length of A: dead volume over area.
     pub dead_length_a: i32,
     /// Dead length of B.
     pub dead_length_b: i32,
-    /// C ρ0 R T / area, raw mm/s, for A.
-    pub flow_a: i32,
+    /// Choked speed of A, C ρ0 R T0 / area, raw mm/s.
+    pub choked_speed_a: i32,
     /// The same for B.
-    pub flow_b: i32,
+    pub choked_speed_b: i32,
     /// Polytropic exponent × 1.048576 × 2^30: see `AxisModel::exponent_per_length`.
     pub exponent: i32,
-    /// mN per 1/256 Pa, × 2^32, of A and B.
+    /// mN per 1/256 Pa, × 2^32, of A.
     pub force_a: i32,
     /// The same for B.
     pub force_b: i32,
@@ -54,7 +54,7 @@ pub struct AxisModel {
     pub low: i32,
     /// Highest pressure asked for.
     pub high: i32,
-    /// Largest force with these, extending and retracting, mN.
+    /// Largest extending force with these, mN.
     pub force_out: i32,
     /// Largest retracting force, mN, positive.
     pub force_in: i32,
@@ -68,12 +68,12 @@ pub struct AxisModel {
     pub breakaway: i32,
     /// Viscous friction, mN per mm/s, × 2^8.
     pub viscous: i32,
-    /// Dead time: from the moment of a period to that at which pulses of the next act, t_on and
+    /// Dead time T_d: from the moment of a period to that at which pulses of the next act, t_on and
     /// the line behind its begin, in s × 2^32.
     pub dead_time: i32,
     /// Dead time in µs.
     pub dead_time_us: i32,
-    /// Dead time from the tick that works out the force on, in s × 2^32.
+    /// Dead time T_r, from the tick that works out the force on: one tick, t_on and the line, in s × 2^32.
     pub dead_time_reference: i32,
     /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
     /// middle of the two ticks whose stroke is used.
@@ -84,11 +84,11 @@ pub struct AxisModel {
     pub mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
     pub nimble_mass: i32,
-    /// Slope of the speed law at the target, 1/s × 2^8, up to `nimble_mass`.
+    /// Slope of the speed law at the target k, 1/s × 2^8, up to `nimble_mass`.
     pub slope: i32,
-    /// Gain of the speed error, 1/s × 2^8, likewise.
+    /// Gain of the speed error D, 1/s × 2^8, likewise.
     pub damping: i32,
-    /// Deceleration towards the target, mm/s², likewise.
+    /// Deceleration towards the target a_b, mm/s², likewise.
     pub brake: i32,
     /// Highest speed asked for, raw mm/s.
     pub top_speed: i32,
@@ -108,11 +108,11 @@ pub struct AxisModel {
     pub precharged: bool,
     /// The mass is learnt from moves.
     pub learns_mass: bool,
-    /// Square of the period of a swing on the air of both chambers, periods² per kg × 2^8.
-    pub swing: i32,
+    /// Square of the time of one oscillation on the air of both chambers, periods² per kg × 2^8.
+    pub oscillation: i32,
 }
 
-/// R T of air at 293.15 K, J/kg, times its density at the reference atmosphere
+/// R T0 of air at 293.15 K, J/kg, times its density ρ0 at the reference atmosphere
 /// of ISO 8778, kg/m³: 1.185 × 287.05 × 293.15 Pa. Times 1e-8 m³/(s Pa) and 1e9 mm³:
 /// mm³/s of choked outflow per dm³/(s bar).
 const CHOKED_MM3_S: u64 = 997_162;
@@ -126,10 +126,10 @@ const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) 
 const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * LOAD_PERCENT / 100;
 /// Ticks of a period of observer and law: valves that take milliseconds need no decision in every one.
 pub const PERIOD_TICKS: u8 = 4;
-/// Square of the period of a swing, 4 π² m / k, with a stiffness k of 86 % of what both sides
+/// Square of the time of one oscillation, 4 π² m / k_air, with a stiffness k_air of 86 % of what both sides
 /// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
 /// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
-const SWING: u64 = 11_751_714_000_000_000_000;
+const OSCILLATION: u64 = 11_751_714_000_000_000_000;
 /// π/4 × 2^30.
 const QUARTER_PI: u64 = 843_314_857;
 
@@ -137,7 +137,7 @@ impl AxisModel {
     /// Checks the data and works out the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time
-    /// T = 1.5 ticks + t_on + line, which bounds its slope and damping,
+    /// T_d = 1.5 ticks + t_on + line, which bounds its slope and damping,
     /// and the speed at which a choked outlet lets the piston go, which bounds
     /// its top. The factors are those of [`crate::tuning`].
     ///
@@ -186,7 +186,7 @@ impl AxisModel {
         );
 
         // Speed law. The larger piston side is the slower outlet, of choked speed
-        // C ρ0 R T / area.
+        // C ρ0 R T0 / area.
         let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1));
         let per_dead_time_8 =
             |percents: u64| divide(percents.wrapping_mul(2_560_000), dead_time_us);
@@ -199,11 +199,10 @@ impl AxisModel {
             BRAKE_PERCENT,
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
-        // how fast the force can change, mN/s. Filled from a supply of about 7 bar at the mean of that and the
-        // atmosphere the flow is 0.9 of the choked one, by ISO 6358 with b of 0.3.
+        // how fast the force can change, mN/s.
         let both_8 = percent(
             stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke),
-            90,
+            FILL_FLOW_PERCENT,
         )
         .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke));
         // Half of both; 2^29 × 2^31 × 2^-12.
@@ -219,7 +218,7 @@ impl AxisModel {
         );
 
         // Pa/mm times mm², in 1e-3 N/m: with the tick below 2^64.
-        let swings = both_8.wrapping_mul(area_a_16).wrapping_shr(24);
+        let stiffness = both_8.wrapping_mul(area_a_16).wrapping_shr(24);
 
         let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
         // 1/256 Pa per mN for an area in mm²: 256 000/area, × 2^12.
@@ -248,8 +247,8 @@ impl AxisModel {
             stroke: number(raw(data.stroke)),
             dead_length_a: number(dead_length_16(data.dead_a, area_a_16)),
             dead_length_b: number(dead_length_16(data.dead_b, area_b_16)),
-            flow_a: number(flow_a_16),
-            flow_b: number(flow_b_16),
+            choked_speed_a: number(flow_a_16),
+            choked_speed_b: number(flow_b_16),
             exponent: const { ((EXPONENT_PERCENT << 50) / 100 / 1_000_000) as i32 },
             force_a: number(force_32(area_a_16)),
             force_b: number(force_32(area_b_16)),
@@ -274,6 +273,7 @@ impl AxisModel {
             moment: number(moment_us),
             period: seconds_32(period_us),
             mass: number(raw(data.mass)),
+            // 0.01 to 1000 kg: beyond what may be told, and fits.
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             slope: number(slope_8),
             damping: number(per_dead_time_8(DAMPING_PERCENT)),
@@ -298,9 +298,9 @@ impl AxisModel {
             release: data.release.raw(),
             precharged: data.precharged,
             learns_mass: data.learns_mass,
-            swing: ratio(
-                SWING,
-                swings.saturating_mul(period_us.wrapping_mul(period_us)),
+            oscillation: ratio(
+                OSCILLATION,
+                stiffness.saturating_mul(period_us.wrapping_mul(period_us)),
             ),
         }
     }

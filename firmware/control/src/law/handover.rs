@@ -43,7 +43,7 @@ impl Predictive {
 
     /// Nothing of the plan has been sent in the tick to come, nor will be.
     pub fn stopped(&mut self, model: &AxisModel) {
-        let sent = (model.times.tick as u16).wrapping_mul(u16::from(self.turn));
+        let sent = (model.times.tick as u16).wrapping_mul(u16::from(self.tick_of_period));
         self.plan = self.plan.map(|on| on.min(sent));
     }
 
@@ -62,7 +62,7 @@ impl Predictive {
     /// To the next tick.
     pub(super) const fn next_tick(&mut self, measured: PositionMm) {
         self.measured = measured.raw();
-        self.turn = self.turn.wrapping_add(1) % PERIOD_TICKS;
+        self.tick_of_period = self.tick_of_period.wrapping_add(1) % PERIOD_TICKS;
     }
 
     /// The end of a period: observes it, and begins the next.
@@ -83,7 +83,7 @@ impl Predictive {
     /// Somebody else drives from the tick on that begins: what is planned for after it does not happen.
     #[cold]
     fn release_valves(&mut self, model: &AxisModel) {
-        let ticks = i32::from(self.turn).wrapping_add(1);
+        let ticks = i32::from(self.tick_of_period).wrapping_add(1);
         let end = self
             .begin
             .wrapping_add(model.times.tick.wrapping_mul(ticks) as u32);

@@ -1,18 +1,32 @@
 //! Inverse dynamics: the force that gives the wanted speed, with friction fed forward.
 //!
 //! ```text
-//! e  = r + v_r T − x'                      v* = v_r + curve(e)        primes: at the end of the dead time
-//! a* = k(e) (v_r − v') + D (v* − v')       limited to 5/2 b           b: brake of the mass; k: slope of the curve, D: damping
-//! F* = m a* + Fc sgn + d v* + ramp − load
+//! e    = r + v_r T_r − x'
+//! a_b' = max(200 mm/s², min(a_b, 0.7 F_left / m))        F_left = F_in − load   for e > 0, F_out + load otherwise
+//! v*   = v_r + curve(e, a_b')
+//! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 5/2 a_b
+//! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*
 //! ```
 //!
-//! Computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
-//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The fed-forward friction
-//! is faded out where the piston does not come to rest: more than there is makes a relay. A piston
-//! that sticks outside its band is pushed with a growing force until it slips, [`BreakawayRamp`].
+//! | | unit | |
+//! |---|---|---|
+//! | r, v_r | mm, mm/s | reference and its speed |
+//! | x', v' | mm, mm/s | motion at the end of the dead time, `dead_time_predictor` |
+//! | T_r | s | dead time from this tick: one tick, t_on and the line |
+//! | curve, k(e), D, a_b | mm/s, 1/s, 1/s, mm/s² | speed by the error and its slope, damping, deceleration: `switching_curve` |
+//! | F_in, F_out | mN | largest force of the supply, retracting and extending: what can brake |
+//! | load, Fc, d, m | mN, mN, mN s/mm, kg | as in [`crate::observer::motion`]; Fb instead of Fc while \|v\| < 3 mm/s; faded by `standstill` |
+//! | sat(u) | 1 | u within ±1 |
+//! | ramp | mN | towards r, +5 Fb in a second while \|v\| < 3 mm/s or stuck, and r rests; −41 % a period above 10 mm/s; at most F_out |
 //!
-//! What it learns: the load by the observer. The ramp is an integral that is forgotten with each new target.
-//! Coulomb friction is as told.
+//! Source: computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
+//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration that a load leaves,
+//! and the ramp, are this project's (decision 38). The fed-forward friction
+//! is faded out where the piston does not come to rest: more than there is makes a relay. The ramp is an integral that is
+//! forgotten with each new target.
+//!
+//! Assumes: friction and supply as told: neither is learnt. Load and mass are those of the observer. The force that is
+//! asked for is there at the end of the dead time, as far as the pulses of one period can make it.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and
 //! [`ForceDemand::force`].

@@ -1,9 +1,13 @@
 //! The predictive law: position of one axis with four on/off valves and one potentiometer.
 //!
+//! *Predictive*: it acts by the state that is predicted for the end of the dead time. Nothing is optimised over a
+//! horizon, and there is no cost.
+//!
 //! ```text
+//!    x, v, load; p also at T_d
 //! observer ──► dead-time predictor ──► switching curve ──► inverse dynamics ──► allocation ──► pulse planner
-//! p, x, v, load     p, x, v at T_d        v*(e), dv*/de         F*                pA*, pB*       µs of each valve
-//!                        standstill (seat, preload): instead of F* all valves shut, or a force of its own
+//!    │              x, v at T_d           v*(e), dv*/de           F*               pA*, pB*     µs of each valve
+//!    └──► standstill (seat, preload): instead of F* all valves shut, or a force of its own
 //! ```
 //!
 //! | file | concept |
@@ -22,6 +26,13 @@
 //! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
 //! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
 //! Gains and thresholds stand in [`crate::tuning`], all of them; formats are those of [`crate::observer`].
+//!
+//! The files have times as: T_t tick, T period, T_d dead time from the moment of the observer, T_r dead time from the
+//! tick that works; and the deceleration towards the target as a_b.
+//!
+//! Assumes: a stroke that is true. A potentiometer that is open, shorted or loose, or frozen, is not noticed here but in
+//! the node (`firmware/node/src/sensor.rs`, `firmware/node/src/joint/no_motion_detector.rs`). Delays of the valves are as
+//! told; `wheeleg tune` looks for them on the axis.
 
 mod allocation;
 mod dead_time_predictor;
@@ -81,7 +92,7 @@ pub struct Predictive {
     /// The law decides about the coils, not somebody else.
     drives: bool,
     /// Tick of the period that comes next.
-    turn: u8,
+    tick_of_period: u8,
     /// Begin of the present period, µs; wraps. In the last tick of a period, once that is observed, of the next.
     begin: u32,
     /// Stroke of the last tick, raw mm.
@@ -119,7 +130,7 @@ impl Predictive {
             swap: PressureSwap::No,
             primed: false,
             drives: false,
-            turn: 0,
+            tick_of_period: 0,
             begin: 0,
             measured: 0,
             plan: [0; 4],
@@ -162,7 +173,7 @@ impl Predictive {
     /// Whether the next tick ends a period: it is the one with all the work.
     #[must_use]
     pub const fn plans(&self) -> bool {
-        self.turn.saturating_add(1) >= PERIOD_TICKS
+        self.tick_of_period.saturating_add(1) >= PERIOD_TICKS
     }
 
     /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the
@@ -197,7 +208,7 @@ impl Predictive {
     fn due(&self, model: &AxisModel) -> OnTimes {
         let tick = model.times.tick as u16;
         // The tick after the last of a period is the first of the next one, whose plan is new.
-        let next = self.turn.wrapping_add(1) % PERIOD_TICKS;
+        let next = self.tick_of_period.wrapping_add(1) % PERIOD_TICKS;
         let gone = tick.wrapping_mul(u16::from(next));
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
     }

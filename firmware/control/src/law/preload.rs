@@ -1,8 +1,11 @@
 //! Preload: ahead of an announced move the force stands at the edge of slipping in its direction.
 //!
 //! ```text
-//! F* = ½ Fc sgn(next − x) − load            Fc: Coulomb friction; load, x: observer
+//! F* = ½ Fc sgn(next − x) − load            Fc: Coulomb friction, N; load, N, and x, mm: observer
+//! acts  until |F* − F expected| ≤ Fc/8 and the counter chamber no longer lags; again from |F* − F expected| > Fc/2 on
 //! ```
+//!
+//! Source: this project (decision 38).
 //!
 //! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
 //! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`). It ends with the announcement, or when
@@ -13,7 +16,7 @@
 //!
 //! Assumes: at least half of the friction that is told, so that the piston stands; that the observer's load and
 //! pressures are right to the other half; the move as announced. If the supply falls, the drive chamber has less than
-//! was reckoned: the force is short of the edge, the piston stands, and the move begins later. The counter chamber
+//! was estimated: the force is short of the edge, the piston stands, and the move begins later. The counter chamber
 //! vents as before. Of an announcement that is not followed nothing is left but the air.
 //!
 //! Config [`AxisModel`], state [`Preload`], update [`Predictive::preload`].
@@ -58,11 +61,17 @@ impl Predictive {
         // behind it, or where patience is over, the piston need not rest.
         let reference_rests = input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS;
         let motion = &self.observer.motion;
-        let leans = stands
+        let pressed = stands
             && !self.is_settled()
             && reference_rests
-            && motion.at_end_stop(model, input.reference.raw(), self.standstill.lingers());
-        let next = input.announced.filter(|_| self.standstill.holds() || leans);
+            && motion.at_end_stop(
+                model,
+                input.reference.raw(),
+                self.standstill.patience_is_over(),
+            );
+        let next = input
+            .announced
+            .filter(|_| self.standstill.holds() || pressed);
         let Some(next) = next else {
             self.preload = Preload::default();
             return None;

@@ -1,14 +1,21 @@
 //! Pulse planner: from the pressure that a chamber lacks to the on-times of the next period.
 //!
 //! ```text
-//! opening = (p* − p expected) / (dp/dt of the open valve)
+//! opening = (p* − p expected) / ṗ         ṗ = n K p_s ψ(p/p_s) / L to fill, −n K p ψ(p_a/p) / L to vent
 //! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
 //! ```
+//!
+//! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean of
+//! the pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project,
+//! decision 7; flow by ISO 6358-1.
 //!
 //! Pulses are timed to the microsecond and may outlast a period. An opening below the shortest is rounded to that or
 //! to nothing, whichever is nearer. The valve that would undo it shuts as soon as its own pulse allows, and a chamber's
 //! two valves are never on together. Near the target a pulse of one chamber alone: two may be too much of valves that
 //! cannot open for less.
+//!
+//! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected one
+//! alone; delays of the valves as told within their margin; supply and atmosphere as told.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 
@@ -34,10 +41,10 @@ enum Ready {
 impl Ready {
     /// In the period that begins `next`, up to which the coil is decided.
     fn of(track: &ValveTrack, next: u32, times: &ValveTimes) -> Self {
-        let lasts = track.lasts(next);
+        let elapsed = track.elapsed(next);
         if track.coil() {
-            Self::On((times.shortest_pulse as u32).saturating_sub(lasts) as i32)
-        } else if lasts < times.shortest_gap as u32 {
+            Self::On((times.shortest_pulse as u32).saturating_sub(elapsed) as i32)
+        } else if elapsed < times.shortest_gap as u32 {
             Self::Shuts
         } else {
             Self::Shut
@@ -100,7 +107,7 @@ fn opening(power: i32, change: i32, n_per_length: i32) -> i32 {
 fn pulses(
     model: &AxisModel,
     chamber: &Chamber,
-    [flow, length]: [i32; 2],
+    [choked_speed, length]: [i32; 2],
     target: i32,
     next: u32,
 ) -> [u16; 2] {
@@ -111,11 +118,11 @@ fn pulses(
     // Of the pressure between now and the end of the dead time.
     let mean = chamber.pressure.saturating_add(chamber.expected) >> 1;
     if change > 0 {
-        let need = opening(model.fill_power(flow, mean), change, n_per_length);
+        let need = opening(model.fill_power(choked_speed, mean), change, n_per_length);
         [fill.on_time(need, vent, times), vent.rest(times)]
     } else {
         let need = opening(
-            model.vent_power(flow, mean),
+            model.vent_power(choked_speed, mean),
             change.saturating_neg(),
             n_per_length,
         );
@@ -136,14 +143,14 @@ pub(super) fn plan(
     let [fill_a, vent_a] = pulses(
         model,
         a,
-        [model.flow_a, model.length_a(end)],
+        [model.choked_speed_a, model.length_a(end)],
         target.a,
         next,
     );
     let [fill_b, vent_b] = pulses(
         model,
         b,
-        [model.flow_b, model.length_b(end)],
+        [model.choked_speed_b, model.length_b(end)],
         target.b,
         next,
     );

@@ -1,18 +1,22 @@
 //! The seat at an end stop: where the target is a stop, a force instead of a position.
 //!
 //! ```text
-//! F* = ±3 F_breakaway                    toward the stop
-//! rest: |v| small, within 1.5 mm of the target, and F expected ≥ ¾ F*
+//! F* = ±min(3 Fb, F_in)                  toward the stop; Fb: break-away friction, F_in: largest retracting force, N
+//! rest: |v| < 3 mm/s, within 1.5 mm of the target, and F expected > ¾ F* towards the stop
 //! ```
 //!
 //! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
 //! target at the very end of the stroke: beyond every rest band of a position law, which then
 //! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then known to be
 //! full, or the other to be empty. An axis without precharge has no seat: the air of it would make a
-//! start without notice 20 ms later (`tests/system/delay.rs`). It is awake again by a new target, or 1.5 mm off its place.
+//! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`). A piston at rest here is pressed
+//! again when it is 1.5 mm off its target; a new target ends the seat.
 //!
-//! Force control against a stiff environment instead of position control (the switch of hybrid control, Raibert and
-//! Craig 1981).
+//! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
+//! and Craig 1981).
+//!
+//! Assumes: the length of the stroke, as told, is right to 0.5 mm; break-away friction and supply as told; chambers that a
+//! precharge has filled, so that the expected force is right to a quarter.
 
 use super::Predictive;
 use crate::axis::AxisModel;

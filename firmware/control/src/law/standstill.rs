@@ -1,23 +1,28 @@
 //! Standstill: when the valves stay shut, a state machine.
 //!
 //! ```text
-//!           in the band and slow, or friction stops it there      for REST_PERIODS
+//!           in the band and slow, or friction stops it there   for more than REST_PERIODS
 //!  SERVO ───────────────────────────────────────────────► CATCH ─────────────────► REST
 //!    ▲ │ ▲                                                  │                        │
 //!    │ │ └──────────────────────────────────────────────────┘                        │
-//!    │ └─► PAUSE   patience is over and it entered the band: one swing with the valves shut
+//!    │ └─► PAUSE   patience is over and it entered the band: one oscillation with the valves shut
 //!    └──────────────────────────────────────────────────── out of the release band ──┘
-//!  PRESS: at an end stop a force is controlled (`seat`); it ends in REST
+//!  PRESS: at an end stop a force is controlled (`seat`); it ends in REST once the piston is pressed, in SERVO when
+//!         the target is no stop any more
 //! ```
 //!
-//! * **Stopping way.** Friction alone stops the piston in the band if m v²/2 lies between the work of what friction
-//!   has left beside the forces that act, over the ways to both edges of the band.
+//! * **Stopping distance.** With shut valves friction alone stops the piston in the band if
+//!   F_s (|e| − band) < m v²/2 < F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target;
+//!   counted on within 12 bands of it and while F_s is at least Fc/4.
 //! * **Patience.** What does not come to rest near its target for long may do so in a wider band, up to 2.4 times
 //!   and 0.4 mm, and the friction that is fed forward fades. Each time it enters that band the law waits with the
-//!   valves shut for a swing of the mass on the air, 2π √(m / k), k = n p (AA²/VA + AB²/VB): no limit
+//!   valves shut for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB): no limit
 //!   cycle lasts.
 //! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
 //!   a new target.
+//!
+//! e: error, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m: mass, kg; n = 1.2; p, V:
+//! mean pressure, Pa, and volume of each chamber at mid stroke, m³; AA, AB: areas, m²; k_air: N/m; T_o: s.
 //!
 //! Assumes: friction of at least 0.85 of what is told, where it is counted on; that shut valves hold the air, so that a
 //! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
@@ -34,10 +39,10 @@ use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
 use crate::tuning::{
-    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FLED, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS,
-    NEAR_PERIODS, PATIENCE, PATIENCE_MOST, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS,
-    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, STILL_SPEED,
-    STOP_LEAST_SHIFT, STOP_ZONE_BANDS, SWING_PERIODS_MAX, SWING_PERIODS_MIN, WIDENS_AFTER,
+    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
+    OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE, PATIENCE_MOST, PAUSE_ENDS_BEYOND,
+    PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS, RELEASE_PERIODS, RELEASE_SIXTEENTHS,
+    RELEASE_WIDEST, REST_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER,
     WIDENS_SHIFT,
 };
 
@@ -50,7 +55,7 @@ pub(super) enum State {
     /// The position servo acts.
     #[default]
     Servo,
-    /// Valves shut for what is left of a swing.
+    /// Valves shut for what is left of an oscillation.
     Pause,
     /// Valves shut: friction stops the piston.
     Catch,
@@ -105,7 +110,7 @@ impl Standstill {
     }
 
     /// Whether it has been near its target without coming to rest for longer than patience allows.
-    pub(super) const fn lingers(&self) -> bool {
+    pub(super) const fn patience_is_over(&self) -> bool {
         self.near > PATIENCE
     }
 
@@ -146,15 +151,15 @@ impl Standstill {
 
     /// One period.
     pub(super) fn update(&mut self, model: &AxisModel, now: &Approach) {
-        let steps = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        let reference_rests = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
         if self.is_at_rest() {
-            if self.stays(model, now, steps) {
+            if self.stays(model, now, reference_rests) {
                 return;
             }
             self.caught = 0;
             self.near = self.near.max(PATIENCE);
         }
-        if !steps {
+        if !reference_rests {
             self.state = State::Servo;
             self.near = self.near.saturating_sub(1);
             self.caught = 0;
@@ -194,7 +199,7 @@ impl Standstill {
     }
 
     /// Whether a piston at rest stays so.
-    fn stays(&mut self, model: &AxisModel, now: &Approach, steps: bool) -> bool {
+    fn stays(&mut self, model: &AxisModel, now: &Approach, reference_rests: bool) -> bool {
         let band = self.band(model);
         let beyond = model.band.wrapping_mul(RELEASE_BEYOND_SIXTEENTHS) >> 4;
         let release = model
@@ -210,25 +215,25 @@ impl Standstill {
             release.max(model.release)
         };
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
-        if steps && away <= release {
+        if reference_rests && away <= release {
             self.outside = 0;
             self.aimed = false;
             return true;
         }
         self.outside = self.outside.wrapping_add(1);
         // A new target is no noise.
-        steps && !self.aimed && self.outside < RELEASE_PERIODS
+        reference_rests && !self.aimed && self.outside < RELEASE_PERIODS
     }
 
     /// Act and wait. Where acting alone has not brought the piston to rest for long,
     /// each gentle entry into the band is followed by a pause with the valves shut, about one
-    /// swing on the air of the chambers: a piston that swings on it, or on the bristles of
+    /// oscillation on the air of the chambers: a piston that oscillates on it, or on the bristles of
     /// its friction, comes to rest by itself, and every pulse meant to help would keep it
-    /// going. One that flees, because the forces on it are not in balance, is not waited for.
+    /// going. One that leaves, because the forces on it are not in balance, is not waited for.
     fn wait(&mut self, model: &AxisModel, now: &Approach, speed: i32, error: i32, inside: bool) {
         let entered = inside && !self.inside;
         self.inside = inside;
-        if speed > GENTLE_SPEED || (error > FLED && !inside) {
+        if speed > GENTLE_SPEED || (error > PAUSE_ENDS_BEYOND && !inside) {
             self.pause = 0;
         } else if self.pause > 0 {
             let spent = if inside || speed >= STILL_SPEED {
@@ -238,7 +243,7 @@ impl Standstill {
             };
             self.pause = self.pause.saturating_sub(spent);
         } else if entered && self.beyond() > 0 {
-            self.pause = swing(model, now.mass);
+            self.pause = oscillation(model, now.mass);
         }
     }
 
@@ -273,12 +278,12 @@ impl Standstill {
     }
 }
 
-/// Periods of a swing of a mass (kg × 2^16) on the air of both chambers, 25…250.
+/// Periods of an oscillation of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
-fn swing(model: &AxisModel, mass: i32) -> u16 {
-    let square_8 = mul_shr_sat(mass, model.swing, 16);
+fn oscillation(model: &AxisModel, mass: i32) -> u16 {
+    let square_8 = mul_shr_sat(mass, model.oscillation, 16);
     let periods = square_root(square_8.unsigned_abs()).wrapping_shr(4);
-    periods.clamp(SWING_PERIODS_MIN, SWING_PERIODS_MAX) as u16
+    periods.clamp(OSCILLATION_PERIODS_MIN, OSCILLATION_PERIODS_MAX) as u16
 }
 
 /// How the piston comes to its target.
@@ -299,7 +304,7 @@ pub(super) struct Approach<'a> {
 
 impl Approach<'_> {
     /// Whether friction alone stops the piston within the band, if the valves shut:
-    /// the way is the kinetic energy over what friction has left beside the
+    /// the distance is the kinetic energy over what friction has left beside the
     /// forces that act.
     #[inline]
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
@@ -323,7 +328,7 @@ impl Approach<'_> {
         } else {
             error
         };
-        let work = |way: i32| i64::from(stopping).wrapping_mul(i64::from(way));
+        let work = |distance: i32| i64::from(stopping).wrapping_mul(i64::from(distance));
         energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
     }
 }

@@ -1,15 +1,27 @@
-//! Proximate time-optimal switching curve: the speed towards a target, by the way that is left.
+//! Proximate time-optimal switching curve: the speed towards a target, by the distance that is left.
 //!
 //! ```text
-//! e_l  = b / k²                              where straight line and parabola meet, with one slope
+//! e_l  = a_b / k²                            where straight line and parabola meet, with one slope
 //! v*   = k e                                 |e| ≤ e_l
-//!      = sgn(e) min(v_top, √(2 b (|e| − e_l/2)))   beyond
+//!      = sgn(e) min(v_top, √(2 a_b (|e| − e_l/2)))   beyond
+//!
+//! k = 0.36 s / T_d      D = 0.95 s / T_d      a_b = 0.60 (0.36 / T_d) v_top s²
+//! s = min(1, ∛(m_n / m))
+//! v_top = min(v_B, 1.5 v_A)                  v = C ρ0 R T0 / area of the chamber: its choked speed
+//! m_n   = 0.60 · ½ Ḟ / (a_b k)               with s = 1; Ḟ: how fast both valves change the force at mid stroke
 //! ```
 //!
-//! The parabola is the time-optimal curve of a mass that brakes with `b`; the straight line at its foot
+//! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time, s;
+//! m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
+//! [`crate::observer::pressure`]. `inverse_dynamics` may lower a_b under a load.
+//!
+//! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot
 //! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
-//! serves 1 and 400 mm. Gains scale with the inverse of the dead time and fall with the cube root of what the mass exceeds
-//! the axis's nimble mass by: slope and damping once, the deceleration twice.
+//! serves 1 and 400 mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are
+//! searched ([`crate::tuning`]). e_l does not depend on the mass.
+//!
+//! Assumes: dead time, supply and conductance as told, the mass that is in use; and that a force can be built up within
+//! about a dead time, which the nimble mass stands for.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].
 
@@ -24,7 +36,7 @@ pub(super) struct SpeedGains {
     pub(super) slope: i32,
     /// Gain of the speed error, 1/s × 2^8.
     pub(super) damping: i32,
-    /// Deceleration towards the target b, mm/s².
+    /// Deceleration towards the target a_b, mm/s².
     pub(super) brake: i32,
     /// 1/(2 k²), s² × 2^32.
     linear: i32,
@@ -56,13 +68,13 @@ impl SpeedGains {
     /// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8, for a
     /// deceleration of at most `brake` (mm/s²).
     pub(super) fn speed(&self, error: i32, brake: i32, top: i32) -> (i32, i32) {
-        // Half of e_l: b / (2 k²), mm/s² × s² × 2^32 to raw mm.
+        // Half of e_l: a_b / (2 k²), mm/s² × s² × 2^32 to raw mm.
         let half = mul_shr_sat(brake, self.linear, 16);
         let size = error.saturating_abs();
         if size <= half.saturating_mul(2) {
             return (mul_shr_sat(self.slope, error, 8), self.slope);
         }
-        // (32 v)² = 2 b e × 2^10, e raw: × 2^11 / 2^16.
+        // (32 v)² = 2 a_b e × 2^10, e raw: × 2^11 / 2^16.
         let square = i64::from(brake)
             .wrapping_mul(i64::from(size.saturating_sub(half)))
             .wrapping_shr(5);

@@ -174,7 +174,7 @@ fn what_somebody_else_sends_is_counted_once() {
             }
             // Choked: of C ρ0 R T p_s a share of the volume, n times as much in pressure.
             let length = f64::from(model.length_a(90 << 16)) / 65_536.0;
-            let flow = f64::from(model.flow_a) / 65_536.0;
+            let flow = f64::from(model.choked_speed_a) / 65_536.0;
             let open_s = f64::from(ticks) * 600e-6;
             let rise = 1.2 * f64::from(model.supply) * flow * open_s / length;
             let risen = f64::from(law.pressures().a - model.ambient);
@@ -203,7 +203,7 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
             let way = (tick / 4).min(100) as i16;
             first = begun.drive(&model, &input(20 + way, 170)).on;
         }
-        assert_eq!(begun.turn, 0);
+        assert_eq!(begun.tick_of_period, 0);
         let begin = begun.begin;
         for sent_ticks in 0..4 {
             let mut law = begun.clone();
@@ -253,7 +253,7 @@ fn what_was_planned_but_stopped_does_not_count() {
     for ticks in 100..104 {
         let mut law = moving(&model, ticks);
         law.drive(&model, &input(70, 170));
-        let sent = 1000 * u16::from(law.turn);
+        let sent = 1000 * u16::from(law.tick_of_period);
         law.stopped(&model);
         assert!(
             law.plan.iter().all(|on| *on <= sent),

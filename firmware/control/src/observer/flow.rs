@@ -1,9 +1,17 @@
 //! Flow through a valve by ISO 6358.
 //!
 //! ```text
-//! q = C ρ0 p₁                          p₂ ≤ b p₁: choked
-//! q = C ρ0 p₁ √(1 − ((p₂/p₁ − b)/(1 − b))²)   otherwise
+//! q = C ρ0 p₁ ψ(p₂/p₁)
+//! ψ(r) = 1                             r ≤ b: choked
+//!      = √(1 − ((r − b)/(1 − b))²)     otherwise
 //! ```
+//!
+//! q: mass flow, kg/s; p₁, p₂: pressure upstream and downstream, Pa absolute; C: sonic conductance, m³/(s Pa);
+//! b: critical pressure ratio, told by the axis data as C is; ρ0 = 1.185 kg/m³: density of the reference atmosphere of
+//! ISO 8778 (20 °C, 1 bar, 65 %). Source: ISO 6358-1, with its factor √(T0/T1) taken as 1.
+//!
+//! Assumes: all air upstream at 293 K (20 K more are 3 % less flow); one C and one b for filling and venting; a valve
+//! that is open, or shut, and nothing between.
 
 use crate::math::{mul_shr, square_root};
 
@@ -17,17 +25,18 @@ pub struct FlowCurve {
 }
 
 impl FlowCurve {
-    /// p₁ ψ(p₂/p₁) from 1 to 2, both in 1/256 Pa; negative when the gas runs back.
+    /// p₁ ψ(p₂/p₁) from 1 to 2, both in 1/256 Pa: the pressure from which as much would flow if choked; negative when
+    /// the gas runs back.
     ///
     /// With y = (p₂ − b p₁)/(1 − b), the root of p₁² − y²: no division.
     #[inline]
     #[must_use]
-    pub fn drive(&self, from: i32, to: i32) -> i32 {
+    pub fn choked_equivalent(&self, from: i32, to: i32) -> i32 {
         let forward = from >= to;
         let (high, low) = if forward { (from, to) } else { (to, from) };
         // In 32 Pa: 17 bits.
         let y = mul_shr(low, self.stretch, 32).wrapping_sub(mul_shr(high, self.choked, 32));
-        let drive = if y <= 0 {
+        let equivalent = if y <= 0 {
             high
         } else {
             let p1 = high.max(0).wrapping_shr(13);
@@ -35,17 +44,21 @@ impl FlowCurve {
             let square = p1.wrapping_sub(y).max(0).wrapping_mul(p1.wrapping_add(y));
             square_root(square.cast_unsigned()).wrapping_shl(13) as i32
         };
-        if forward { drive } else { drive.wrapping_neg() }
+        if forward {
+            equivalent
+        } else {
+            equivalent.wrapping_neg()
+        }
     }
 
-    /// The same as a power, for an open valve's `flow` as a speed of the piston.
+    /// The same times the choked speed of a chamber (raw mm/s): the power over area of an open valve.
     #[inline(never)]
-    pub(crate) fn power(&self, from: i32, to: i32, flow: i32) -> i32 {
-        power(self.drive(from, to), flow)
+    pub(crate) fn power(&self, from: i32, to: i32, choked_speed: i32) -> i32 {
+        power(self.choked_equivalent(from, to), choked_speed)
     }
 }
 
-/// Power of `pressure` (1/256 Pa) at `speed` (raw mm/s): 2^-24 Pa mm/s to 2^8.
+/// Power over area of `pressure` (1/256 Pa) at `speed` (raw mm/s): 2^-24 Pa mm/s to 2^8.
 /// Below 2^28.
 #[inline]
 pub(crate) const fn power(pressure: i32, speed: i32) -> i32 {

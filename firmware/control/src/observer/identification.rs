@@ -1,13 +1,13 @@
 //! Identification of a move: the mass, and where within their bounds the pressures were, by least squares.
 //!
-//! While the piston slides one way, the impulse of the force that the model reckons is linear in what it does not know:
+//! While the piston slides one way, the impulse of the estimated force is linear in what the model does not know:
 //!
 //! ```text
-//! J(k) = Σ (F − viscous) = m Δv(k)/T − c k − uA Σ wA + uB Σ wB          k: periods since the piston slides
+//! J(i) = Σ (F − d v) = m (v(i) − v₀)/T + c i − uA Σ wA + uB Σ wB        i: periods since the piston slides
 //!   wA = AA (pA⁺ − pA⁻)      width of the bounds, as a force        u: error of the pressure as a share of it
 //! ```
 //!
-//! `c` is load and friction. The air's error fades as a chamber is filled, is vented or grows, in a way that the widths
+//! J in mN · periods, w in mN, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's error fades as a chamber is filled, is vented or grows, in a way that the widths
 //! have in common with it; that tells it from mass and load. Normal equations of the four unknowns, with a ridge that holds
 //! the shares at nothing where the move says little (Ljung, System Identification, ch. 7; Hoerl and Kennard 1970).
 //!
@@ -208,10 +208,10 @@ mod tests {
             a_n *= 0.97;
             b_n *= if period <= 30 { 0.98 } else { 1.01 };
             let true_n = mass_kg * gained / 4.0 + 12.0;
-            let reckoned_n = true_n - shares[0] * a_n + shares[1] * b_n;
+            let estimated_n = true_n - shares[0] * a_n + shares[1] * b_n;
             let raw = ((speed - 20.0) * 65_536.0) as i32;
             let widths = [(a_n * 1e3) as i32, (b_n * 1e3) as i32];
-            regression.add(model, raw, period, (reckoned_n * 1e3) as i32, widths);
+            regression.add(model, raw, period, (estimated_n * 1e3) as i32, widths);
         }
         regression.solve(model).expect("told apart")
     }
@@ -236,7 +236,7 @@ mod tests {
         }
     }
 
-    /// The more of the residual is reckoned with, and the less the pressures are likely to be off, the less they are
+    /// The larger the residual that is expected, and the less the pressures are likely to be off, the less they are
     /// corrected: here an error of 0.6 and 0.7 of the bounds' widths.
     #[test]
     fn the_ridge_is_that_of_the_table() {

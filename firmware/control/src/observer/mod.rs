@@ -7,7 +7,7 @@
 //! | [`pressure`] | pressure of a chamber, and its bounds | openings, motion |
 //! | [`motion`] | stroke, speed, load | pressure force, measured stroke |
 //! | `trajectory` | where the piston goes in the dead time | motion |
-//! | [`mass`] | moving mass, from three moments of a move | pressure force, speed |
+//! | [`mass`] | moving mass, from three instants of a move | pressure force, speed |
 //! | `identification` | mass and pressures from one move, where those are not known | the same, bounds |
 //!
 //! All of it once in a period of [`PERIOD_TICKS`] ticks, in this order ([`Observer::update`]). The law in
@@ -92,10 +92,10 @@ impl Observer {
 
     /// Where the piston is at the end of the dead time at its present speed, raw mm.
     pub(crate) fn end_of_dead_time(&self, model: &AxisModel) -> i32 {
-        let way = mul_shr(self.motion.speed, model.dead_time, 32);
+        let ahead = mul_shr(self.motion.speed, model.dead_time, 32);
         self.motion
             .stroke
-            .saturating_add(way)
+            .saturating_add(ahead)
             .max(0)
             .min(model.stroke)
     }
@@ -145,12 +145,12 @@ impl Observer {
             ahead,
         } = self.trajectory;
         let a = ChamberMotion {
-            flow: model.flow_a,
+            choked_speed: model.choked_speed_a,
             lengths: [model.length_a(middle), model.length_a(end)],
             speeds: [speed.wrapping_neg(), ahead.wrapping_neg()],
         };
         let b = ChamberMotion {
-            flow: model.flow_b,
+            choked_speed: model.choked_speed_b,
             lengths: [model.length_b(middle), model.length_b(end)],
             speeds: [speed, ahead],
         };

@@ -1,7 +1,8 @@
-//! Motion and load observer: a fading-memory filter of second order around the equation of motion.
+//! Motion and load observer: a fading-memory filter of degree 2 around the equation of motion. Three states: stroke,
+//! speed, load.
 //!
 //! ```text
-//! predict   m dv/dt = F + load − d v − Fc sgn v             F = pA AA − pB AB − pa (AA − AB)
+//! predict   m dv/dt = F + load − d v − 0.92 Fc sgn v        F = pA AA − pB AB − pa (AA − AB)
 //!           stuck: |v| small and |F + load| < Fb, or pressed against an end stop
 //! correct   ε = x measured − x predicted                    θ: weight of a period against the next
 //!           x += (1 − θ³) ε
@@ -12,9 +13,20 @@
 //! Gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
 //! Fundamentals of Kalman Filtering, ch. 7), which has one parameter, θ. The load takes what the pressures
 //! have wrong, too, so only a share c of its gain is used, and the filter is slower than its θ says: of its
-//! three poles the slow one is 0.81 a period, 19 ms. Friction: Coulomb, viscous and break-away, as told.
+//! three poles the slow one is 0.81 a period, 19 ms.
 //!
-//! Assumes: a load that is constant but for corrections, the mass of the estimator beside it, friction within a few tenths of the data.
+//! | | unit | |
+//! |---|---|---|
+//! | x, v | mm, mm/s | stroke, speed; positive extends |
+//! | F, load | mN | pressure force; force from outside and what the model does not know |
+//! | Fc, Fb | mN | Coulomb and break-away friction, as told; the observer counts 0.92 of Fc |
+//! | d | mN s/mm (N s/m) | viscous friction, as told |
+//! | m | kg | mass, as told or learnt |
+//! | T | s | period |
+//!
+//! Assumes: a load that is constant but for corrections, the mass of the estimator beside it, friction between half and
+//! twice of what is told. That is what the bars are kept with (`tests/system/control_bars.rs`); what friction is off goes
+//! into the load.
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 
@@ -97,11 +109,15 @@ impl Motion {
     }
 
     /// Within a millimetre of an end stop, with a `target` (raw mm) more than one behind it; or, for a
-    /// piston that `lingers` there, less than one before it.
+    /// piston with which `patience_is_over` there, less than one before it.
     #[inline]
     #[must_use]
-    pub fn at_end_stop(&self, model: &AxisModel, target: i32, lingers: bool) -> bool {
-        let zone = if lingers { STOP_ZONE } else { -STOP_ZONE };
+    pub fn at_end_stop(&self, model: &AxisModel, target: i32, patience_is_over: bool) -> bool {
+        let zone = if patience_is_over {
+            STOP_ZONE
+        } else {
+            -STOP_ZONE
+        };
         let far = model.stroke.saturating_sub(STOP_ZONE);
         (self.stroke < STOP_ZONE && target < zone)
             || (self.stroke > far && target > model.stroke.saturating_sub(zone))

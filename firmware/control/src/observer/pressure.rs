@@ -1,15 +1,26 @@
 //! Pressure observer: ISO 6358 flow into a polytropic chamber, with the bounds of what is known.
 //!
 //! ```text
-//! dp/dt = n (K p_s ψ(p/p_s) t_fill − K p ψ(p_a/p) t_vent − p v) / L        K = C ρ0 R T / A
-//! dp⁻/dt, dp⁺/dt: the same, from the lowest and the highest pressure that can be
+//! Δp = n (K p_s ψ(p/p_s) t_fill − K p ψ(p_a/p) t_vent − p v T) / L         K = C ρ0 R T0 / A
+//! Δp⁻, Δp⁺: the same, from the lowest and the highest pressure that can be
 //! ```
 //!
-//! Open loop: there is no pressure sensor. `n` = 1.2 lies between isothermal (1) and adiabatic (1.4);
-//! volumes are lengths, `L` = volume / area, and flows speeds of the piston (Bobrow and McDonell 1998, Pandian
-//! et al. 2002 for the chamber; ISO 6358-1 for the flow). Errors die out by themselves: a filling chamber
+//! | | unit | |
+//! |---|---|---|
+//! | p, p_s, p_a | Pa | pressure of the chamber, of the supply, of the atmosphere, absolute |
+//! | t_fill, t_vent | s | for how long each valve was open at the chamber in the period |
+//! | T | s | the period |
+//! | v | mm/s | speed of the piston, positive where the chamber grows |
+//! | L | mm | volume of the chamber with its line over its area A |
+//! | K | mm/s | choked speed: that of the piston at which an open outlet holds the pressure; T0 = 293 K, C and ρ0 as in [`super::flow`] |
+//! | ψ | 1 | flow over choked flow, [`super::flow`] |
+//! | n | 1 | polytropic exponent, 1.2: between isothermal (1) and adiabatic (1.4) |
+//!
+//! Open loop: there is no pressure sensor. The chamber is that of Bobrow and McDonell 1998 and Pandian et al. 2002, the
+//! flow that of ISO 6358-1. Errors die out by themselves: a filling chamber
 //! ends at the supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone
-//! in p, so both bounds keep their order, and their distance says how far the estimate can be off.
+//! in p, so both bounds keep their order, and their distance says how far the estimate can be off. Only the
+//! identification of a move uses the bounds (`identification`); they hold as long as the assumptions do.
 //!
 //! Assumes: supply and atmosphere as told, tight seals, no flow but through the valves.
 //!
@@ -44,8 +55,8 @@ pub(crate) struct Period {
 /// A chamber's geometry, and what the piston does to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChamberMotion {
-    /// Flow of an open valve as a speed of the piston, raw mm/s.
-    pub(crate) flow: i32,
+    /// Choked speed K, raw mm/s.
+    pub(crate) choked_speed: i32,
     /// Length of the chamber in the middle of the period that ends at the moment, and where the
     /// dead time ends, raw mm.
     pub(crate) lengths: [i32; 2],
@@ -128,16 +139,16 @@ impl Chamber {
         let limits = limits(model, both);
         // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
         let mean = self.pressure.saturating_add(self.expected) >> 1;
-        let flows = Flows::at(model, motion.flow, mean, both);
-        let step = |p: i32, flows: &Flows, open, speed, span, n_per_length| {
+        let powers = Powers::at(model, motion.choked_speed, mean, both);
+        let step = |p: i32, powers: &Powers, open, speed, span, n_per_length| {
             within_limits(
-                p.saturating_add(flows.change(open, power(p, speed), span, n_per_length)),
+                p.saturating_add(powers.change(open, power(p, speed), span, n_per_length)),
                 limits,
             )
         };
         self.pressure = step(
             self.pressure,
-            &flows,
+            &powers,
             open,
             speed,
             times.period,
@@ -145,15 +156,15 @@ impl Chamber {
         );
         self.expected = step(
             self.pressure,
-            &flows,
+            &powers,
             committed,
             speed_ahead,
             model.dead_time_us,
             model.exponent_per_length(length_ahead),
         );
         self.bounds = self.bounds.map(|p| {
-            let flows = Flows::at(model, motion.flow, p, open);
-            step(p, &flows, open, speed, times.period, n_per_length)
+            let powers = Powers::at(model, motion.choked_speed, p, open);
+            step(p, &powers, open, speed, times.period, n_per_length)
         });
     }
 
@@ -185,24 +196,25 @@ impl Chamber {
     }
 }
 
-/// Powers of the open valves of a chamber: pressure times a speed of the piston, in 2^8 Pa mm/s.
+/// Powers of the open valves of a chamber over its piston area: pressure times speed, in 2^8 Pa mm/s
+/// (1 Pa mm/s is 1 mW/m²).
 #[derive(Clone, Copy, Debug, Default)]
-struct Flows {
+struct Powers {
     fill: i32,
     vent: i32,
 }
 
-impl Flows {
+impl Powers {
     /// Of those that are `open` at all, at `pressure`.
-    fn at(model: &AxisModel, flow: i32, pressure: i32, [fill, vent]: [i32; 2]) -> Self {
+    fn at(model: &AxisModel, choked_speed: i32, pressure: i32, [fill, vent]: [i32; 2]) -> Self {
         Self {
             fill: if fill > 0 {
-                model.fill_power(flow, pressure)
+                model.fill_power(choked_speed, pressure)
             } else {
                 0
             },
             vent: if vent > 0 {
-                model.vent_power(flow, pressure)
+                model.vent_power(choked_speed, pressure)
             } else {
                 0
             },
@@ -276,16 +288,16 @@ impl AxisModel {
         self.exponent.checked_div(short).unwrap_or(0)
     }
 
-    /// Power of an open fill valve of this `flow` (raw mm/s) into a chamber at `pressure`.
+    /// Power over area of an open fill valve of this choked speed (raw mm/s) into a chamber at `pressure`: K p_s ψ.
     #[inline]
-    pub(crate) fn fill_power(&self, flow: i32, pressure: i32) -> i32 {
-        self.curve.power(self.supply, pressure, flow)
+    pub(crate) fn fill_power(&self, choked_speed: i32, pressure: i32) -> i32 {
+        self.curve.power(self.supply, pressure, choked_speed)
     }
 
-    /// Power of an open vent valve; positive lowers the pressure.
+    /// Power over area of an open vent valve, K p ψ; positive lowers the pressure.
     #[inline]
-    pub(crate) fn vent_power(&self, flow: i32, pressure: i32) -> i32 {
-        self.curve.power(pressure, self.ambient, flow)
+    pub(crate) fn vent_power(&self, choked_speed: i32, pressure: i32) -> i32 {
+        self.curve.power(pressure, self.ambient, choked_speed)
     }
 
     /// Force of the two pressures, mN, positive extending.
@@ -335,7 +347,7 @@ mod tests {
     /// A piston that stands in mid-stroke.
     fn at_rest(model: &AxisModel) -> ChamberMotion {
         ChamberMotion {
-            flow: model.flow_a,
+            choked_speed: model.choked_speed_a,
             lengths: [model.length_a(90 << 16); 2],
             speeds: [0; 2],
         }
@@ -381,7 +393,7 @@ mod tests {
         let model = model();
         let chamber = Chamber::new(model.mean, [model.ambient, model.supply]);
         let motion = ChamberMotion {
-            flow: model.flow_a,
+            choked_speed: model.choked_speed_a,
             lengths: [90 << 16; 2],
             speeds: [speed_mm_s << 16; 2],
         };

@@ -5,14 +5,17 @@
 //! end    = middle + (v + Δv/2) T/2 + v T_d     where the pulses of the next period act
 //! ```
 //!
-//! Constant speed beyond the period: the acceleration is not counted on, because the air that is squeezed
-//! pushes back, the more the shorter a chamber is.
+//! x: stroke, mm; v: speed, mm/s, both of the moment; Δv: what it gained in the last period; T: period, T_d: dead time, s.
+//! Source: this project, decision 7; a Taylor series of the motion, cut off.
+//!
+//! Assumes: the acceleration of the last period for one more, and constant speed beyond: it is not counted on for longer,
+//! because the air that is squeezed pushes back, the more the shorter a chamber is.
 
 use super::motion::Motion;
 use crate::axis::AxisModel;
 use crate::math::mul_shr;
 
-/// The piston's way through the next period and the dead time after it.
+/// Where the piston goes in the next period and the dead time after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct PeriodTrajectory {
     /// Stroke in the middle of the period to the next moment, raw mm.
@@ -42,8 +45,8 @@ impl PeriodTrajectory {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
         let half = mul_shr(speed, model.period >> 1, 32);
         let middle = motion.stroke.saturating_add(half);
-        let way = half.saturating_add(mul_shr(motion.speed, model.dead_time, 32));
-        let free = middle.saturating_add(way);
+        let rest = half.saturating_add(mul_shr(motion.speed, model.dead_time, 32));
+        let free = middle.saturating_add(rest);
         let end = free.max(0).min(model.stroke);
         Self {
             middle,
@@ -77,9 +80,12 @@ mod tests {
             assert_eq!((trajectory.end, trajectory.ahead), (end << 16, 0));
         }
         let free = trajectory(90, 400);
-        let way = f64::from(free.end) / 65_536.0 - 90.0;
+        let distance = f64::from(free.end) / 65_536.0 - 90.0;
         let time_us = model.times.period + model.dead_time_us;
-        assert!((way - 400e-6 * f64::from(time_us)).abs() < 1e-2, "{way}");
+        assert!(
+            (distance - 400e-6 * f64::from(time_us)).abs() < 1e-2,
+            "{distance}"
+        );
         assert_eq!(free.ahead, 400 << 16);
     }
 }

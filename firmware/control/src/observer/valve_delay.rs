@@ -10,6 +10,9 @@
 //! "response time"), and the wave's way through the line at the speed of sound. Whole µs, on the
 //! on-times that are sent.
 //!
+//! Assumes: delays as told, the same in every pulse, at every pressure and voltage; the margin of the axis data is for
+//! what they differ by. A valve that is open, or shut, and nothing between.
+//!
 //! Config [`ValveTimes`], state [`ValveTrack`], updates [`ValveTrack::energise`] and [`ValveTrack::passes`].
 
 /// Changes of one valve that can be under way at once.
@@ -20,7 +23,7 @@ const EDGES: usize = 4;
 pub struct ValveTimes {
     /// Control tick.
     pub tick: i32,
-    /// Ticks between two computations of the law.
+    /// Period: between two computations of the law.
     pub period: i32,
     /// Coil on to open, 0…50 000.
     pub on: i32,
@@ -90,13 +93,13 @@ impl ValveTrack {
     /// For how long the coil has been as it is at the moment `at`, µs.
     #[inline]
     #[must_use]
-    pub const fn lasts(&self, at: u32) -> u32 {
+    pub const fn elapsed(&self, at: u32) -> u32 {
         at.wrapping_sub(self.changed)
     }
 
     /// The coil changes at the moment `at`.
     fn change(&mut self, at: u32, times: &ValveTimes) {
-        let lasted = self.lasts(at);
+        let elapsed = self.elapsed(at);
         let (took, delay) = if self.coil {
             (times.on, times.off)
         } else {
@@ -104,7 +107,7 @@ impl ValveTrack {
         };
         self.coil = !self.coil;
         self.changed = at;
-        if lasted < took as u32 && self.pending > 0 {
+        if elapsed < took as u32 && self.pending > 0 {
             // Called back before it moved: the change under way does not happen.
             self.pending = self.pending.wrapping_sub(1);
         } else if let Some(next) = self.edges.get_mut(usize::from(self.pending)) {
@@ -167,7 +170,7 @@ impl ValveTrack {
     pub fn committed(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
         let mut valve = *self;
         if valve.coil {
-            let left = (times.shortest_pulse as u32).saturating_sub(valve.lasts(next));
+            let left = (times.shortest_pulse as u32).saturating_sub(valve.elapsed(next));
             valve.change(next.wrapping_add(left), times);
         }
         // All that is under way passes in twice the longest delays.
@@ -250,7 +253,7 @@ mod tests {
         if !track.coil {
             return 0;
         }
-        let left = i64::from(TIMES.shortest_pulse) - i64::from(track.lasts(next));
+        let left = i64::from(TIMES.shortest_pulse) - i64::from(track.elapsed(next));
         left.clamp(0, 4000) as i32
     }
 

@@ -188,14 +188,14 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let (area_a, area_rod) = (quarter_pi * bore * bore, quarter_pi * rod * rod);
     let area_b = area_a - area_rod;
     let flow = data.conductance.to_num::<f64>() * 10.0 * 1.185 * 287.05 * 293.15;
-    let (flow_a, flow_b) = (flow / area_a, flow / area_b);
+    let (choked_speed_a, choked_speed_b) = (flow / area_a, flow / area_b);
     // From the moment, two and a half ticks after the begin of a period, to the next one's valves.
     let period = 4.0 * f64::from(TICK.get()) * 1e-6;
     let dead_time = (1.5 * f64::from(TICK.get()) + on + line) * 1e-6;
     let ambient = 101_325.0;
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
-    let top = flow_b.min(1.5 * flow_a);
+    let top = choked_speed_b.min(1.5 * choked_speed_a);
     let slope = f64::min(0.36 / dead_time, 65_535.0 / 256.0);
     let brake = 0.6 * slope * top;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
@@ -204,8 +204,8 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let two = |bits: i32| 2_f64.powi(bits);
     let theta: f64 = 28_400.0 / 65_536.0;
     vec![
-        ("flow_a", flow_a * two(16)),
-        ("flow_b", flow_b * two(16)),
+        ("choked_speed_a", choked_speed_a * two(16)),
+        ("choked_speed_b", choked_speed_b * two(16)),
         ("dead_length_a", dead_a / area_a * two(16)),
         ("dead_length_b", dead_b / area_b * two(16)),
         ("force_a", 1e-3 * area_a * two(24)),
@@ -252,8 +252,8 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
 
 fn coefficient(model: &AxisModel, name: &str) -> i32 {
     match name {
-        "flow_a" => model.flow_a,
-        "flow_b" => model.flow_b,
+        "choked_speed_a" => model.choked_speed_a,
+        "choked_speed_b" => model.choked_speed_b,
         "dead_length_a" => model.dead_length_a,
         "dead_length_b" => model.dead_length_b,
         "force_a" => model.force_a,

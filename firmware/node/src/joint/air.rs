@@ -125,13 +125,16 @@ impl AirModel {
     pub(super) fn new(axis: &AxisModel, valve_on: Micros) -> Self {
         let share = i64::from(axis.ambient).wrapping_shl(17);
         // 18/16 of what both chambers take together.
-        let both = time(axis.dead_length_a.saturating_add(axis.stroke), axis.flow_a)
-            .saturating_add(time(axis.dead_length_b, axis.flow_b));
+        let both = time(
+            axis.dead_length_a.saturating_add(axis.stroke),
+            axis.choked_speed_a,
+        )
+        .saturating_add(time(axis.dead_length_b, axis.choked_speed_b));
         let slow = valve_on.get().saturating_mul(SLOWER_FIFTHS) / 5;
         let known = both.saturating_mul(18) >> (4_u32.wrapping_add(VENTED_SHIFT));
         Self {
-            a: Chamber::new(axis, axis.dead_length_a, axis.flow_a, axis.force_a),
-            b: Chamber::new(axis, axis.dead_length_b, axis.flow_b, axis.force_b),
+            a: Chamber::new(axis, axis.dead_length_a, axis.choked_speed_a, axis.force_a),
+            b: Chamber::new(axis, axis.dead_length_b, axis.choked_speed_b, axis.force_b),
             stroke: axis.stroke,
             ambient: clipped(divide_signed(share, i64::from(axis.supply))),
             fall: clipped(i64::from(axis.curve.stretch).wrapping_mul(3) >> 11),

@@ -65,6 +65,23 @@ fn a_preload_that_is_there_sends_no_pulse() {
     assert!(pulses(7_000) > 0);
 }
 
+/// One that has reached its force acts again once more than half of the 10 N of friction is missing.
+#[test]
+fn a_preload_acts_again_where_half_the_friction_is_missing() {
+    let awaited = |missing: i32| {
+        let (model, mut law) = at_a_stop(900, 0, 5);
+        law.standstill.seat(true);
+        let announced = announced(150, 200, input(90, 90));
+        let made = model.pressure_force(law.observer.expected());
+        law.observer.motion.load = 5_000 - missing - made;
+        law.preload(&model, &announced, true)
+    };
+    for side in [-1, 1] {
+        assert_eq!(awaited(side * 4_900), Some(Awaited::Ready));
+        assert!(matches!(awaited(side * 5_100), Some(Awaited::Force(_))));
+    }
+}
+
 /// From an end stop against which a full chamber has held it a move is awaited by pressures about the mean, under
 /// any load: the force alone would be there as soon as the other chamber is as full.
 #[test]
