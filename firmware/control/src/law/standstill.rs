@@ -157,7 +157,10 @@ impl Standstill {
                 return;
             }
             self.caught = 0;
-            self.near = self.near.max(PATIENCE);
+            // One that has left its place has had its patience; a new target is tried with a new one.
+            if !self.aimed {
+                self.near = self.near.max(PATIENCE);
+            }
         }
         if !reference_rests {
             self.state = State::Servo;

@@ -164,6 +164,31 @@ fn patience_begins_within_24_bands() {
     assert!(near(285, 5) && !near(285, 4) && !near(291, 50));
 }
 
+/// A piston that has left its place has had its patience; a new target is approached with a new one.
+#[test]
+fn a_new_target_has_a_patience_of_its_own() {
+    let near = |target_mm: i32| {
+        let mut standstill = aimed();
+        states(&mut standstill, 0, 0, 10);
+        assert!(standstill.holds());
+        standstill.aim(&model(), target_mm << 16);
+        for _ in 0..RELEASE_PERIODS {
+            seen(200, 0, |now| {
+                let now = Approach {
+                    reference: target_mm << 16,
+                    ..*now
+                };
+                standstill.update(&model(), &now);
+            });
+        }
+        assert_eq!(standstill.state, State::Servo);
+        standstill.near
+    };
+    assert_eq!(near(90), PATIENCE + 1, "2 mm off its place");
+    assert_eq!(near(93), RELEASE_PERIODS, "1 mm from a new target");
+    assert_eq!(near(190), 0, "98 mm from it");
+}
+
 /// However wide the band of an axis, it widens to 0.4 mm at most; and one that has widened to 0.36 mm
 /// is left at 0.45 mm, not at twice that; one that is as wide as 0.4 mm is left by half a narrow band beyond.
 #[test]
