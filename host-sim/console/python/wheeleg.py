@@ -37,7 +37,9 @@ class Refused(Exception):
     """The robot or its server does not do it."""
 
     def __init__(self, reason, text):
-        super().__init__(f"{reason}: {text}")
+        # Nor does the text of a false server act on a terminal.
+        shown = "".join(c if c.isprintable() else "\ufffd" for c in f"{reason}: {text}")
+        super().__init__(shown)
         self.reason = reason
 
 
@@ -78,9 +80,14 @@ class Robot:
         self._changed = threading.Condition()
         self._latest, self._events, self._answers = {}, [], {}
         self._state, self._seen_us, self._n, self._lost = None, 0, 0, None
-        self._channels = {c["id"]: c for c in self.get("channels")["channels"]}
         self._socket = connect(f"ws://{self.host}/ws", subprotocols=[SUBPROTOCOL])
-        self._shake_hands()
+        try:
+            self._shake_hands()
+            # Only now: a server that has not proved to have the key would be given it here.
+            self._channels = {c["id"]: c for c in self.get("channels")["channels"]}
+        except BaseException:
+            self._socket.close()
+            raise
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
