@@ -70,9 +70,14 @@ def refused(reason, act):
     raise AssertionError(f"not refused: {reason}")
 
 
+def set_dead_proxies():
+    """From now on the environment names a proxy that is not there."""
+    proxies = ("http_proxy", "https_proxy", "all_proxy")
+    os.environ.update({name: "http://127.0.0.1:9" for name in proxies}, no_proxy="")
+
+
 def main(program):
-    # Nothing goes through a proxy: there is none at this one.
-    os.environ.update({name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "all_proxy")}, no_proxy="")
+    set_dead_proxies()
     with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
         refused("wrong_key", lambda: Robot(address, "0" * 64))
         with false_server() as (false_address, heard):
