@@ -7,16 +7,19 @@ look and stop; a program whose connection is cut loses the control.
 """
 
 import contextlib
+import json
 import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-import urllib.error
 from pathlib import Path
 
+from websockets.sync.server import serve
+
 sys.path.insert(0, str(Path(__file__).parents[2] / "host-sim/console/python"))
-from wheeleg import Refused, Robot
+from wheeleg import SUBPROTOCOL, Refused, Robot
 
 
 @contextlib.contextmanager
@@ -36,22 +39,50 @@ def served(program, home, *options):
         process.wait()
 
 
+@contextlib.contextmanager
+def false_server():
+    """A server in place of ours, without the keys: its address, and all that it hears."""
+    heard = []
+
+    def ask(_, request):
+        heard.append(f"{request.path}\n{request.headers}")
+
+    def greet(socket):
+        hello = {"op": "hello", "version": 1, "layout": "a", "commands": "b", "nonce": "00" * 32}
+        socket.send(json.dumps(hello))
+        heard.append(socket.recv(timeout=5))
+        socket.send(json.dumps({"op": "error", "reason": "nobody", "text": "\x1b]0;title\x07", "remedy": "none"}))
+
+    with serve(greet, "127.0.0.1", 0, process_request=ask, subprotocols=[SUBPROTOCOL]) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        host, port = server.socket.getsockname()
+        yield f"{host}:{port}", heard
+        server.shutdown()
+
+
 def refused(reason, act):
     try:
         act()
     except Refused as error:
         assert error.reason == reason, f"{error.reason}, not {reason}"
+        assert str(error).isprintable(), repr(error)
         return
     raise AssertionError(f"not refused: {reason}")
 
 
+def set_dead_proxies():
+    """From now on the environment names a proxy that is not there."""
+    proxies = ("http_proxy", "https_proxy", "all_proxy")
+    os.environ.update({name: "http://127.0.0.1:9" for name in proxies}, no_proxy="")
+
+
 def main(program):
+    set_dead_proxies()
     with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
-        try:
-            Robot(address, "0" * 64)
-            raise AssertionError("a wrong key opens")
-        except urllib.error.HTTPError as error:
-            assert error.code == 401, error
+        refused("wrong_key", lambda: Robot(address, "0" * 64))
+        with false_server() as (false_address, heard):
+            refused("nobody", lambda: Robot(false_address, keys["control"]))
+            assert len(heard) == 2 and not any(keys["control"].strip() in text for text in heard), heard
         with Robot(address, keys["control"]) as robot:
             robot.until(lambda state: state["ready"])
             channels = robot.get("channels")["channels"]

@@ -267,3 +267,52 @@ fn a_wrong_command_is_told_with_every_value_and_range() {
     }
     assert_eq!(served.end("TERM").0, Some(143));
 }
+
+#[test]
+fn parameters_of_a_board_are_read_written_and_saved_from_the_command_line() {
+    let served = Served::new("");
+    served.until("ready", |state| state["ready"] == true);
+    let param = |arguments: &[&str]| {
+        let output = served.ctl(&[&["param"], arguments].concat());
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().replace("\n  │ ", " ");
+        let (said, told) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(served.state()["control"], Value::Null, "{arguments:?}");
+        (output.status.code(), said, told)
+    };
+    let (code, before, told) = param(&["get", "3", "error_scale"]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(before.ends_with(" mm") && before != "21.0 mm", "{before}");
+    let (code, written, told) = param(&["set", "3", "error_scale", "21"]);
+    assert_eq!((code, &*written), (Some(0), "21.0 mm"), "{told}");
+    // That board alone, and it has it.
+    assert_eq!(param(&["get", "3", "error_scale"]).1, "21.0 mm");
+    assert_eq!(param(&["get", "2", "error_scale"]).1, before);
+    let json = served.ctl(&["--json", "param", "get", "3", "error_scale"]);
+    let json: Value = serde_json::from_slice(&json.stdout).expect("JSON");
+    let wanted = r#"{"board":3,"parameter":"error_scale","value":21.0,"unit":"mm"}"#;
+    assert_eq!(json, serde_json::from_str::<Value>(wanted).expect("JSON"));
+    for (arguments, code, part) in [
+        (&["set", "3", "proportional", "5"][..], 1, "0 to 4 1/mm"),
+        (&["set", "3", "proportional", "-1"], 1, "0 to 4 1/mm"),
+        (&["set", "3", "proportional", "much"], 2, "'much'"),
+        (
+            &["get", "3", "error_scal"],
+            1,
+            "did you mean `error_scale`?",
+        ),
+        (&["get", "9", "error_scale"], 2, "from 1 to 8"),
+        (&["save", "0"], 2, "from 1 to 8"),
+    ] {
+        let (ended, said, told) = param(arguments);
+        assert_eq!((ended, &*said), (Some(code), ""), "{arguments:?}: {told}");
+        assert!(told.contains(part), "{arguments:?}: no {part} in {told}");
+    }
+    let (code, said, told) = param(&["save", "3"]);
+    assert_eq!((code, &*said), (Some(0), "done"), "{told}");
+    // Not under an armed robot, and not beside who drives.
+    assert!(served.ctl(&["take", "--", "Arm"]).status.success());
+    let (code, _, told) = param(&["save", "3"]);
+    assert_eq!(code, Some(1), "{told}");
+    assert!(told.contains("disarm"), "{told}");
+    assert_eq!(served.end("TERM").0, Some(143));
+}

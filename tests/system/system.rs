@@ -49,5 +49,7 @@ mod service;
 mod session;
 #[cfg(unix)]
 mod stop;
+#[cfg(unix)]
+mod terminal;
 mod walk;
 mod workspace;

@@ -48,7 +48,8 @@ pub struct Record {
     pub step: u16,
     /// Whether all axes are armed.
     pub armed: bool,
-    /// Whether the E-stop bit was sent.
+    /// Whether the E-stop is latched at the end of the cycle: from the next SYNC on its bit goes to
+    /// all boards, until `ClearFault`.
     pub emergency_stop: bool,
     /// Why all axes hold, if they do.
     pub hold: Option<HoldReason>,

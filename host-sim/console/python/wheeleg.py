@@ -1,4 +1,4 @@
-"""Sees and drives the robot that `wheeleg serve` runs. One file; it needs `websockets`.
+"""Sees and drives the robot that `wheeleg serve` runs. One file; it needs `websockets` 15 or newer.
 
     from wheeleg import Robot
 
@@ -37,7 +37,9 @@ class Refused(Exception):
     """The robot or its server does not do it."""
 
     def __init__(self, reason, text):
-        super().__init__(f"{reason}: {text}")
+        # Nor does the text of a false server act on a terminal.
+        shown = "".join(c if c.isprintable() else "\ufffd" for c in f"{reason}: {text}")
+        super().__init__(shown)
         self.reason = reason
 
 
@@ -78,9 +80,15 @@ class Robot:
         self._changed = threading.Condition()
         self._latest, self._events, self._answers = {}, [], {}
         self._state, self._seen_us, self._n, self._lost = None, 0, 0, None
-        self._channels = {c["id"]: c for c in self.get("channels")["channels"]}
-        self._socket = connect(f"ws://{self.host}/ws", subprotocols=[SUBPROTOCOL])
-        self._shake_hands()
+        # This computer's own address needs no proxy, which would be told the key.
+        self._socket = connect(f"ws://{self.host}/ws", subprotocols=[SUBPROTOCOL], proxy=None)
+        try:
+            self._shake_hands()
+            # Only now: a server that has not proved to have the key would be given it here.
+            self._channels = {c["id"]: c for c in self.get("channels")["channels"]}
+        except BaseException:
+            self._socket.close()
+            raise
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -100,7 +108,8 @@ class Robot:
         """A document of the HTTP API: `state`, `commands`, `channels`, `parameters`, `events`, `faults`, `recordings`."""
         request = urllib.request.Request(f"http://{self.host}/api/v1/{path}")
         request.add_header("Authorization", f"Bearer {self._digits}")
-        with urllib.request.urlopen(request, timeout=5) as answer:
+        direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+        with direct.open(request, timeout=5) as answer:
             return json.load(answer)
 
     def state(self):

@@ -12,14 +12,14 @@ use axum::http::header::{
     AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY,
     X_CONTENT_TYPE_OPTIONS,
 };
+use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{MethodRouter, get, post};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::json;
 
-use crate::catalogue::fault_list;
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Place};
 use crate::hex;
@@ -164,6 +164,9 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
         _ => &[],
     };
     let host = server.hosts.check(request.headers(), pages);
+    // Some clients write the name once more before the path.
+    let named = request.uri().authority().map(Authority::as_str);
+    let host = host.filter(|host| named.is_none_or(|named| named == *host));
     let host = host.map(str::to_owned);
     let mut response = match host {
         Some(host) => {
@@ -182,10 +185,13 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     set(X_CONTENT_TYPE_OPTIONS, "nosniff");
     set(REFERRER_POLICY, "no-referrer");
     set(CACHE_CONTROL, "no-store");
-    set(
-        HeaderName::from_static("cross-origin-resource-policy"),
-        "same-origin",
-    );
+    for name in [
+        "cross-origin-resource-policy",
+        // A page that has opened ours has no hold on it.
+        "cross-origin-opener-policy",
+    ] {
+        set(HeaderName::from_static(name), "same-origin");
+    }
     response
 }
 
@@ -206,6 +212,9 @@ async fn key(
         return plain();
     }
     if has_key(&server.context, request.headers()) {
+        // Many requests may have come in one piece: between two of them it is others' turn, the
+        // robot's stop before all.
+        tokio::task::yield_now().await;
         return next.run(request).await;
     }
     let remedy = "send `Authorization: Bearer KEY` with the digits of control.key or view.key";
@@ -373,7 +382,7 @@ async fn commands(State(server): State<Arc<Server>>) -> Response {
 }
 
 async fn parameters(State(server): State<Arc<Server>>) -> Response {
-    json_text(server.context.hub.parameters().to_string())
+    json_text(server.context.hub.parameters())
 }
 
 #[derive(Deserialize)]
@@ -397,15 +406,15 @@ async fn events(
             "leave it out",
         );
     }
-    json_text(server.context.hub.events(last.into()).to_string())
+    json_text(server.context.hub.events(last.into()))
 }
 
 async fn faults(State(server): State<Arc<Server>>) -> Response {
-    let list: Value = json!({
-        "injectable": fault_list(),
-        "active": server.context.hub.active_faults(),
-    });
-    json_text(list.to_string())
+    let hub = &server.context.hub;
+    let (injectable, active) = (&hub.catalogue.faults_json, json!(hub.active_faults()));
+    json_text(format!(
+        r#"{{"injectable":{injectable},"active":{active}}}"#
+    ))
 }
 
 /// Most recordings of one answer.
@@ -439,6 +448,7 @@ async fn stop(State(server): State<Arc<Server>>) -> Response {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::Value;
     use std::collections::BTreeSet;
 
     #[test]

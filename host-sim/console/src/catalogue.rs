@@ -152,6 +152,8 @@ pub(crate) struct Catalogue {
     pub(crate) channels_json: String,
     /// Answer of `/api/v1/commands`.
     pub(crate) commands_json: String,
+    /// The faults that can begin in a robot that runs.
+    pub(crate) faults_json: String,
 }
 
 impl Catalogue {
@@ -164,6 +166,7 @@ impl Catalogue {
         Self {
             channels_json: json!({ "layout": layout, "channels": channels }).to_string(),
             commands_json: json!({ "hash": hash, "commands": commands }).to_string(),
+            faults_json: Value::Array(fault_list()).to_string(),
             layout,
             commands: hash,
         }
@@ -269,8 +272,7 @@ fn argument(argument: &Argument) -> Value {
     value
 }
 
-/// The faults that can begin in a robot that runs.
-pub(crate) fn fault_list() -> Vec<Value> {
+fn fault_list() -> Vec<Value> {
     let list = KINDS.iter().filter(|row| !row.kind.is_built_in());
     let list = list.map(|row| {
         json!({

@@ -10,8 +10,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use axum::extract::ws::Utf8Bytes;
 use serde_json::{Value, json};
-use tokio::sync::watch;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
@@ -36,6 +37,8 @@ const BATCH_PERIOD: Duration = Duration::from_millis(20);
 const TICKET: Duration = Duration::from_secs(2);
 /// Events that are kept for who asks later.
 const EVENTS: usize = 256;
+/// Stops of one connection whose answers are waited for.
+const STOPS: usize = 16;
 /// Clients at a time; the last place is for a role that may control.
 pub(crate) const CLIENTS: usize = 32;
 
@@ -71,6 +74,8 @@ struct Client {
     session: String,
     outbox: Arc<Outbox>,
     subscriptions: BTreeMap<u16, Subscription>,
+    /// When the holder of the control was told last that this client asks for it.
+    asked: Option<Instant>,
 }
 
 /// A request that is not at its end.
@@ -88,6 +93,27 @@ enum Asked {
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),
+}
+
+/// A client's connection, as it asks.
+pub(crate) struct Asking {
+    id: ClientId,
+    stops: StopsUnderWay,
+}
+
+/// Stops of one connection whose answers are waited for: few at a time. Whoever asks for more of
+/// them is read no further until then, and costs nobody else time or memory.
+pub(crate) struct StopsUnderWay(Arc<Semaphore>);
+
+impl StopsUnderWay {
+    pub(crate) fn new() -> Self {
+        Self(Arc::new(Semaphore::new(STOPS)))
+    }
+
+    /// The next one begins, when it may; it ends where this is dropped.
+    pub(crate) async fn begin(&self) -> Option<OwnedSemaphorePermit> {
+        Arc::clone(&self.0).acquire_owned().await.ok()
+    }
 }
 
 /// What of a channel came since the last look.
@@ -112,7 +138,8 @@ struct Inner {
     last_holder: String,
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
-    events: VecDeque<Value>,
+    /// The newest events, each as it was told.
+    events: VecDeque<Utf8Bytes>,
     faults: Vec<(FaultSpec, u64)>,
     status: Option<Status>,
     failure: Option<String>,
@@ -216,7 +243,7 @@ impl Hub {
         name: &str,
         session: &str,
         outbox: &Arc<Outbox>,
-    ) -> Option<(ClientId, u64)> {
+    ) -> Option<(Asking, u64)> {
         let mut inner = self.inner();
         let places = match role {
             Role::Control => CLIENTS,
@@ -235,19 +262,39 @@ impl Hub {
                 session: session.to_owned(),
                 outbox: Arc::clone(outbox),
                 subscriptions: BTreeMap::new(),
+                asked: None,
             },
         );
         let now_us = inner.status.map_or(0, |status| status.now_us);
-        Some((id, now_us))
+        let stops = StopsUnderWay::new();
+        Some((Asking { id, stops }, now_us))
     }
 
     /// A client is gone. Control that it holds ends with its beats, at the master.
-    pub(crate) fn leave(&self, id: ClientId) {
-        self.inner().clients.remove(&id);
+    pub(crate) fn leave(&self, asking: &Asking) {
+        self.inner().clients.remove(&asking.id);
     }
 
     /// What a client asks; `limited`: it asks too often.
-    pub(crate) fn ask(self: &Arc<Self>, id: ClientId, n: u64, body: Body, limited: bool) {
+    pub(crate) async fn ask(self: &Arc<Self>, asking: &Asking, n: u64, body: Body, limited: bool) {
+        let id = asking.id;
+        if matches!(body, Body::Stop) {
+            let under_way = asking.stops.begin().await;
+            let hub = Arc::clone(self);
+            tokio::spawn(async move {
+                let answer = match hub.stop().await {
+                    Some(now_us) => done(n, now_us),
+                    None => refused(
+                        n,
+                        Reason::NotConfirmed,
+                        "NOT CONFIRMED within 200 ms: cut the air",
+                    ),
+                };
+                hub.inner().tell(id, &answer);
+                drop(under_way);
+            });
+            return;
+        }
         let mut inner = self.inner();
         match body {
             Body::Beat { seen_us } => {
@@ -255,21 +302,8 @@ impl Hub {
                     self.signals.beat(seen_us);
                 }
             }
-            Body::Stop => {
-                drop(inner);
-                let hub = Arc::clone(self);
-                tokio::spawn(async move {
-                    let answer = match hub.stop().await {
-                        Some(now_us) => done(n, now_us),
-                        None => refused(
-                            n,
-                            Reason::NotConfirmed,
-                            "NOT CONFIRMED within 200 ms: cut the air",
-                        ),
-                    };
-                    hub.inner().tell(id, &answer);
-                });
-            }
+            // Above: it waits for its answer without the lock.
+            Body::Stop => {}
             _ if limited => inner.tell(
                 id,
                 &refused(n, Reason::Busy, "too many frames: at most 100 per second"),
@@ -323,16 +357,18 @@ impl Hub {
     }
 
     /// The newest events, oldest first.
-    pub(crate) fn events(&self, last: usize) -> Value {
+    pub(crate) fn events(&self, last: usize) -> String {
         let inner = self.inner();
         let skip = inner.events.len().saturating_sub(last);
-        let events: Vec<Value> = inner.events.iter().skip(skip).cloned().collect();
-        json!({ "events": events })
+        let events: Vec<Utf8Bytes> = inner.events.iter().skip(skip).cloned().collect();
+        drop(inner);
+        let events: Vec<&str> = events.iter().map(Utf8Bytes::as_str).collect();
+        format!(r#"{{"events":[{}]}}"#, events.join(","))
     }
 
     /// The boards' parameters.
-    pub(crate) fn parameters(&self) -> Value {
-        self.inner().viewers.parameters.document()
+    pub(crate) fn parameters(&self) -> String {
+        self.inner().viewers.parameters.document().to_owned()
     }
 
     /// The faults that are under way.
@@ -404,5 +440,25 @@ impl Inner {
 
     fn tell_done(&self, id: ClientId, n: u64) {
         self.tell(id, &done(n, self.now_us()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn of_one_connection_some_stops_are_under_way_at_a_time() {
+        let stops = StopsUnderWay::new();
+        let mut under_way = Vec::new();
+        for _ in 0..STOPS {
+            under_way.push(stops.begin().await.expect("it begins"));
+        }
+        let short = Duration::from_millis(20);
+        let next = tokio::time::timeout(short, stops.begin()).await;
+        assert!(next.is_err(), "one more than allowed");
+        under_way.pop();
+        let next = tokio::time::timeout(short, stops.begin()).await;
+        assert!(next.is_ok_and(|next| next.is_some()), "it ended");
     }
 }

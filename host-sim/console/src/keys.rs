@@ -112,11 +112,11 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
 /// [`ConsoleError::Key`] if it cannot be read, or others can read it.
 pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
-    let file = File::open(path).map_err(cannot)?;
-    // Nobody is to change who may read a device or a folder.
-    if !file.metadata().map_err(cannot)?.is_file() {
+    // Nobody is to change who may read a device or a folder, nor to wait for who writes to a pipe.
+    if !fs::metadata(path).map_err(cannot)?.is_file() {
         return Err(wrong(path, "is no key: it is not a file".to_owned()));
     }
+    let file = File::open(path).map_err(cannot)?;
     match open_to_others(&file).map_err(cannot)? {
         None => Ok(file),
         Some(mode) => Err(ConsoleError::Key {
@@ -213,5 +213,11 @@ mod tests {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).expect("set");
         let error = Keys::open(home.path()).expect_err("refused");
         assert!(error.to_string().contains("others can read"), "{error}");
+        // A pipe that nobody writes to is not waited for.
+        let pipe = home.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.expect("mkfifo").success());
+        let error = read(&pipe).expect_err("refused");
+        assert!(error.to_string().contains("not a file"), "{error}");
     }
 }

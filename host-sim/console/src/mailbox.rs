@@ -29,10 +29,11 @@ pub(crate) struct Contents<W> {
     pub(crate) messages: W,
 }
 
-impl<W> Contents<W> {
-    /// Closes the connection.
+impl<W: Waiting> Contents<W> {
+    /// Closes the connection. What waits is not sent any more.
     pub(crate) fn close(&mut self, why: Close) {
         self.close.get_or_insert(why);
+        self.messages = W::default();
     }
 }
 
@@ -42,9 +43,14 @@ impl<W: Waiting> Mailbox<W> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts something in, and wakes the writer.
+    /// Puts something in, and wakes the writer. Nothing is kept for a connection that is closed:
+    /// one that takes nothing is not gone yet, and may go on asking.
     pub(crate) fn put(&self, put: impl FnOnce(&mut Contents<W>)) {
-        put(&mut self.contents());
+        let mut contents = self.contents();
+        if contents.close.is_none() {
+            put(&mut contents);
+        }
+        drop(contents);
         self.wake.notify_one();
     }
 

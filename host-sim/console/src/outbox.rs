@@ -197,6 +197,17 @@ mod tests {
             assert!(outbox.contents().close.is_none());
             outbox.ordered(Utf8Bytes::from_static("{}"));
         }
+        // What it goes on asking is not kept.
+        for _ in 0..ORDERED_MAX {
+            outbox.ordered(Utf8Bytes::from_static("{}"));
+            outbox.batch(1, 1, 0, Bytes::from_static(b"x"));
+        }
+        let contents = outbox.contents();
+        let Queue {
+            ordered, batches, ..
+        } = &contents.messages;
+        assert_eq!((ordered.len(), batches.len()), (0, 0));
+        drop(contents);
         let close = outbox.next().expect("a close");
         assert!(matches!(close, Message::Close(Some(frame)) if frame.code == 4004));
     }

@@ -1,7 +1,8 @@
 //! The boards' parameters as clients see them: as the robot's file stores them, and as the boards
 //! have told them since.
 
-use std::collections::BTreeMap;
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 use wheeleg_config::{NodeParams, allowed_values, in_unit};
@@ -16,20 +17,25 @@ pub(crate) const DESCRIPTION: &str = "/robot_description";
 /// A board and the number of its parameter.
 pub(crate) type Place = (u8, u16);
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Parameter {
     place: Place,
     info: &'static ParamInfo,
     raw: i32,
     /// The board has told it; else it is what the robot's file stores.
     told: bool,
+    /// As the viewers' protocol has it, JSON.
+    shown: String,
 }
 
-/// All parameters, by name.
+/// All parameters, by name. Their texts are made once: who asks without end costs little time.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameters {
     all: BTreeMap<String, Parameter>,
-    urdf: String,
+    /// The robot's description, as a parameter of the viewers' protocol.
+    description: String,
+    /// [`Self::document`], until a board tells a value.
+    document: OnceCell<String>,
 }
 
 impl Parameters {
@@ -40,23 +46,31 @@ impl Parameters {
             let stored = stored.of(node);
             params_at(board).iter().map(move |info| {
                 let set = stored.iter().find(|(id, _)| *id == info.id);
+                let raw = set.map_or(info.default, |(_, raw)| *raw);
+                let name = name(node, info);
                 let parameter = Parameter {
                     place: (board, info.id),
                     info,
-                    raw: set.map_or(info.default, |(_, raw)| *raw),
+                    raw,
                     told: false,
+                    shown: shown(&name, info, raw),
                 };
-                (name(node, info), parameter)
+                (name, parameter)
             })
         });
         Self {
             all: boards.collect(),
-            urdf,
+            description: json!({ "name": DESCRIPTION, "value": urdf }).to_string(),
+            document: OnceCell::new(),
         }
     }
 
-    /// Tables of both kinds of boards, and the values of each board in the order of its table.
-    pub(crate) fn document(&self) -> Value {
+    /// Tables of both kinds of boards, and the values of each board in the order of its table: JSON.
+    pub(crate) fn document(&self) -> &str {
+        self.document.get_or_init(|| self.tables().to_string())
+    }
+
+    fn tables(&self) -> Value {
         let boards = Node::ALL.into_iter().map(|node| {
             let values = params_at(node.number()).iter().map(|info| {
                 let parameter = self.all.get(&name(node, info));
@@ -78,21 +92,40 @@ impl Parameters {
         })
     }
 
-    /// Those of `names` that there are, or all; each as the viewers' protocol has it.
-    pub(crate) fn list(&self, names: &[String]) -> Vec<Value> {
-        if names.is_empty() {
-            let all = self.all.iter().map(|(name, p)| entry(name, p));
-            return all.chain([self.description()]).collect();
-        }
-        let one = |name: &String| {
-            let of_board = self.all.get(name).map(|p| entry(name, p));
-            of_board.or_else(|| (name == DESCRIPTION).then(|| self.description()))
+    /// Those of `names` that there are, each once, or all: a list in JSON as the viewers' protocol
+    /// has it.
+    pub(crate) fn list(&self, names: &[String]) -> String {
+        let texts: Vec<&str> = match names.is_empty() {
+            true => self.shown().map(|(_, text)| text).collect(),
+            false => self.named(names).map(|(_, text)| text).collect(),
         };
-        names.iter().filter_map(one).collect()
+        format!("[{}]", texts.join(","))
     }
 
-    fn description(&self) -> Value {
-        json!({ "name": DESCRIPTION, "value": self.urdf })
+    /// Names of those of `names` that there are, or of all.
+    pub(crate) fn names(&self, names: &[String]) -> BTreeSet<&str> {
+        match names.is_empty() {
+            true => self.shown().map(|(name, _)| name).collect(),
+            false => self.named(names).map(|(name, _)| name).collect(),
+        }
+    }
+
+    /// Name and text of all.
+    fn shown(&self) -> impl Iterator<Item = (&str, &str)> {
+        let of_boards = self.all.iter().map(|(name, p)| (&**name, &*p.shown));
+        of_boards.chain([(DESCRIPTION, &*self.description)])
+    }
+
+    /// Name and text of those of `names` that there are, each once however often it is named: a
+    /// short request has no endless answer.
+    fn named(&self, names: &[String]) -> impl Iterator<Item = (&str, &str)> {
+        let once: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+        once.into_iter().filter_map(|name| {
+            let of_board = self.all.get_key_value(name);
+            let of_board = of_board.map(|(name, p)| (&**name, &*p.shown));
+            let description = (name == DESCRIPTION).then_some((DESCRIPTION, &*self.description));
+            of_board.or(description)
+        })
     }
 
     /// Arguments of the `WriteParameter` that sets a parameter, or what is wrong with it.
@@ -111,6 +144,8 @@ impl Parameters {
         let (name, parameter) = all.find(|(_, p)| p.place == place)?;
         parameter.raw = raw;
         parameter.told = true;
+        parameter.shown = shown(name, parameter.info, raw);
+        self.document.take();
         Some(name.clone())
     }
 }
@@ -140,14 +175,12 @@ fn table(rows: &[ParamInfo]) -> Vec<Value> {
     rows.iter().map(row).collect()
 }
 
-fn entry(name: &str, parameter: &Parameter) -> Value {
-    match parameter.info.format {
-        Format::Flag => json!({ "name": name, "value": parameter.raw != 0 }),
-        _ => {
-            let value = in_unit(parameter.info, parameter.raw);
-            json!({ "name": name, "value": value, "type": "float64" })
-        }
-    }
+fn shown(name: &str, info: &ParamInfo, raw: i32) -> String {
+    let value = match info.format {
+        Format::Flag => json!({ "name": name, "value": raw != 0 }),
+        _ => json!({ "name": name, "value": in_unit(info, raw), "type": "float64" }),
+    };
+    value.to_string()
 }
 
 #[cfg(test)]
@@ -157,6 +190,10 @@ mod tests {
 
     const GAIN: &str = "/joint/3/proportional";
 
+    fn json(text: &str) -> Value {
+        serde_json::from_str(text).expect("JSON")
+    }
+
     fn parameters() -> Parameters {
         let robot = builtin::robot("wheeleg-2003").expect("built in");
         Parameters::new(&robot.node, "<robot/>".to_owned())
@@ -164,14 +201,15 @@ mod tests {
 
     #[test]
     fn every_board_has_its_whole_table() {
-        let all = parameters().list(&[]);
+        let all = json(&parameters().list(&[]));
+        let all = all.as_array().expect("a list");
         let boards = 6 * params_at(1).len() + 2 * params_at(7).len();
         assert_eq!(all.len(), boards + 1);
         assert_eq!(
             all[boards],
             json!({ "name": DESCRIPTION, "value": "<robot/>" })
         );
-        let document = parameters().document();
+        let document = json(parameters().document());
         for board in document["boards"].as_array().expect("a list") {
             let kind = board["kind"].as_str().expect("a text");
             let rows = document[kind].as_array().expect("a table");
@@ -189,18 +227,37 @@ mod tests {
     #[test]
     fn what_a_board_has_told_is_shown_in_its_unit() {
         let mut parameters = parameters();
+        // Asked for before, too.
+        assert_eq!(json(parameters.document())["boards"][2]["address"], 3);
         let info = params_at(3)
             .iter()
             .find(|row| row.name == "proportional")
             .expect("in the table");
         let told = parameters.told((3, info.id), raw_of(info, 0.03));
         assert_eq!(told.as_deref(), Some(GAIN));
-        assert_eq!(parameters.list(&[GAIN.to_owned()])[0]["value"], 0.03);
+        let listed = json(&parameters.list(&[GAIN.to_owned()]));
+        assert_eq!(listed[0]["value"], 0.03);
         let place = params_at(3).iter().position(|row| row.name == info.name);
         let place = place.expect("in the table");
-        let shown = &parameters.document()["boards"][2]["values"][place];
+        let shown = &json(parameters.document())["boards"][2]["values"][place];
         assert_eq!(shown, &json!({ "value": 0.03, "told": true }));
         assert_eq!(parameters.told((3, 0xFFFF), 0), None);
+    }
+
+    #[test]
+    fn what_is_named_often_is_told_once() {
+        let parameters = parameters();
+        let names = vec![DESCRIPTION.to_owned(); 1_300];
+        let listed = json(&parameters.list(&names));
+        assert_eq!(
+            listed,
+            json!([{ "name": DESCRIPTION, "value": "<robot/>" }])
+        );
+        assert_eq!(parameters.names(&names).len(), 1);
+        let names = [GAIN, GAIN, "/nothing"].map(str::to_owned);
+        let listed = json(&parameters.list(&names));
+        assert_eq!(listed.as_array().expect("a list").len(), 1);
+        assert_eq!(parameters.list(&["/nothing".to_owned()]), "[]");
     }
 
     #[test]

@@ -107,7 +107,7 @@ pub(crate) async fn serve(
         server_mac,
         key,
     } = admitted;
-    let Some((id, master_us)) = context.hub.enter(role, &name, &session, &outbox) else {
+    let Some((asking, master_us)) = context.hub.enter(role, &name, &session, &outbox) else {
         return refuse(&mut socket, Close::TooSlow).await;
     };
     let welcome = json!({
@@ -145,7 +145,7 @@ pub(crate) async fn serve(
                     return;
                 };
                 let Entered { n, body, limited } = entered;
-                context.hub.ask(id, n, body, limited);
+                context.hub.ask(&asking, n, body, limited).await;
             }
         };
         tokio::select! {
@@ -153,7 +153,7 @@ pub(crate) async fn serve(
             () = read => {}
         }
     }
-    context.hub.leave(id);
+    context.hub.leave(&asking);
 }
 
 /// Sends what waits for a client until it is closed or takes nothing more.

@@ -229,6 +229,11 @@ mod tests {
             assert!(outbox.contents().close.is_none());
             outbox.answer(status(0, ""));
         }
+        // What it goes on asking is not kept.
+        for _ in 0..ANSWERS_MAX {
+            outbox.answer(status(0, ""));
+        }
+        assert_eq!(outbox.contents().messages.answers.len(), 0);
         let close = outbox.next().expect("a close");
         assert!(matches!(close, Message::Close(Some(frame)) if frame.code == 4004));
     }

@@ -13,7 +13,7 @@ use super::channels;
 use super::outbox::{Outbox, status};
 use super::request::{Malformed, Request, parse_binary, parse_text};
 use crate::close::Close;
-use crate::hub::{Hub, Looking};
+use crate::hub::{Hub, Looking, StopsUnderWay};
 use crate::progress::PROGRESS;
 use crate::rate::Bucket;
 use crate::session::{SILENCE, send_all};
@@ -79,6 +79,7 @@ pub(crate) async fn serve(mut socket: WebSocket, hub: Arc<Hub>, viewing: Viewing
         let looking = Looking {
             id,
             may_write: viewing.may_write,
+            stops: StopsUnderWay::new(),
         };
         let (mut out, mut input) = socket.split();
         let write = send_all(&mut out, || outbox.wait());
@@ -93,11 +94,11 @@ pub(crate) async fn serve(mut socket: WebSocket, hub: Arc<Hub>, viewing: Viewing
                 };
                 match request {
                     // A stop is never too much.
-                    Ok(stop @ Request::Call(_)) => hub.look(&looking, stop),
+                    Ok(stop @ Request::Call(_)) => hub.look(&looking, stop).await,
                     Ok(_) if !bucket.take(Instant::now()) => {
                         outbox.answer(status(1, "too many messages: at most 100 per second"));
                     }
-                    Ok(request) => hub.look(&looking, request),
+                    Ok(request) => hub.look(&looking, request).await,
                     Err(Malformed) => {
                         outbox.close(Close::BadFrame);
                         // The writer sends the close, and ends the session.

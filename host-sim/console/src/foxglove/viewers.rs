@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::body::Bytes;
 use axum::extract::ws::Message;
-use serde_json::{Value, json};
+use serde_json::json;
 use wheeleg_config::NodeParams;
 use wheeleg_scene::Scene;
 use wheeleg_telemetry::{Derive as _, Derived, OwnedSample, SampleRef, Taken};
@@ -251,16 +251,15 @@ impl Viewers {
     /// Tells a viewer of parameters.
     pub(crate) fn tell_parameters(&self, id: ViewerId, names: &[String], request: Option<&str>) {
         let values = self.parameters.list(names);
-        self.tell(id, parameter_values(values, request));
+        self.tell(id, parameter_values(&values, request));
     }
 
     /// Changes of parameters from now on, or no longer; no names: all.
     pub(crate) fn follow(&mut self, id: ViewerId, names: &[String], follow: bool) {
-        let listed = self.parameters.list(names);
         let Some(viewer) = self.all.get_mut(&id) else {
             return;
         };
-        for name in listed.iter().filter_map(|p| p["name"].as_str()) {
+        for name in self.parameters.names(names) {
             if follow {
                 viewer.parameters.insert(name.to_owned());
             } else {
@@ -275,7 +274,7 @@ impl Viewers {
             return;
         };
         let values = self.parameters.list(std::slice::from_ref(&name));
-        let message = parameter_values(values, None);
+        let message = parameter_values(&values, None);
         for viewer in self.all.values() {
             if viewer.parameters.contains(&name) {
                 viewer.outbox.answer(message.clone());
@@ -290,10 +289,9 @@ fn encode(sample: &OwnedSample) -> Bytes {
     out.into()
 }
 
-fn parameter_values(values: Vec<Value>, request: Option<&str>) -> Message {
-    let mut message = json!({ "op": "parameterValues", "parameters": values });
-    if let Some(id) = request {
-        message["id"] = json!(id);
-    }
-    Message::Text(message.to_string().into())
+/// `values`: a list in JSON.
+fn parameter_values(values: &str, request: Option<&str>) -> Message {
+    let id = request.map_or(String::new(), |id| format!(r#","id":{}"#, json!(id)));
+    let message = format!(r#"{{"op":"parameterValues","parameters":{values}{id}}}"#);
+    Message::Text(message.into())
 }

@@ -12,9 +12,8 @@ use tokio::time::timeout;
 use super::outbox::status;
 use super::request::Setting;
 use super::viewers::ViewerId;
-use crate::desk::ClientId;
 use crate::hex;
-use crate::hub::{Hub, Role};
+use crate::hub::{Asking, Hub, Role};
 use crate::outbox::Outbox;
 use crate::request::{Body, Spoken};
 
@@ -63,7 +62,7 @@ async fn write_all(hub: &Arc<Hub>, settings: Vec<Setting>) -> Result<(), String>
 /// A session of the console within the server.
 struct Session {
     hub: Arc<Hub>,
-    id: ClientId,
+    asking: Asking,
     outbox: Arc<Outbox>,
     n: u64,
 }
@@ -74,10 +73,10 @@ impl Session {
         getrandom::fill(&mut number).map_err(|e| e.to_string())?;
         let outbox = Arc::new(Outbox::default());
         let entered = hub.enter(Role::Control, NAME, &hex::encode(&number), &outbox);
-        let (id, _) = entered.ok_or("all places of the console are taken")?;
+        let (asking, _) = entered.ok_or("all places of the console are taken")?;
         Ok(Self {
             hub: Arc::clone(hub),
-            id,
+            asking,
             outbox,
             n: 0,
         })
@@ -112,7 +111,7 @@ impl Session {
             seen_us: self.hub.now_us(),
             valid_us: VALID_US,
         };
-        self.hub.ask(self.id, self.n, body, false);
+        self.hub.ask(&self.asking, self.n, body, false).await;
         timeout(ANSWER, self.answer())
             .await
             .map_err(|_| format!("no answer to {name}"))?
@@ -127,7 +126,8 @@ impl Session {
             if message["op"] == "state" {
                 // It sees the robot.
                 let seen_us = message["master_us"].as_u64().unwrap_or_default();
-                self.hub.ask(self.id, 0, Body::Beat { seen_us }, false);
+                let beat = Body::Beat { seen_us };
+                self.hub.ask(&self.asking, 0, beat, false).await;
             }
             if message["op"] != "answer" || message["n"] != self.n {
                 continue;
@@ -148,6 +148,6 @@ impl Session {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        self.hub.leave(self.id);
+        self.hub.leave(&self.asking);
     }
 }

@@ -1,6 +1,6 @@
 //! Who is in control, and requests from their begin to their end.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use wheeleg_master::command::{Command, CommandCode};
@@ -12,6 +12,10 @@ use crate::messages::{outcome, refused};
 use crate::reason::Reason;
 use crate::request::{HostCommand, Order, Spoken};
 
+/// The holder of the control is told of one who asks for it so often at most: who asks without end
+/// fills no queue of theirs.
+const ASKED: Duration = Duration::from_secs(1);
+
 impl Inner {
     pub(super) fn give(
         &mut self,
@@ -21,7 +25,7 @@ impl Inner {
         seen_us: u64,
         valid_us: u64,
     ) {
-        let Some(client) = self.clients.get(&id) else {
+        let Some(client) = self.clients.get_mut(&id) else {
             return;
         };
         if client.role != Role::Control {
@@ -40,12 +44,16 @@ impl Inner {
                 match self.desk.ask(id, who, takes) {
                     Ok(()) => {}
                     Err(Denied::Held) => {
-                        let asked = json!({ "op": "asked", "by": client.name });
-                        let answer = self.held(n);
-                        if let Some(holder) = self.desk.holder() {
-                            self.tell(holder.client, &asked);
+                        let now = Instant::now();
+                        let told = client.asked.is_some_and(|told| now - told < ASKED);
+                        if !told {
+                            client.asked = Some(now);
+                            let asked = json!({ "op": "asked", "by": client.name });
+                            if let Some(holder) = self.desk.holder() {
+                                self.tell(holder.client, &asked);
+                            }
                         }
-                        return self.tell(id, &answer);
+                        return self.tell(id, &self.held(n));
                     }
                     Err(Denied::NotInControl) => {
                         let text = "take the control first";

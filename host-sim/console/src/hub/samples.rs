@@ -56,7 +56,7 @@ impl Inner {
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();
                 }
-                tell_event(&self.clients, &mut self.events, event);
+                tell_event(&self.clients, &mut self.events, &event);
             }
             self.viewers
                 .see(moving.channel, moving.t_ns, &moving.sample);
@@ -123,7 +123,11 @@ fn encode(moving: &Moving) -> Bytes {
     out.into()
 }
 
-fn tell_event(clients: &BTreeMap<ClientId, Client>, events: &mut VecDeque<Value>, event: Value) {
+fn tell_event(
+    clients: &BTreeMap<ClientId, Client>,
+    events: &mut VecDeque<Utf8Bytes>,
+    event: &Value,
+) {
     let text = Utf8Bytes::from(event.to_string());
     for client in clients.values() {
         client.outbox.ordered(text.clone());
@@ -131,5 +135,5 @@ fn tell_event(clients: &BTreeMap<ClientId, Client>, events: &mut VecDeque<Value>
     if events.len() == EVENTS {
         events.pop_front();
     }
-    events.push_back(event);
+    events.push_back(text);
 }

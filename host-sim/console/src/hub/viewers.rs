@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::extract::ws::Message;
 use serde_json::{Value, json};
 
-use super::{CLIENTS, Hub};
+use super::{CLIENTS, Hub, StopsUnderWay};
 use crate::foxglove::{self, Call, Outbox, Request, Setting, ViewerId, status};
 use crate::foxglove::{STOP_SERVICE, URDF};
 
@@ -15,6 +15,8 @@ pub(crate) struct Looking {
     pub(crate) id: ViewerId,
     /// Whether it may write parameters.
     pub(crate) may_write: bool,
+    /// Its stops.
+    pub(crate) stops: StopsUnderWay,
 }
 
 /// First bytes of binary messages.
@@ -35,8 +37,12 @@ impl Hub {
     }
 
     /// What a viewer asks.
-    pub(crate) fn look(self: &Arc<Self>, looking: &Looking, request: Request) {
+    pub(crate) async fn look(self: &Arc<Self>, looking: &Looking, request: Request) {
         let id = looking.id;
+        let request = match request {
+            Request::Call(call) => return self.call(looking, call).await,
+            other => other,
+        };
         let mut inner = self.inner();
         let viewers = &mut inner.viewers;
         match request {
@@ -64,11 +70,8 @@ impl Hub {
                 drop(inner);
                 self.set_parameters(looking, parameters, request);
             }
-            Request::Call(call) => {
-                drop(inner);
-                self.call(id, call);
-            }
-            Request::Other => {
+            // A call is answered above.
+            Request::Call(_) | Request::Other => {
                 let text = "not offered here: the robot is driven at the console";
                 viewers.tell(id, status(2, text));
             }
@@ -98,12 +101,14 @@ impl Hub {
         }
     }
 
-    fn call(self: &Arc<Self>, id: ViewerId, call: Call) {
+    async fn call(self: &Arc<Self>, looking: &Looking, call: Call) {
+        let id = looking.id;
         if call.service != STOP_SERVICE {
             let text = format!("there is no service {}", call.service);
             return self.tell_viewer(id, failure(&call, &text));
         }
         // Whatever the encoding: a stop has no arguments.
+        let under_way = looking.stops.begin().await;
         let hub = Arc::clone(self);
         tokio::spawn(async move {
             let message = match hub.stop().await {
@@ -111,6 +116,7 @@ impl Hub {
                 None => failure(&call, "NOT CONFIRMED within 200 ms: cut the air"),
             };
             hub.tell_viewer(id, message);
+            drop(under_way);
         });
     }
 

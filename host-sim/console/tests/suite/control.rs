@@ -157,6 +157,18 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     );
     assert_eq!(answer["holder"], "first");
     assert_eq!(look(&mut first, "asked")["by"], "second");
+    // Who asks without end is told of once a second.
+    let begin = Instant::now();
+    let mut told = 0;
+    for _ in 0..40 {
+        let reason = refusal(&mut second, "TakeControl", &json!({}));
+        assert_eq!(reason, "control_held");
+        for _ in 0..4 {
+            let asked = |heard| matches!(heard, Incoming::Json(m) if m["op"] == "asked");
+            told += u64::from(first.read().is_some_and(asked));
+        }
+    }
+    assert!(told <= begin.elapsed().as_secs() + 1, "{told} times");
     assert_eq!(refusal(&mut second, "Disarm", &json!({})), "not_in_control");
     assert_eq!(refusal(&mut second, "Pause", &json!({})), "control_held");
     // Its beats keep the control of nobody.

@@ -85,6 +85,12 @@ fn foreign_hosts_and_origins_are_refused_everywhere() {
                 "{path} {host} {origin}: {answer}"
             );
         }
+        // By a name of ours in one place, and of a stranger in another.
+        let request = format!(
+            "GET http://evil.example{path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n"
+        );
+        let answer = raw(&rig, &request);
+        assert!(answer.starts_with("HTTP/1.1 403"), "{path}: {answer}");
     }
 }
 
@@ -99,6 +105,8 @@ fn the_page_comes_with_its_policy_and_no_name_leads_out_of_it() {
         "frame-ancestors 'none'",
         "x-content-type-options: nosniff",
         "cache-control: no-store",
+        "referrer-policy: no-referrer",
+        "cross-origin-opener-policy: same-origin",
     ] {
         assert!(
             page.to_ascii_lowercase().contains(header),
@@ -108,6 +116,8 @@ fn the_page_comes_with_its_policy_and_no_name_leads_out_of_it() {
     for path in [
         "/../Cargo.toml",
         "/%2e%2e/Cargo.toml",
+        "/..%2f..%2fCargo.toml",
+        "/index.html%00",
         "//etc/passwd",
         "/control.key",
         "/x",

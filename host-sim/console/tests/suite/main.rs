@@ -4,6 +4,7 @@
 mod api;
 mod common;
 mod control;
+mod flood;
 mod foxglove;
 mod hostile;
 mod latency;

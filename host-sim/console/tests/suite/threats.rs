@@ -19,12 +19,14 @@ fn every_threat_has_a_test_that_is_there() {
         assert!(!names.is_empty(), "no test: {row}");
         let mut file = String::new();
         for name in names {
-            if name.ends_with(".rs") {
+            if name.ends_with(".rs") || name.ends_with(".py") {
                 let path = root.join(name);
                 file = std::fs::read_to_string(&path).expect("a file of tests");
             } else if name.contains('_') {
-                let test = format!("fn {name}()");
-                assert!(file.contains(&test), "{name} is nowhere: {row}");
+                // In Rust, or in Python.
+                let tests = [format!("fn {name}()"), format!("def {name}(")];
+                let there = tests.iter().any(|test| file.contains(test));
+                assert!(there, "{name} is nowhere: {row}");
             } else {
                 // A row of the fault matrix, or a fuzz target.
                 let fuzz = root

@@ -1,56 +1,34 @@
 //! `wheeleg ctl`: the console for the command line.
 
+mod param;
+mod reach;
+
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write as _};
-use std::path::PathBuf;
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
-use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
-use wheeleg_console::keys::{self, CONTROL_FILE, VIEW_FILE};
-use wheeleg_console::request::FRAME_MAX;
-use wheeleg_console::{ADDRESS, Fingerprint, Key, SPEED};
+use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_console::keys::VIEW_FILE;
+use wheeleg_console::{Key, SPEED};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::view::plain;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
-use super::exit::{self, LOST, REFUSED};
+use super::exit::{self, LOST};
 use super::serve::refused;
-use super::{print, tell, whole};
-
-/// How long a command of this program may be under way, ms.
-const VALID_MS: u32 = 1_000;
+use super::{print, say, tell, whole};
+use param::ParamCommand;
+use reach::{Reach, not_answered};
 
 /// Arguments of `wheeleg ctl`.
 #[derive(Debug, Args)]
 #[command(after_help = exit::help(exit::CTL))]
 pub(super) struct CtlArgs {
-    /// Address of the server.
-    #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
-    url: Url,
-    /// SHA-256 of the certificate of a server with TLS, as it prints it.
-    #[arg(long, value_name = "HEX", value_parser = Fingerprint::parse)]
-    fingerprint: Option<Fingerprint>,
-    /// File of the key [default: the one that `wheeleg serve` has made].
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    reach: Reach,
     #[command(subcommand)]
     command: CtlCommand,
-}
-
-impl CtlArgs {
-    /// The server that is meant.
-    fn url(&self) -> Url {
-        let url = self.url.clone();
-        match self.fingerprint {
-            Some(fingerprint) => url.with_certificate(fingerprint),
-            None => url,
-        }
-    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -74,6 +52,9 @@ enum CtlCommand {
     },
     /// Stop the robot.
     Stop,
+    /// Read, write or save parameters of a board.
+    #[command(subcommand)]
+    Param(ParamCommand),
     /// Begin a fault, such as pot-open:joint3.
     Inject {
         /// Fault and target, as `wheeleg faults list` has them.
@@ -124,13 +105,17 @@ fn parse_pace(text: &str) -> Result<f64, String> {
 
 /// Does what is asked of the server.
 pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
-    let key = |file| read_key(args, file);
-    match &args.command {
-        CtlCommand::Status => status(args, &key(VIEW_FILE)?),
-        CtlCommand::Watch { channels, hz } => watch(args, &key(VIEW_FILE)?, channels, *hz),
+    let CtlArgs { reach, command } = args;
+    let host = |name: &str, arguments: Value| {
+        let end = reach.give(name, &arguments)?;
+        reach.print_outcome(&end)
+    };
+    match command {
+        CtlCommand::Status => status(reach, &reach.key(VIEW_FILE)?),
+        CtlCommand::Watch { channels, hz } => watch(reach, &reach.key(VIEW_FILE)?, channels, *hz),
         CtlCommand::Stop => {
-            let key = key(VIEW_FILE)?;
-            stop(args, &key).or_else(|why| match why {
+            let key = reach.key(VIEW_FILE)?;
+            stop(reach, &key).or_else(|why| match why {
                 StudyError::Stdout(_) => Err(why),
                 // Whatever kept the answer away, nobody knows of a stop.
                 _ => {
@@ -139,34 +124,27 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
                 }
             })
         }
-        CtlCommand::Take { command } => take(args, &key(CONTROL_FILE)?, command),
-        CtlCommand::Inject { fault } => host(args, "Inject", &json!({ "fault": fault })),
-        CtlCommand::EndFault { fault } => host(args, "EndFault", &json!({ "fault": fault })),
-        CtlCommand::Pause => host(args, "Pause", &json!({})),
-        CtlCommand::Resume => host(args, "Resume", &json!({})),
-        CtlCommand::Step { cycles } => host(args, "Step", &json!({ "cycles": cycles })),
-        CtlCommand::Speed { speed } => host(args, "Speed", &json!({ "speed": speed })),
+        CtlCommand::Take { command } => take(reach, command),
+        CtlCommand::Param(command) => param::command(reach, command),
+        CtlCommand::Inject { fault } => host("Inject", json!({ "fault": fault })),
+        CtlCommand::EndFault { fault } => host("EndFault", json!({ "fault": fault })),
+        CtlCommand::Pause => host("Pause", json!({})),
+        CtlCommand::Resume => host("Resume", json!({})),
+        CtlCommand::Step { cycles } => host("Step", json!({ "cycles": cycles })),
+        CtlCommand::Speed { speed } => host("Speed", json!({ "speed": speed })),
         CtlCommand::Rec { what } => match what {
-            Recording::Start => host(args, "RecordStart", &json!({})),
-            Recording::Stop => host(args, "RecordStop", &json!({})),
+            Recording::Start => host("RecordStart", json!({})),
+            Recording::Stop => host("RecordStop", json!({})),
         },
     }
 }
 
-fn read_key(args: &CtlArgs, file: &str) -> Result<Key, StudyError> {
-    let path = match &args.key {
-        Some(path) => path.clone(),
-        None => keys::folder().map_err(refused)?.join(file),
-    };
-    keys::read(&path).map_err(refused)
-}
-
-fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
-    let (code, state) = http(&args.url(), "GET", "state", key).map_err(refused)?;
+fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
+    let (code, state) = http(&reach.url(), "GET", "state", key).map_err(refused)?;
     if code != 200 {
         return Ok(not_answered(&state));
     }
-    if args.json {
+    if reach.json {
         return print(&format!("{state:#}\n"));
     }
     let word = |value: &Value| match value {
@@ -214,33 +192,27 @@ fn status(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
     print(&text)
 }
 
-fn not_answered(problem: &Value) -> ExitCode {
-    let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
-    tell(&format!("{}: {}", text("detail"), text("remedy")));
-    ExitCode::from(REFUSED)
-}
-
-fn stop(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
-    if args.url().is_exposed() {
-        return stop_by_session(args, key);
+fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
+    if reach.url().is_exposed() {
+        return stop_by_session(reach, key);
     }
-    let (code, answer) = http(&args.url(), "POST", "stop", key).map_err(refused)?;
+    let (code, answer) = http(&reach.url(), "POST", "stop", key).map_err(refused)?;
     match code {
-        200 if args.json => print(&format!("{answer}\n")),
+        200 if reach.json => print(&format!("{answer}\n")),
         200 => print("stopped: the stop is in SYNC, and latched\n"),
         504 => Ok(not_confirmed()),
-        403 => stop_by_session(args, key),
+        403 => stop_by_session(reach, key),
         _ => Ok(not_answered(&answer)),
     }
 }
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.
-fn stop_by_session(args: &CtlArgs, key: &Key) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
+fn stop_by_session(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
     let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
     match client.prompt_outcome(n) {
         Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
-        end => print_outcome(args, &end),
+        end => reach.print_outcome(&end),
     }
 }
 
@@ -250,19 +222,19 @@ fn not_confirmed() -> ExitCode {
     ExitCode::from(LOST)
 }
 
-fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&args.url(), "view", "ctl", key).map_err(refused)?;
+fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
     if !topics.is_empty() {
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
         let n = client.send(frame).map_err(refused)?;
         if let end @ (Outcome::Refused { .. } | Outcome::Lost) = client.outcome(n) {
-            return print_outcome(args, &end);
+            return reach.print_outcome(&end);
         }
     }
     loop {
         let line = match client.read() {
             Some(Incoming::Json(event)) if event["op"] == "event" => {
-                if args.json {
+                if reach.json {
                     event.to_string()
                 } else {
                     let t_s = event["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
@@ -277,7 +249,7 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
                 missed,
                 body,
             }) => match sample(channel, &body) {
-                Some((t_ns, values)) => line(args, channel, missed, t_ns, &values),
+                Some((t_ns, values)) => line(reach, channel, missed, t_ns, &values),
                 None => continue,
             },
             Some(Incoming::Closed { .. }) => {
@@ -286,8 +258,7 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
             }
             _ => continue,
         };
-        let mut out = std::io::stdout().lock();
-        match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        match say(&format!("{line}\n")) {
             Ok(()) => {}
             // The reader has gone away (`| head`).
             Err(e) if e.kind() == ErrorKind::BrokenPipe => return Ok(ExitCode::SUCCESS),
@@ -297,14 +268,14 @@ fn watch(args: &CtlArgs, key: &Key, topics: &[String], hz: u32) -> Result<ExitCo
 }
 
 fn line(
-    args: &CtlArgs,
+    reach: &Reach,
     channel: u16,
     missed: u32,
     t_ns: u64,
     values: &Map<String, Value>,
 ) -> String {
     let topic = channels()[usize::from(channel)].topic;
-    if args.json {
+    if reach.json {
         return json!({ "topic": topic, "t_ns": t_ns, "missed": missed, "values": values })
             .to_string();
     }
@@ -362,7 +333,7 @@ fn argument(text: &str) -> Result<(String, Value), StudyError> {
     Ok((name.to_owned(), parsed.unwrap_or_else(|| json!(value))))
 }
 
-fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyError> {
+fn take(reach: &Reach, words: &[String]) -> Result<ExitCode, StudyError> {
     let Some((name, arguments)) = words.split_first() else {
         return Ok(ExitCode::SUCCESS);
     };
@@ -376,72 +347,8 @@ fn take(args: &CtlArgs, key: &Key, words: &[String]) -> Result<ExitCode, StudyEr
             ));
         }
     }
-    let arguments = Value::Object(given);
-    ensure_fits(name, &arguments)?;
-    let mut client = Client::connect(&args.url(), "control", "ctl", key).map_err(refused)?;
-    let mut give = |name: &str, arguments: &Value| {
-        let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
-        client.keep_control(true);
-        end
-    };
-    let taken = give("TakeControl", &json!({}))?;
-    if taken != Outcome::Done {
-        return print_outcome(args, &taken);
-    }
-    let end = give(name, &arguments)?;
-    if end != Outcome::Lost {
-        let released = give("ReleaseControl", &json!({}))?;
-        if released != Outcome::Done {
-            tell("the control is not released: the robot will hold");
-        }
-    }
-    print_outcome(args, &end)
-}
-
-/// Bytes of a frame beside the command in it.
-const AROUND: usize = 256;
-
-/// Refuses what the server would not read: it ends the connection at a frame that is too long.
-fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
-    let bytes = name.len() + arguments.to_string().len();
-    let most = FRAME_MAX - AROUND;
-    if bytes <= most {
-        return Ok(());
-    }
-    Err(StudyError::refused(
-        format!("the command has {bytes} bytes: allowed are {most}"),
-        "`wheeleg commands` lists the commands of the robot, `wheeleg faults list` the faults",
-    ))
-}
-
-fn host(args: &CtlArgs, name: &str, arguments: &Value) -> Result<ExitCode, StudyError> {
-    ensure_fits(name, arguments)?;
-    let key = read_key(args, CONTROL_FILE)?;
-    let mut client = Client::connect(&args.url(), "control", "ctl", &key).map_err(refused)?;
-    let end = client
-        .carry_out(name, arguments, VALID_MS)
-        .map_err(refused)?;
-    print_outcome(args, &end)
-}
-
-/// Prints how a request ended; its exit code.
-fn print_outcome(args: &CtlArgs, end: &Outcome) -> Result<ExitCode, StudyError> {
-    let (status, code, reason, text) = match end {
-        Outcome::Done => ("done", 0, "", ""),
-        Outcome::Refused { reason, text } => ("refused", REFUSED, reason.as_str(), text.as_str()),
-        Outcome::Unknown => ("unknown", LOST, "", "nobody answered within 2 s"),
-        Outcome::Lost => ("lost", LOST, "", "the connection ended"),
-    };
-    if args.json {
-        let end = json!({ "status": status, "reason": reason, "text": text });
-        print(&format!("{end}\n"))?;
-    } else if text.is_empty() {
-        print(&format!("{status}\n"))?;
-    } else {
-        // It may quote what was given.
-        tell(&plain(&format!("{status}: {text}")));
-    }
-    Ok(ExitCode::from(code))
+    let end = reach.in_control(&[(name.as_str(), Value::Object(given))])?;
+    reach.print_outcome(&end)
 }
 
 #[cfg(test)]

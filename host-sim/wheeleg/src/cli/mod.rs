@@ -15,6 +15,7 @@ mod export;
 mod faults;
 mod field;
 mod figures;
+mod harmless;
 mod identify;
 mod interface;
 mod list;
@@ -29,7 +30,7 @@ mod usage;
 mod view;
 
 use std::fmt::Display;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -42,6 +43,7 @@ use wheeleg_studies::StudyError;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
 use exit::{FAILED, TARGETS_MISSED};
+use harmless::harmless;
 
 /// Simulator and control stack of the hybrid robot Wheeleg.
 ///
@@ -160,15 +162,23 @@ pub(crate) fn main() -> ExitCode {
 
 /// Writes to stdout. A reader that has gone away (`| head`) is no error.
 fn print(text: &str) -> Result<ExitCode, StudyError> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match say(text) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(StudyError::Stdout(e)),
         _ => Ok(ExitCode::SUCCESS),
     }
 }
 
+/// Writes to stdout: a file or a pipe gets what was meant, a terminal nothing that acts on it.
+fn say(text: &str) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let shown = out.is_terminal().then(|| harmless(text));
+    out.write_all(shown.as_deref().unwrap_or(text).as_bytes())?;
+    out.flush()
+}
+
 /// Writes a line to standard error. There may be nobody left to read it after a hang-up.
 fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", harmless(line));
 }
 
 /// What every study that draws can be asked for.

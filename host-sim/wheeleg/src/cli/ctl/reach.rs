@@ -1,0 +1,146 @@
+//! How a server is reached, and the control of its robot for the length of a command.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use serde_json::{Value, json};
+use wheeleg_console::client::{Client, Outcome, Url};
+use wheeleg_console::keys::{self, CONTROL_FILE};
+use wheeleg_console::request::FRAME_MAX;
+use wheeleg_console::{ADDRESS, Fingerprint, Key};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::view::plain;
+
+use super::super::exit::{LOST, REFUSED};
+use super::super::serve::refused;
+use super::super::{print, tell};
+
+/// How long a command of this program may be under way, ms.
+const VALID_MS: u32 = 1_000;
+
+/// Which server, and how its answers are printed.
+#[derive(Debug, Args)]
+pub(super) struct Reach {
+    /// Address of the server.
+    #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
+    url: Url,
+    /// SHA-256 of the certificate of a server with TLS, as it prints it.
+    #[arg(long, value_name = "HEX", value_parser = Fingerprint::parse)]
+    fingerprint: Option<Fingerprint>,
+    /// File of the key [default: the one that `wheeleg serve` has made].
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl Reach {
+    /// The server that is meant.
+    pub(super) fn url(&self) -> Url {
+        let url = self.url.clone();
+        match self.fingerprint {
+            Some(fingerprint) => url.with_certificate(fingerprint),
+            None => url,
+        }
+    }
+
+    /// The key that is given, or that of `file`.
+    pub(super) fn key(&self, file: &str) -> Result<Key, StudyError> {
+        let path = match &self.key {
+            Some(path) => path.clone(),
+            None => keys::folder().map_err(refused)?.join(file),
+        };
+        keys::read(&path).map_err(refused)
+    }
+
+    /// A session that may drive.
+    pub(super) fn control(&self) -> Result<Client, StudyError> {
+        let key = self.key(CONTROL_FILE)?;
+        Client::connect(&self.url(), "control", "ctl", &key).map_err(refused)
+    }
+
+    /// Takes the control, gives commands up to the first that is not done, and releases the control;
+    /// how the last one ended.
+    pub(super) fn in_control(&self, commands: &[(&str, Value)]) -> Result<Outcome, StudyError> {
+        for (name, arguments) in commands {
+            ensure_fits(name, arguments)?;
+        }
+        let mut client = self.control()?;
+        let mut give = |name: &str, arguments: &Value| {
+            let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
+            client.keep_control(true);
+            end
+        };
+        let mut end = give("TakeControl", &json!({}))?;
+        if end != Outcome::Done {
+            return Ok(end);
+        }
+        for (name, arguments) in commands {
+            end = give(name, arguments)?;
+            if end != Outcome::Done {
+                break;
+            }
+        }
+        if end != Outcome::Lost {
+            let released = give("ReleaseControl", &json!({}))?;
+            if released != Outcome::Done {
+                tell("the control is not released: the robot will hold");
+            }
+        }
+        Ok(end)
+    }
+
+    /// Gives a command to the simulation; how it ended.
+    pub(super) fn give(&self, name: &str, arguments: &Value) -> Result<Outcome, StudyError> {
+        ensure_fits(name, arguments)?;
+        let mut client = self.control()?;
+        client.carry_out(name, arguments, VALID_MS).map_err(refused)
+    }
+
+    /// Prints how a request ended; its exit code.
+    pub(super) fn print_outcome(&self, end: &Outcome) -> Result<ExitCode, StudyError> {
+        let (status, code, reason, text) = match end {
+            Outcome::Done => ("done", 0, "", ""),
+            Outcome::Refused { reason, text } => {
+                ("refused", REFUSED, reason.as_str(), text.as_str())
+            }
+            Outcome::Unknown => ("unknown", LOST, "", "nobody answered within 2 s"),
+            Outcome::Lost => ("lost", LOST, "", "the connection ended"),
+        };
+        if self.json {
+            let end = json!({ "status": status, "reason": reason, "text": text });
+            print(&format!("{end}\n"))?;
+        } else if text.is_empty() {
+            print(&format!("{status}\n"))?;
+        } else {
+            // It may quote what was given.
+            tell(&plain(&format!("{status}: {text}")));
+        }
+        Ok(ExitCode::from(code))
+    }
+}
+
+/// Tells what a server refuses over HTTP; its exit code.
+pub(super) fn not_answered(problem: &Value) -> ExitCode {
+    let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
+    tell(&format!("{}: {}", text("detail"), text("remedy")));
+    ExitCode::from(REFUSED)
+}
+
+/// Bytes of a frame beside the command in it.
+const AROUND: usize = 256;
+
+/// Refuses what the server would not read: it ends the connection at a frame that is too long.
+fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
+    let bytes = name.len() + arguments.to_string().len();
+    let most = FRAME_MAX - AROUND;
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(StudyError::refused(
+        format!("the command has {bytes} bytes: allowed are {most}"),
+        "`wheeleg commands` lists the commands of the robot, `wheeleg faults list` the faults",
+    ))
+}
