@@ -5,12 +5,14 @@
 Without a key and with a wrong one nothing is shown. With the right one: ready, walk, stop the gait,
 provoke a fault, read its remedy, stop with Esc from within a field. A slider asks for a stroke; a parameter is written, and not saved while armed. Who has the view key may look and
 stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Somebody drives by
-hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space, and on a slope on its
+ground. A page that did not run says so. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
 import contextlib
 import io
+import math
 import os
 import re
 import shutil
@@ -43,10 +45,10 @@ def expect(holds, what):
 class Console:
     """`wheeleg serve` in a home of its own."""
 
-    def __init__(self, program, home, listen="127.0.0.1:0", *options):
+    def __init__(self, program, home, listen="127.0.0.1:0", *options, scenario="stand"):
         environment = dict(os.environ, XDG_STATE_HOME=str(home))
         self.recordings = home / "recordings"
-        arguments = [program, "serve", "stand", "--listen", listen, "--recordings", str(self.recordings), *options]
+        arguments = [program, "serve", scenario, "--listen", listen, "--recordings", str(self.recordings), *options]
         self.process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True)
         first = self.process.stdout.readline()
         self.address = first.split()[1].rstrip("/")
@@ -437,6 +439,7 @@ def journey(browser, console, folder):
     expect(waits(page, "State", ["disarmed"]), f"at first: {cell(page, 'State')}")
     records(page, True)
     expect(becomes_ready(page), f"Ready: {page.inner_text('.answer')!r}")
+    page_hangs(page)
     slider(page)
     parameters(page)
     drives_by_hand(page)
@@ -457,7 +460,10 @@ def journey(browser, console, folder):
         press(page, "Stop walking")
 
     page.select_option("select[aria-label=Fault]", "pot-open")
-    page.fill("input[aria-label='Target and value']", ":joint3")
+    targets = page.eval_on_selector_all("select[aria-label=Target] option", "list => list.map((o) => o.value)")
+    expect(targets == [f"joint{n}" for n in range(1, 7)], f"targets: {targets}")
+    page.select_option("select[aria-label=Target]", "joint3")
+    expect(page.locator("input[aria-label=Value]").is_hidden(), "a fault without a value asks for one")
     for _ in range(ATTEMPTS):
         page.get_by_role("button", name="Inject").click()
         try:
@@ -467,6 +473,9 @@ def journey(browser, console, folder):
             continue
     remedy = page.inner_text(".faults")
     expect("Board 3" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
+    expect("Injected by you: pot-open:joint3. Press End" in remedy, f"what is in the way: {remedy!r}")
+    told = page.inner_text(".try .answer")
+    expect("Inject: done" in told, f"beside Inject: {told!r}")
     expect(waits(page, "State", ["HOLD"]), f"after the fault: {cell(page, 'State')}")
     expect("No reading" in page.locator(".joint").nth(2).inner_text(), "the joint shows a reading all the same")
     expect("error" not in page.locator(".joint").nth(2).inner_text(), "the joint shows an error of no reading")
@@ -475,12 +484,58 @@ def journey(browser, console, folder):
     page.screenshot(path=folder / "fault.png")
     records(page, False)
 
-    page.focus("input[aria-label='Target and value']")
+    page.select_option("select[aria-label=Fault]", "bit-errors")
+    expect(page.locator("select[aria-label=Target]").is_hidden(), "a fault of the whole robot asks for a target")
+    page.focus("input[aria-label=Value]")
     page.keyboard.press("Escape")
     expect(waits(page, "State", ["STOPPED"]), f"after Esc: {cell(page, 'State')}")
     page.wait_for_timeout(300)
     expect("Boards 1, 2, 3" in page.inner_text(".faults"), "equal faults of all boards are not one line")
     return page
+
+
+def ground(browser, program, folder):
+    """The view from the side draws the ground of the scenario."""
+    with tempfile.TemporaryDirectory() as home:
+        console = Console(program, Path(home), scenario="slope-10")
+        try:
+            page = opened(browser, console, f"#k={console.keys['control']}")
+            page.wait_for_selector(".joint")
+            expect(becomes_ready(page), f"Ready on a slope: {page.inner_text('.answer')!r}")
+            # Left to walk a little, it stands higher than where it began.
+            walks(page)
+            page.wait_for_timeout(4000)
+            line = page.eval_on_selector(".r-near-edge", "line => line.getAttribute('points')")
+            points = [tuple(map(float, point.split(","))) for point in line.split()]
+            near = lambda x: min(points, key=lambda point: abs(point[0] - x))[1]
+            # The near track is half a track to the right: 0.26 and 0.2 of it to the left and down.
+            wheel = page.evaluate("() => [...document.querySelectorAll('.views .side svg > g > .r-tyre-face')].pop().parentElement.getAttribute('transform').match(/-?[0-9.]+/g).map(Number)")
+            x, y, scale = wheel[0], wheel[1], wheel[2]
+            wanted = 1000 * math.tan(math.radians(10))
+            expect(abs(near(x) - near(x + 1000) - wanted) < 4, f"the drawn ground rises by {near(x) - near(x + 1000):.1f} mm in a metre, not {wanted:.1f}")
+            below = near(x) - (y + 146 * scale)
+            expect(-8 < below < 12, f"the ground is drawn {below:.1f} mm below the wheel")
+            page.screenshot(path=folder / "slope.png")
+            page.locator(".views .btn", has_text="3D").click()
+            page.wait_for_timeout(1500)
+            page.screenshot(path=folder / "slope-3d.png")
+        finally:
+            console.end()
+
+
+def page_hangs(page):
+    """A page that did not run for so long that its operator was lost says that it was the page."""
+    for _ in range(ATTEMPTS):
+        expect(becomes_ready(page), f"Ready before a pause: {page.inner_text('.answer')!r}")
+        page.evaluate("() => { const end = performance.now() + 900; while (performance.now() < end); }")
+        try:
+            page.wait_for_selector(".fault:has-text('Operator lost')", timeout=3000)
+            break
+        except Exception:
+            continue
+    told = page.inner_text(".faults")
+    seconds = re.search(r"For ([0-9.]+) s this page did not run", told)
+    expect(seconds and 0.5 < float(seconds[1]) < 5, f"a page that did not run: {told!r}")
 
 
 def looks_only(browser, console):
@@ -524,6 +579,7 @@ def main(program, folder, axe):
             space_fails(browser, console)
             page = journey(browser, console, folder)
             looks_only(browser, console)
+            ground(browser, program, folder)
             looks(page, folder, axe)
             console.end()
             repeats(program, console)

@@ -4,9 +4,12 @@
 
 A whole log, one that breaks off, and two that are compared. At three sizes, light and dark: nothing is wider
 than the window, nothing is asked for from elsewhere, the console is empty, axe-core finds nothing. The robot
-plays, the cursor is one over all plots, and an event can be gone to.
+plays, the cursor is one over all plots, and an event can be gone to. Its ground is that of the scenario, and what went wrong
+first is named once.
 """
 
+import math
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -41,6 +44,53 @@ def journey(browser, report):
     page.context.close()
 
 
+def rise(page):
+    """How much higher the drawn ground is a metre ahead of the axle than below it, along the near track, and how far below
+    the near wheel it is drawn, mm."""
+    return page.evaluate("""() => {
+        const line = document.querySelector('.r-near-edge').getAttribute('points').split(' ').map((p) => p.split(',').map(Number));
+        const wheel = document.querySelectorAll('.view svg > g > .r-tyre-face');
+        const place = wheel[wheel.length - 1].parentElement.getAttribute('transform').match(/-?[0-9.]+/g).map(Number);
+        const radius = 146 * place[2];
+        const at = (x) => line.reduce((a, b) => (Math.abs(b[0] - x) < Math.abs(a[0] - x) ? b : a))[1];
+        return [at(place[0]) - at(place[0] + 1000), at(place[0]) - (place[1] + radius)];
+    }""")
+
+
+def ground(browser, program, folder):
+    """The ground of a slope is drawn as it is: in the page of the log, and in the report, which is told it by the scenario."""
+    run = folder / "slope"
+    done = subprocess.run([program, "run", "slope-10", "--out", str(run)], capture_output=True, text=True)
+    expect(done.returncode == 0, f"slope-10: {done.stderr}")
+    made(program, run / "log.html", run / "log.mcap")
+    for report in ["log.html", "report.html"]:
+        page = opened(browser, (run / report).resolve(), 1280, 720, "light")
+        for end in ["Home", "End"]:
+            page.focus(".scrub")
+            page.keyboard.press(end)
+            higher, below = rise(page)
+            wanted = 1000 * math.tan(math.radians(10))
+            expect(abs(higher - wanted) < 3, f"{report}, {end}: the drawn ground rises by {higher} mm in a metre, not {wanted:.1f}")
+            # The axle stands upright over the middle of the wheel; on a slope the tyre's lowest point is uphill of the picture's.
+            expect(-8 < below < 12, f"{report}, {end}: the ground is drawn {below} mm below the wheel")
+        page.screenshot(path=folder / f"slope-{report}.png")
+        page.context.close()
+
+
+def cause(browser, program, folder):
+    """One fault is one cause, named first with its remedy, by the page of the log and by the report."""
+    run = folder / "pot-open"
+    subprocess.run([program, "run", "three-step", "--fault", "pot-open:joint3@3s", "--out", str(run)], capture_output=True, text=True)
+    made(program, run / "log.html", run / "log.mcap")
+    for report, place in [("log.html", "h1"), ("report.html", "header .verdict")]:
+        page = opened(browser, (run / report).resolve(), 1280, 720, "light")
+        told = page.inner_text(place)
+        expect(told.rstrip(".") == "joint 3: the position sensor reads outside its range, at 3.00 s", f"{report}: {told!r}")
+        expect("potentiometer wiring" in page.inner_text("header"), f"{report} does not say what to do")
+        page.screenshot(path=folder / f"cause-{report}.png")
+        page.context.close()
+
+
 def main(program, log, folder, axe):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -63,9 +113,13 @@ def main(program, log, folder, axe):
             shots.mkdir(exist_ok=True)
             check_report.looks(browser, report.resolve(), shots, axe)
         journey(browser, whole.resolve())
+        ground(browser, program, folder)
+        cause(browser, program, folder)
         page = opened(browser, cut.resolve(), 1280, 720, "light")
         expect("breaks off" in page.inner_text(".note"), "the page does not say that its log breaks off")
         browser.close()
+    for run in ["slope", "pot-open"]:
+        shutil.rmtree(folder / run, ignore_errors=True)
     if problems:
         sys.exit("\n".join(problems))
     print(f"{whole.name}: {size} bytes, sound at {len(check_report.SIZES)} sizes; pictures in {folder.name}/")

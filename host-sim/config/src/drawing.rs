@@ -34,6 +34,12 @@ impl Drawing {
             track_mm: mm(robot.spatial.track_m),
         }
     }
+
+    /// Distance between the middles of both wheels \[mm\].
+    #[must_use]
+    pub fn track_mm(&self) -> f64 {
+        self.track_mm
+    }
 }
 
 fn mm(metres: f64) -> f64 {

@@ -278,6 +278,7 @@ fn fault_list() -> Vec<Value> {
         json!({
             "fault": row.name,
             "targets": row.place.expected(),
+            "places": row.place.targets(),
             "effect": row.doc,
             "value": row.value.map(|v| json!({
                 "unit": v.unit, "min": v.min, "max": v.max, "default": v.default, "description": v.doc,

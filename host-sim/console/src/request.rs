@@ -317,9 +317,7 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
                  write {before:?}"
             )));
         }
-        format!("{text}@0s")
-            .parse::<FaultSpec>()
-            .map_err(bad_argument)
+        FaultSpec::at_once(text).map_err(bad_argument)
     };
     Ok(match info.code {
         HostCode::Pause => HostCommand::Pause,

@@ -1,5 +1,6 @@
 // A filmstrip: the robot on its ground in the middle of every swing, side by side.
 import { html, svg, fixed } from "./dom.js";
+import { trackHeights } from "./ground.js";
 import { sideView } from "./robot.js";
 
 /** Frames of a strip, at most: of a longer walk they lie evenly over it. */
@@ -36,15 +37,16 @@ export function showFilm(place, motion, poseAt, goTo) {
   const all = swings(motion.t, motion.load_n);
   if (all.length < FEWEST) return;
   const count = Math.min(FRAMES, all.length);
+  const heights = motion.ground && trackHeights(motion.geometry, motion.ground);
   const strip = html("div", { class: "strip", role: "group", "aria-label": "Frames of the walk" });
   for (let i = 0; i < count; i += 1) {
     const t = all[Math.round((i * (all.length - 1)) / Math.max(1, count - 1))];
     const picture = svg("svg");
     const now = poseAt(t);
-    sideView(picture, motion.geometry, motion.ground).update(now);
+    sideView(picture, motion.geometry, heights).update(now);
     const label = `${fixed(t, 1)} s, ${fixed(now.travel_mm / 1000, 2)} m`;
     strip.append(html("div", { class: "frame" }, picture, html("button", { type: "button", class: "num", onclick: () => goTo(t) }, label)));
   }
-  place.append(html("h2", {}, "Filmstrip"), html("p", {}, `${count} of ${all.length} swings, each in its middle. A frame leads the robot above to its time.`), strip);
+  place.append(html("h2", {}, "Filmstrip"), html("p", {}, `${count} of ${all.length} swings, each in its middle. Click a frame to go to its time.`), strip);
   place.hidden = false;
 }

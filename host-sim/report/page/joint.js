@@ -9,7 +9,7 @@ const NO_READING = new Set([32, 33]);
 
 /** @param {string} name @param {number} board @param {(stroke_mm: number) => void} ask gives the command */
 export function jointCard(name, board, ask) {
-  const picture = svg("svg", { viewBox: "0 0 260 40", class: "cyl", role: "img" });
+  const picture = svg("svg", { viewBox: "0 0 260 48", class: "cyl", role: "img" });
   const title = svg("title", {}, picture);
   svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "bed" }, picture);
   const chamber = { a: svg("rect", { x: 14, y: 9, height: 22, class: "air" }, picture), b: svg("rect", { y: 9, height: 22, class: "air" }, picture) };
@@ -17,7 +17,7 @@ export function jointCard(name, board, ask) {
   const rod = svg("rect", { y: 18, height: 4, class: "rod" }, picture);
   const piston = svg("rect", { y: 9, width: 7, height: 22, class: "piston" }, picture);
   const asked = svg("rect", { y: 5, width: 7, height: 30, class: "want" }, picture);
-  const valves = VALVES.map((_, k) => svg("path", { d: k % 2 === 0 ? "M-5,4 L5,4 L0,-4Z" : "M-5,-4 L5,-4 L0,4Z", transform: `translate(${[24, 40, 204, 188][k]},36)`, class: "v" }, picture));
+  const valves = VALVES.map((_, k) => svg("path", { d: k % 2 === 0 ? "M-5,4 L5,4 L0,-4Z" : "M-5,-4 L5,-4 L0,4Z", transform: `translate(${[24, 40, 204, 188][k]},42)`, class: "v" }, picture));
   const value = html("b", { class: "val" }, "–");
   const side = html("span", { class: "ask" });
   const slider = html("input", { type: "range", min: 0, max: STROKE_MM, step: 1, value: STROKE_MM / 2, "aria-label": `${name}, stroke to ask for, mm` });

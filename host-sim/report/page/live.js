@@ -1,9 +1,11 @@
 // The console: the robot as it is now, and what its operator may do.
 import { html, svg, set, say, fixed, sign } from "./dom.js";
+import { reliefHeights } from "./ground.js";
 import { sideView, topView, footView } from "./robot.js";
 import { Link } from "./link.js";
 import { HZ, Scope } from "./scope.js";
 import { LINKS, boardsView } from "./boards.js";
+import { Pauses, faultsToTry, faultsView } from "./faults.js";
 import { driver } from "./drive.js";
 import { jointCard } from "./joint.js";
 import { parametersView } from "./parameters.js";
@@ -14,11 +16,9 @@ const BEAT_MS = 50;
 /** How often the line is measured. */
 const ECHO_MS = 100;
 const EVENTS = 200;
+/** Who was in control so shortly ago may be who was lost, ms. */
+const DROVE_MS = 5000;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
-/** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
-const HOLDS = {
-  operator_lost: ["Operator lost: the robot holds.", "Nothing was seen of who drove for 0.4 s. Check that the page is in front and the line is good; then take the control, clear the fault, and press Ready."],
-};
 const WHEELS = ["/wheel/7", "/wheel/8"];
 
 /** The key from the address, which must not stay there, or of this tab. @returns {import("./link.js").Identity | null} */
@@ -47,24 +47,29 @@ const cell = (name, minor = false) => {
   const value = html("b", {}, "–");
   return { root: html("div", { class: minor ? "cell minor" : "cell" }, html("small", {}, name), value), value };
 };
-const button = (name, code, act) => html("button", { class: "btn", type: "button", onclick: act }, html("span", {}, name), code && html("small", {}, code));
+/** With a hint below its name, and the number of its command for who asks for it. */
+const button = (name, hint, act, code = "") => html("button", { class: "btn", type: "button", title: code || null, onclick: act }, html("span", {}, name), hint && (hint instanceof Node ? hint : html("small", {}, hint)));
 
 // ---- answers ----
 const answer = html("p", { class: "answer", role: "status" }, "Nothing was asked yet.");
-/** @param {string} what @param {import("./link.js").Answer} given */
-function tell(what, { status, text, reason, holder }) {
+/** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
+function tell(what, { status, text, reason, holder }, places = [answer]) {
   const held = holder ? ` (${holder} is in control)` : "";
   // A command that ran for long and was ended was not refused.
   const verdict = reason === "interrupted" ? "ended early" : "refused";
   const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${text || reason}${held}`;
-  answer.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
-  answer.classList.toggle("bad", status !== "done");
+  for (const place of places) {
+    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
+    place.classList.toggle("bad", status !== "done");
+  }
 }
-async function command(name, args, taken) {
+/** @param {string} name @param {Object<string, any>} [args] @param {() => void} [taken] @param {HTMLElement[]} [beside] shows the answer, too */
+async function command(name, args, taken, beside = []) {
   if (!link) return false;
-  say(answer, `${name} …`);
+  const places = [answer, ...beside];
+  for (const place of places) say(place, `${name} …`);
   const given = await link.command(name, args, taken);
-  tell(name, given);
+  tell(name, given, places);
   return given.status === "done";
 }
 /** One after the other; ends at the first refusal. @param {string[]} names */
@@ -73,7 +78,7 @@ async function inTurn(...names) {
 }
 
 // ---- stop ----
-const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", {}, "Esc"));
+const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", { class: "key" }, "Esc"));
 async function stop() {
   byHand.letGo();
   if (!link) return unconfirmed();
@@ -115,13 +120,13 @@ function pose() {
   /** @type {[number, number]} */
   const wheels_mm = [known(now.of.get(WHEELS[0])?.sensed_mm), known(now.of.get(WHEELS[1])?.sensed_mm)];
   // Of real boards nobody knows where the robot is; on their wheels it has gone so far.
-  return { travel_mm: known(body.x_mm, (wheels_mm[0] + wheels_mm[1]) / 2), wheels_mm, pitch_deg: known(body.pitch_deg), legs };
+  const place = { y_mm: known(body.y_mm), z_mm: known(body.z_mm, drawing.wheel_radius_mm), yaw_deg: known(body.yaw_deg) };
+  return { travel_mm: known(body.x_mm, (wheels_mm[0] + wheels_mm[1]) / 2), wheels_mm, pitch_deg: known(body.pitch_deg), ...place, legs };
 }
 /** The same in space; real boards stand level where their wheels have brought them. */
 function spacePose(robot) {
   const body = now.of.get("/body") ?? {};
-  const [x_mm, y_mm, z_mm] = [robot.travel_mm, known(body.y_mm), known(body.z_mm, drawing.wheel_radius_mm)];
-  return { x_mm, y_mm, z_mm, roll_deg: known(body.roll_deg), pitch_deg: robot.pitch_deg, yaw_deg: known(body.yaw_deg), wheels_mm: robot.wheels_mm, legs: robot.legs };
+  return { ...robot, x_mm: robot.travel_mm, roll_deg: known(body.roll_deg) };
 }
 /** Sizes of the robot, and the ground if it is not level; from the server. @type {any} */
 let drawing = null;
@@ -161,28 +166,17 @@ async function toggleSpace() {
 const joints = JOINTS.map((name, i) => jointCard(name, i + 1, (stroke) => command("JointReference", { joint: i + 1, stroke })));
 
 // ---- faults, boards, events ----
-const faults = html("ul", { class: "faults" });
+const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]));
+const faults = faultsView(toTry.ours);
+const pauses = new Pauses();
+/** When this page was last in control. */
+let drove_ms = -Infinity;
 const boards = boardsView();
 /** @type {Scope | null} */
 let scope = null;
 const events = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
-/** One line for what many boards have. */
-function showFaults(state) {
-  const rows = new Map();
-  for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
-  const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Mend what the boards and events tell, then clear the fault and press Ready."];
-  // A stop is told by the boards.
-  const held = state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault";
-  faults.replaceChildren(
-    ...(held ? [html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${cause}`), html("p", {}, remedy))] : []),
-    ...[...rows.values()].map(({ fault: f, boards: of }) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`), html("p", {}, f.remedy), html("small", {}, `${f.name}, number ${f.number}`))),
-    ...(rows.size === 0 && !held ? [html("li", { class: "none" }, sign("met"), " No board has a fault.")] : []),
-  );
-}
-let shownFaults = "";
-
 // ---- recording ----
-const record = button("Record", "0x0307", () => command(recording() ? "RecordStop" : "RecordStart"));
+const record = button("Record", "", () => command(recording() ? "RecordStop" : "RecordStart"), "RecordStart 0x0307, RecordStop 0x0308");
 const recorded = html("p", { class: "effect", role: "status" }, "Not recording.");
 const recording = () => Boolean(now.state?.recording && !now.state.recording.failure);
 let lastRecording = "";
@@ -190,7 +184,6 @@ function showRecording(state) {
   const { recording: r } = state;
   record.classList.toggle("on", recording());
   say(record.firstElementChild, recording() ? "Stop recording" : "Record");
-  say(record.lastElementChild, recording() ? "0x0308" : "0x0307");
   if (r?.failure) say(recorded, `Recording ${r.id} ended early: ${r.failure}. The robot goes on; make room, then record again.`);
   else if (r) {
     lastRecording = r.id;
@@ -207,10 +200,6 @@ const fields = html("div", { class: "fields" });
 const which = html("select", { "aria-label": "Command", onchange: showFields });
 const effect = html("p", { class: "effect" });
 form.append(html("div", { class: "row" }, which, html("button", { class: "btn" }, "Send")), effect, fields);
-const fault = html("select", { "aria-label": "Fault" });
-const target = html("input", { "aria-label": "Target and value", placeholder: ":joint3 or =3", size: 14, spellcheck: "false" });
-const injected = html("ul", { class: "injected" });
-
 function showFields() {
   const chosen = commands.find((c) => c.name === which.value);
   if (!chosen) return;
@@ -239,10 +228,10 @@ form.addEventListener("submit", (submit) => {
 });
 
 // ---- what the operator does ----
-const take = button("Take control", "0x0125", () => command(mine() ? "ReleaseControl" : "TakeControl"));
+const take = button("Take control", "", () => command(mine() ? "ReleaseControl" : "TakeControl"), "TakeControl 0x0125, ReleaseControl 0x0126");
 const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
 const walk = button("Walk", "as set below", () => (stepping() ? command("StopGait") : command("Walk", byHand.order(1, 0))));
-const hold = button("Hold", "Space", () => command("Hold"));
+const hold = button("Hold", html("small", { class: "key" }, "Space"), () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
 const byHand = driver(command);
@@ -275,14 +264,13 @@ addEventListener("pagehide", leaves);
 // ---- the page ----
 function build({ robot, commands: list, faults: injectable }) {
   ({ drawing, relief } = robot);
-  views = { side: sideView(pictures.side, robot.drawing), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
+  views = { side: sideView(pictures.side, robot.drawing, relief ? reliefHeights(relief) : undefined), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
   say(head.robot.value, robot.name);
   commands = list;
   which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
   which.value = "JointReference";
   showFields();
-  fault.replaceChildren(...injectable.map((f) => html("option", { value: f.fault, title: f.effect }, f.fault)));
-  const inject = button("Inject", "", () => command("Inject", { fault: `${fault.value}${target.value.trim()}` }));
+  toTry.offer(injectable);
   page.replaceChildren(
     html(
       "header",
@@ -307,13 +295,13 @@ function build({ robot, commands: list, faults: injectable }) {
         "div",
         { class: "col" },
         html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
-        html("section", { class: "panel faultlist" }, html("h2", {}, "Faults"), faults),
+        faults.root,
         boards.root,
         byHand.root,
         html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
         parameters.root,
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
-        robot.simulated && html("section", { class: "panel" }, html("h2", {}, "Faults to try"), html("div", { class: "row" }, fault, target, inject), injected),
+        robot.simulated && toTry.root,
         html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
         keys,
       ),
@@ -332,7 +320,6 @@ function showState(state) {
   const speed = state.pace.paused ? "paused" : `× ${fixed(state.pace.factor)}`;
   say(head.speed.value, speed);
   say(take.firstElementChild, mine() ? "Release control" : "Take control");
-  say(take.lastElementChild, mine() ? "0x0126" : "0x0125");
   say(walk.firstElementChild, state.stepping ? "Stop walking" : "Walk");
   say(walk.lastElementChild, state.stepping ? "feet down" : "as set below");
   const looks = link?.identity.role !== "control";
@@ -340,21 +327,15 @@ function showState(state) {
   parameters.allow(!looks);
   boards.state(state);
   showRecording(state);
-  const key = JSON.stringify([state.hold, state.boards.map((b) => b.faults)]);
-  if (key !== shownFaults) {
-    shownFaults = key;
-    showFaults(state);
-  }
-  const active = state.faults.join();
-  if (injected.dataset.active !== active) {
-    injected.dataset.active = active;
-    injected.replaceChildren(...state.faults.map((f) => html("li", {}, f, button("End", "", () => command("EndFault", { fault: f })))));
-  }
+  if (mine()) drove_ms = performance.now();
+  faults.state(state, performance.now() - drove_ms < DROVE_MS, pauses);
+  toTry.state(state.faults);
 }
 
 /** Draws the newest state, and only then counts it as seen. */
 function paint() {
   requestAnimationFrame(paint);
+  pauses.run(link?.late_ms() ?? 0);
   if (!views) return;
   const silent = performance.now() - now.heard_ms;
   const age = Math.max(silent, link?.late_ms() ?? 0);
@@ -425,7 +406,10 @@ async function begin() {
     });
     build(about);
     await link.subscribe([...drawn], HZ);
-    setInterval(() => mine() && link?.beat(), BEAT_MS);
+    setInterval(() => {
+      pauses.run(link?.late_ms() ?? 0);
+      if (mine()) link?.beat();
+    }, BEAT_MS);
     setInterval(() => link?.echo(), ECHO_MS);
   } catch (error) {
     page.replaceChildren(html("p", { class: "alone", role: "alert" }, error instanceof Error ? error.message : String(error)));

@@ -6,7 +6,7 @@ import { stepByKey } from "./transport.js";
 
 /** @typedef {{label: string, colour: string, width: number, x: number[], y: Array<number | null>}} Series */
 /** @typedef {{title: string, unit: string, x_label: string, x: [number, number], y: [number, number],
- *   series: Series[], limits: number[], marks: number[], height: number}} Panel */
+ *   series: Series[], limits: number[], marks: number[], marked: string, height: number}} Panel */
 
 const PAD = { left: 52, right: 12, top: 8, bottom: 22 };
 const ZOOM_PX = 6;
@@ -54,7 +54,7 @@ export class Plot {
     this.values = panel.series.map(() => html("b", { class: "num" }, "–"));
     const legend = panel.series.map((s, i) => s.label && html("span", { class: "key" }, html("i", { style: `border-color:var(--c-${s.colour.slice(1)}, ${s.colour});border-top-width:${s.width + 0.5}px` }), s.label, " ", this.values[i]));
     if (panel.limits.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "limit" }), "limit"));
-    if (panel.marks.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "event" }), "mark"));
+    if (panel.marks.length > 0) legend.push(html("span", { class: "key" }, html("i", { class: "event" }), panel.marked));
 
     this.canvas = html("canvas", { "aria-hidden": "true" });
     this.cursor = html("div", { class: "cursor", hidden: true });
@@ -165,12 +165,12 @@ export class Plot {
     g.strokeStyle = css("--line");
     g.fillStyle = css("--ink-3");
     g.textAlign = "right";
-    for (const v of ticks(y0, y1, Math.max(2, inner.h / 45))) {
+    for (const v of ticks(y0, y1, Math.max(3, inner.h / 45))) {
       line(PAD.left, Math.round(Y(v)) + 0.5, width - PAD.right, Math.round(Y(v)) + 0.5);
       g.fillText(short(v), PAD.left - 6, Y(v));
     }
     g.textAlign = "center";
-    for (const t of ticks(x0, x1, Math.max(2, inner.w / 80))) {
+    for (const t of ticks(x0, x1, Math.max(3, inner.w / 80))) {
       line(Math.round(X(t)) + 0.5, PAD.top + inner.h, Math.round(X(t)) + 0.5, PAD.top + inner.h + 4);
       g.fillText(short(t), Math.min(X(t), width - 16), PAD.top + inner.h + 13);
     }
@@ -204,15 +204,23 @@ export class Plot {
   }
 }
 
+/** Fewer numbers tell too little of an axis. */
+const FEWEST_TICKS = 3;
+
 /** Round values between two ends, about `count` of them. */
 function ticks(low, high, count) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= rough) ?? rough;
-  const values = [];
-  // Counted, because of a range without sense no step might lead to its end.
-  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + step * 1e-6 && values.length <= 2 * count; i += 1) values.push(i * step);
-  return values;
+  const steps = [0.5, 1, 2, 5, 10].map((f) => f * power);
+  const chosen = Math.max(1, steps.findIndex((step) => step >= rough));
+  /** Counted, because of a range without sense no step might lead to its end. @param {number} step */
+  const every = (step) => {
+    const found = [];
+    for (let i = Math.ceil(low / step - 1e-6); i * step <= high + step * 1e-6 && found.length <= 3 * count; i += 1) found.push(i * step);
+    return found;
+  };
+  const values = every(steps[chosen]);
+  return values.length >= FEWEST_TICKS ? values : every(steps[chosen - 1]);
 }
 
 const short = (v) => {

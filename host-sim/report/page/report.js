@@ -5,6 +5,7 @@ import { held, linear } from "./signal.js";
 import { Player } from "./player.js";
 import { transport } from "./transport.js";
 import { Linked, Plot } from "./plot.js";
+import { trackHeights } from "./ground.js";
 import { footView, sideView, topView } from "./robot.js";
 import { showFilm } from "./film.js";
 
@@ -31,7 +32,7 @@ function pose(m, t) {
 /** The robot with its transport, below which everything follows. @param {HTMLElement} place @param {Motion} motion @param {Player} player */
 function showMotion(place, motion, player) {
   const pictures = { side: svg("svg"), top: svg("svg"), left: svg("svg"), right: svg("svg") };
-  const side = sideView(pictures.side, motion.geometry, motion.ground);
+  const side = sideView(pictures.side, motion.geometry, motion.ground && trackHeights(motion.geometry, motion.ground));
   const top = topView(pictures.top, motion.geometry, motion.ground);
   const feet = [footView(pictures.left, "Left"), footView(pictures.right, "Right")];
   const readings = html("dl", { class: "readings" });

@@ -3,7 +3,7 @@
 import { svg, set, say } from "./dom.js";
 import { oblique, points, tenth } from "./projection.js";
 import { BODY, SIDES, WHEEL_WIDTH, leg } from "./shape.js";
-import { terrainAbove, terrainSide } from "./ground.js";
+import { floorSide, terrainAbove, terrainSide } from "./ground.js";
 
 /** @typedef {import("./shape.js").Geometry} Geometry */
 /** @typedef {import("./shape.js").Strokes} Strokes */
@@ -65,29 +65,13 @@ function chassisSide(root) {
   face("r-body", [rear, -half, 168], [rear + 46, -half, belly], [nose, -half, belly], [front, -half, chin], [front, -half, deck], [rear, -half, deck]);
 }
 
-function groundSide(picture) {
-  const far = 520;
-  const ground = svg("g", {}, picture);
-  svg("polygon", { class: "r-ground", points: points([oblique(-1500, far, 0), oblique(2500, far, 0), oblique(2500, -far, 0), oblique(-1500, -far, 0)]) }, ground);
-  const ticks = svg("g", {}, ground);
-  for (let x = -2000; x <= 6000; x += 100) {
-    const tick = svg("line", { class: x % 500 === 0 ? "r-tick r-tick5" : "r-tick" }, ticks);
-    put(tick, oblique(x, far, 0), oblique(x, -far, 0));
-    if (x % 500 !== 0) continue;
-    const [lx, ly] = oblique(x, -far, 0);
-    say(svg("text", { x: lx + 8, y: ly - 8 }, ticks), `${(x / 1000).toFixed(1)} m`);
-  }
-  const shadows = SIDES.map(() => svg("ellipse", { rx: 34, ry: 8, class: "r-shadow" }, ground));
-  return { ticks, shadows };
-}
-
 /** The robot from its right side, on a level floor or on a terrain. @param {SVGElement} picture @param {Geometry} g
- * @param {import("./ground.js").Ground} [terrain] */
-export function sideView(picture, g, terrain) {
+ * @param {import("./ground.js").Heights} [heights] */
+export function sideView(picture, g, heights) {
   set(picture, { viewBox: "-392 -492 1310 606", role: "img", preserveAspectRatio: "xMidYMax meet" });
   picture.classList.add("robot");
   const title = svg("title", {}, picture);
-  const { ticks, shadows } = terrain ? terrainSide(picture, g, terrain) : groundSide(picture);
+  const moveGround = heights ? terrainSide(picture, g, heights) : floorSide(picture);
   // The axle stays where it is in the picture; what is on it pitches about its middle.
   const farWheel = wheelSide(picture, g, g.track_mm / 2);
   const root = svg("g", {}, picture);
@@ -114,9 +98,14 @@ export function sideView(picture, g, terrain) {
   return {
     /** @param {Pose} pose */
     update(pose) {
-      // The axle stays where it is in the picture; a terrain goes up and down below it.
-      const down = terrain ? (pose.z_mm ?? g.wheel_radius_mm) - g.wheel_radius_mm : 0;
-      set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},${tenth(down)})` });
+      const pitch = (pose.pitch_deg * Math.PI) / 180;
+      /** @type {import("./ground.js").FootPlace[]} */
+      const feet = SIDES.map((side, i) => {
+        const { o6, sole } = leg(g, side.y, pose.legs[i].sensed_mm);
+        const [x, z] = [o6[0], sole - g.wheel_radius_mm];
+        return [x * Math.cos(pitch) - z * Math.sin(pitch), o6[1], g.wheel_radius_mm + x * Math.sin(pitch) + z * Math.cos(pitch)];
+      });
+      moveGround(pose, feet);
       const [left, right] = (pose.wheels_mm ?? [pose.travel_mm, pose.travel_mm]).map((mm) => (mm / g.wheel_radius_mm) * (180 / Math.PI));
       farWheel(left);
       nearWheel(right);
@@ -144,7 +133,6 @@ export function sideView(picture, g, terrain) {
           set(part.commanded, { transform: `translate(${oblique(...asked.o6, 0)})` });
           part.setCommanded(asked.sole);
         }
-        if (shadows[i]) set(shadows[i], { cx: x, cy: y, opacity: tenth(Math.max(0.2, 1 - at.sole / 120)) });
         const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
         set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
         set(part.tag, { x: tenth(x - 24), y: tenth(y - 378) });

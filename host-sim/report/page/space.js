@@ -31,6 +31,11 @@ void main() {
   shown = vec4(base * light, 1.0);
 }`;
 
+/** Width over height of a picture that shows the whole robot; a narrower one is seen from farther away. */
+const WHOLE = 1.4;
+/** Middle of the robot, ahead of its axle. */
+const MIDDLE_MM = 220;
+
 /** Places and normals, a triangle after the other; edges, a line after the other. */
 class Builder {
   constructor() {
@@ -182,10 +187,12 @@ function painter(canvas, geometry, relief) {
     // The middle of the robot is before its axle, wherever it heads.
     const heading = (pose.yaw_deg * Math.PI) / 180;
     /** @type {[number, number, number]} */
-    const target = [pose.x_mm + 130 * Math.cos(heading), pose.y_mm + 130 * Math.sin(heading), pose.z_mm + 20];
-    const flat = distance * Math.cos(height);
-    const eye = looking([target[0] + flat * Math.cos(turn), target[1] + flat * Math.sin(turn), target[2] + distance * Math.sin(height)], target);
-    gl.uniformMatrix4fv(uniform.seen, false, multiply(perspective(0.6, canvas.width / Math.max(1, canvas.height), 50, 20_000), eye));
+    const target = [pose.x_mm + MIDDLE_MM * Math.cos(heading), pose.y_mm + MIDDLE_MM * Math.sin(heading), pose.z_mm + 20];
+    const aspect = canvas.width / Math.max(1, canvas.height);
+    const away = distance * Math.max(1, WHOLE / aspect);
+    const flat = away * Math.cos(height);
+    const eye = looking([target[0] + flat * Math.cos(turn), target[1] + flat * Math.sin(turn), target[2] + away * Math.sin(height)], target);
+    gl.uniformMatrix4fv(uniform.seen, false, multiply(perspective(0.6, aspect, 50, 30_000), eye));
     gl.uniform3fv(uniform.line, colours.line);
     gl.uniform1i(uniform.gridded, 1);
     // In steps of the grid, so that the floor's lines stand still.

@@ -21,6 +21,7 @@
 
 pub mod analysis;
 pub mod axis_sim;
+mod cause;
 pub mod check;
 pub mod compare;
 pub mod delay;

@@ -60,6 +60,65 @@ pub(crate) struct GroundPicture {
     pub(crate) blocks: Vec<[[f64; 2]; 4]>,
 }
 
+/// Most rocks in a picture.
+pub(crate) const MOST_ROCKS: usize = 3000;
+
+impl GroundPicture {
+    /// Whether it is no more than the floor at height 0.
+    pub(crate) fn is_level(&self) -> bool {
+        let heights = self.left_mm.iter().chain(&self.right_mm);
+        heights.copied().all(|z| z == 0.0) && self.rocks.is_empty() && self.blocks.is_empty()
+    }
+}
+
+/// Places in a line ahead at which heights are told.
+pub(crate) struct Strip {
+    /// The first, m.
+    pub(crate) from_m: f64,
+    pub(crate) count: usize,
+}
+
+impl Strip {
+    /// Distance between places, m.
+    pub(crate) const STEP_M: f64 = 0.01;
+    /// What is drawn behind and ahead of the robot, m.
+    const ROUND_M: [f64; 2] = [1.6, 1.6];
+    /// Longest strip that is drawn, m.
+    const LONGEST_M: f64 = 60.0;
+
+    /// Around all places of a robot, m ahead of the start.
+    pub(crate) fn around(x_m: impl Iterator<Item = f64>) -> Self {
+        let known = x_m.filter(|x| x.is_finite());
+        let (least, most) = known.fold((0.0_f64, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+        let from_m = ((least - Self::ROUND_M[0]) / Self::STEP_M).floor() * Self::STEP_M;
+        let to = (most + Self::ROUND_M[1]).min(from_m + Self::LONGEST_M);
+        let count = ((to - from_m) / Self::STEP_M) as usize + 1;
+        Self { from_m, count }
+    }
+
+    /// A place, m.
+    pub(crate) fn x_m(&self, k: usize) -> f64 {
+        self.from_m + k as f64 * Self::STEP_M
+    }
+
+    /// From the first to the last, m.
+    pub(crate) fn x_range_m(&self) -> std::ops::RangeInclusive<f64> {
+        self.from_m..=self.x_m(self.count - 1)
+    }
+
+    /// Places between two ends, m. The casts saturate.
+    pub(crate) fn places(&self, low: f64, high: f64) -> std::ops::Range<usize> {
+        let place = |x: f64| (x - self.from_m) / Self::STEP_M;
+        let end = (place(high).floor() + 1.0).max(0.0) as usize;
+        (place(low).ceil().max(0.0) as usize)..end.min(self.count)
+    }
+}
+
+/// Millimetres to a tenth.
+pub(crate) fn mm(metres: f64) -> f64 {
+    (metres * 1e4).round() / 10.0 + 0.0
+}
+
 impl Motion {
     /// Whether there is anything to play.
     pub(crate) fn is_empty(&self) -> bool {

@@ -45,6 +45,15 @@ impl FaultSpec {
         let lasts_s = self.kind.lasts_s(self.value);
         self.until_s.unwrap_or(self.from_s + lasts_s)
     }
+
+    /// A fault that begins at once, from a text without a time.
+    ///
+    /// # Errors
+    /// [`SpecError`] as for a text with one.
+    pub fn at_once(text: &str) -> Result<Self, SpecError> {
+        let spec = format!("{text}@0s").parse();
+        spec.map_err(|e: SpecError| e.about(text))
+    }
 }
 
 /// Why a text is no fault.
@@ -100,6 +109,20 @@ pub enum SpecError {
     },
 }
 
+impl SpecError {
+    /// The same of another text, which the user wrote.
+    fn about(mut self, written: &str) -> Self {
+        match &mut self {
+            Self::Name { text, .. }
+            | Self::NotImplemented { text, .. }
+            | Self::Target { text, .. }
+            | Self::Value { text, .. }
+            | Self::Time { text, .. } => written.clone_into(text),
+        }
+        self
+    }
+}
+
 fn suggestion(nearest: &Option<&'static str>) -> String {
     nearest.map_or_else(String::new, |n| format!(" (did you mean `{n}`?)"))
 }
@@ -131,6 +154,25 @@ impl Place {
                 "one switch of a foot: `:left.front`, with left or right and front, left, back or right"
             }
         }
+    }
+
+    /// Every target of this kind, as a text names it; none where none is named.
+    #[must_use]
+    pub fn targets(self) -> Vec<String> {
+        let targets: Vec<FaultTarget> = match self {
+            Self::Robot => Vec::new(),
+            Self::Board => Node::ALL.map(FaultTarget::Board).to_vec(),
+            Self::Joint => Node::JOINTS.map(FaultTarget::Board).to_vec(),
+            Self::Wheel => Node::WHEELS.map(FaultTarget::Board).to_vec(),
+            Self::Valve => (0..6)
+                .flat_map(|joint| (0..VALVES.len()).map(move |v| FaultTarget::Valve(joint, v)))
+                .collect(),
+            Self::FootSwitch => (0..LEGS.len())
+                .flat_map(|leg| (0..SWITCHES.len()).map(move |s| FaultTarget::FootSwitch(leg, s)))
+                .collect(),
+        };
+        let text = |target: &FaultTarget| target.to_string().trim_start_matches(':').to_owned();
+        targets.iter().map(text).collect()
     }
 
     /// Whether a target is of this kind and exists.
@@ -340,6 +382,37 @@ mod tests {
         }
         let default = parse("bit-errors@1500ms").expect("default value");
         assert_eq!((default.value, default.from_s), (1e-4, 1.5));
+    }
+
+    #[test]
+    fn every_listed_target_is_one() {
+        for info in KINDS {
+            let targets = info.place.targets();
+            let texts = targets.iter().map(|t| format!("{}:{t}@1s", info.name));
+            let given: Vec<String> = texts.collect();
+            for text in &given {
+                let spec = parse(text).expect(text);
+                assert!(spec.to_string().starts_with(text.trim_end_matches("@1s")));
+            }
+            assert_eq!(
+                given.is_empty(),
+                info.place == Place::Robot,
+                "{}",
+                info.name
+            );
+        }
+        assert_eq!(
+            [Place::Board, Place::Wheel, Place::Valve].map(|p| p.targets().len()),
+            [8, 2, 24]
+        );
+        // Who gave no time reads of none.
+        let told = FaultSpec::at_once("pot-open")
+            .expect_err("no target")
+            .to_string();
+        assert!(
+            told.contains("`pot-open`: ") && !told.contains('@'),
+            "{told}"
+        );
     }
 
     #[test]

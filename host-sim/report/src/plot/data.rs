@@ -25,6 +25,7 @@ pub(crate) struct PanelData<'a> {
     series: Vec<SeriesData<'a>>,
     limits: &'a [f64],
     marks: Vec<f64>,
+    marked: &'a str,
     height: u32,
 }
 
@@ -58,6 +59,7 @@ impl<'a> PanelData<'a> {
             series: series.collect(),
             limits: &lines.limits,
             marks: seen(&panel.marks, panel.x_range),
+            marked: panel.marked,
             height: panel.height,
         })
     }

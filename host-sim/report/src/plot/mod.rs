@@ -74,6 +74,8 @@ pub struct Panel {
     pub x_range: (f64, f64),
     /// Vertical marks, such as the time of an event.
     pub marks: Vec<f64>,
+    /// What they mean, for the legend.
+    pub marked: &'static str,
     /// What is drawn.
     pub content: Content,
     /// Height in pixels.
@@ -189,6 +191,7 @@ impl Panel {
             title: title.into(),
             x_range,
             marks: Vec::new(),
+            marked: "mark",
             content,
             height,
             on_clock: false,

@@ -334,13 +334,18 @@ impl ThreeStepMeter {
         let strides = self.strides.count;
         let steps = lifts.min(touchdowns).min(strides);
         targets.push(Target::new(
-        "A25",
-        format!("steps in the run: {lifts} lifts and {touchdowns} touchdowns by the foot switches, {strides} strides of b6"),
-        Some(steps as f64),
-        "1",
-        Some(expected),
-        Some(expected),
-    ));
+            "A25",
+            format!(
+                "steps in the run: {} and {} by the foot switches, {} of b6",
+                counted(lifts, "lift"),
+                counted(touchdowns, "touchdown"),
+                counted(strides, "stride")
+            ),
+            Some(steps as f64),
+            "1",
+            Some(expected),
+            Some(expected),
+        ));
         let alternate = analysis
             .contacts
             .iter()
@@ -384,6 +389,12 @@ impl ThreeStepMeter {
             targets.push(Target::new(id, what, peak(range), "N", None, None).info());
         }
     }
+}
+
+/// A count with its word.
+fn counted(count: usize, word: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {word}{plural}")
 }
 
 fn delays(targets: &mut Vec<Target>, robot: &RobotConfig, analysis: &Analysis) {

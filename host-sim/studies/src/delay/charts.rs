@@ -76,6 +76,7 @@ fn starts(study: &Study) -> Figure {
             &[],
         );
         panel.marks = vec![PAPER_DELAY_S - PAPER_BAND_S, PAPER_DELAY_S + PAPER_BAND_S];
+        panel.marked = "paper's delay";
         panel
     };
     let mut panels = vec![panel(Law::Paper), panel(Law::Default)];
@@ -137,6 +138,7 @@ fn home(study: &Study) -> Figure {
     for (panel, delay) in panels[1..].iter_mut().zip(runs.map(|(_, o)| o.delay_s)) {
         panel.height = 130;
         panel.marks = delay.into_iter().collect();
+        panel.marked = "first millimetre";
     }
     Figure {
         id: "home".to_owned(),

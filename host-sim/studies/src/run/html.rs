@@ -9,6 +9,7 @@ use super::figures::Source;
 use super::motion::motion;
 use crate::StudyError;
 use crate::analysis::{Judgement, StartDelay, Target};
+use crate::cause::{self, FaultEvent};
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{Picture, json, page, pictures};
@@ -75,6 +76,9 @@ fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
 struct Page<'a> {
     summary: &'a Summary,
     verdict: String,
+    /// What went wrong first, and what to do about it.
+    cause: Option<String>,
+    remedy: Option<&'static str>,
     scenario_text: &'a str,
     robot_text: &'a str,
     pil: Option<Boards<'a>>,
@@ -207,9 +211,17 @@ pub(super) fn render(
     });
     let required = summary.targets.iter().filter(|t| t.required);
     let met = required.clone().filter(|t| t.pass).count();
+    let faults = all
+        .iter()
+        .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
+    let cause = cause::first(faults);
     let values = Page {
         summary,
         verdict: verdict(summary),
+        cause: cause
+            .as_ref()
+            .map(|(first, count)| cause::sentence(first, *count)),
+        remedy: cause.and_then(|(first, _)| first.remedy),
         scenario_text: &source.scenario.description,
         robot_text: &source.robot.description,
         pil: summary.pil.as_ref().map(Boards::new),

@@ -12,6 +12,7 @@ use super::plain::plain;
 use super::signals::{self, Signal, foot, joint, signal};
 use super::thin::Thin;
 use crate::StudyError;
+use crate::cause::{self, Cause, FaultEvent};
 use crate::motion::{Mark, Motion, Phase, phase_name, rounded};
 
 /// Most instants of the robot that plays; a short log has one every 20 ms.
@@ -47,6 +48,18 @@ pub(super) struct LoggedEvent {
 }
 
 impl LoggedEvent {
+    fn fault(&self) -> FaultEvent {
+        let (code, detail, fault) = self.alike.clone();
+        FaultEvent {
+            t_ns: self.t_ns,
+            code,
+            detail,
+            fault,
+            who: self.who.clone(),
+            what: self.what.clone(),
+        }
+    }
+
     /// For a person.
     pub(super) fn text(&self) -> String {
         if self.who.is_empty() {
@@ -306,6 +319,11 @@ impl Content {
             .filter(|event| event.kind == Some(EventKind::Fault))
     }
 
+    /// The first cause of its faults, and how many there are.
+    pub(super) fn cause(&self) -> Option<(Cause, usize)> {
+        cause::first(self.faults().map(LoggedEvent::fault))
+    }
+
     /// The robot for the page's player.
     pub(super) fn motion(&self, geometry: Drawing) -> Motion {
         let rows = &self.robot.rows;
@@ -339,7 +357,7 @@ impl Content {
             y_mm: column(19),
             z_mm: column(20),
             yaw_deg: column(21),
-            // The log does not hold the ground.
+            // It is no signal of the log.
             ground: None,
             phases: self.shown_phases(end),
             marks,

@@ -6,6 +6,7 @@
 
 mod content;
 mod difference;
+mod ground;
 mod page;
 mod plain;
 mod signals;
@@ -102,7 +103,11 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         _ => Vec::new(),
     };
     let (geometry, drawn_as) = geometry(options, &logs[0].content)?;
-    let text = page::make(&logs, &groups, &differences, geometry, drawn_as.as_deref())?;
+    // The robot of the page plays the first log.
+    let mut motion = logs[0].content.motion(geometry);
+    let x_m = motion.travel_mm.iter().map(|x_mm| x_mm * 1e-3);
+    motion.ground = ground::picture(&options.logs[0], motion.geometry.track_mm() * 1e-3, x_m)?;
+    let text = page::make(&logs, &groups, &differences, &motion, drawn_as.as_deref())?;
     let page = options.out.clone().unwrap_or_else(|| beside(&options.logs));
     let is_log = |log: &PathBuf| same_file(log, &page);
     if let Some(log) = options.logs.iter().find(|log| is_log(log)) {

@@ -5,7 +5,6 @@ use std::io::Read as _;
 use std::path::Path;
 
 use serde::Serialize;
-use wheeleg_config::Drawing;
 use wheeleg_report::plot::{Content as Drawn, Figure, Panel, line};
 use wheeleg_report::{Picture, json, page, pictures};
 use wheeleg_telemetry::EventKind;
@@ -14,6 +13,8 @@ use super::Named;
 use super::difference::Difference;
 use super::signals::{Curve, Group, Plot};
 use crate::StudyError;
+use crate::cause::sentence;
+use crate::motion::Motion;
 
 const TIME: &str = "time of the log [s]";
 /// Most marks of faults in a panel.
@@ -71,6 +72,8 @@ struct DifferenceLine {
 #[derive(Serialize)]
 struct Page<'a> {
     verdict: String,
+    /// What to do about what the verdict says.
+    remedy: Option<&'static str>,
     logs: Vec<About>,
     motion: Option<String>,
     drawn_as: Option<&'a str>,
@@ -121,6 +124,7 @@ fn panel(plot: &Plot, logs: &[Named]) -> Panel {
         .faults()
         .map(|event| event.t_ns as f64 * 1e-9);
     panel.marks = faults.take(MARKS).collect();
+    panel.marked = "fault";
     panel.on_clock = true;
     panel
 }
@@ -193,16 +197,10 @@ fn single(log: &Named) -> String {
         name("robot"),
         name("scenario")
     );
-    let faults = content.faults().count();
-    match content.faults().next() {
-        None => format!("{what}: no fault"),
-        Some(first) => format!(
-            "{what}: {faults} {}, the first at {:.2} s: {}",
-            if faults == 1 { "fault" } else { "faults" },
-            first.t_ns as f64 * 1e-9,
-            first.text()
-        ),
-    }
+    content.cause().map_or_else(
+        || format!("{what}: no fault"),
+        |(cause, count)| sentence(&cause, count),
+    )
 }
 
 /// Makes the page.
@@ -210,15 +208,16 @@ pub(super) fn make(
     logs: &[Named],
     groups: &[Group],
     differences: &[Difference],
-    geometry: Drawing,
+    motion: &Motion,
     drawn_as: Option<&str>,
 ) -> Result<String, StudyError> {
     let verdict = verdict(logs, differences);
+    let cause = logs[0].content.cause().filter(|_| logs.len() == 1);
+    let remedy = cause.and_then(|(cause, _)| cause.remedy);
     let figures: Vec<(Figure, String)> = groups
         .iter()
         .map(|group| (figure(group, logs), String::new()))
         .collect();
-    let motion = logs[0].content.motion(geometry);
     let mut events: Vec<Line> = Vec::new();
     for (i, log) in logs.iter().enumerate() {
         events.extend(log.content.events.iter().map(|event| Line {
@@ -242,8 +241,9 @@ pub(super) fn make(
         .collect();
     let values = Page {
         verdict,
+        remedy,
         logs: logs.iter().map(about).collect(),
-        motion: (!motion.is_empty()).then(|| json(&motion)),
+        motion: (!motion.is_empty()).then(|| json(motion)),
         drawn_as,
         figures: pictures(&figures),
         events,

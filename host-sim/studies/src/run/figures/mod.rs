@@ -97,6 +97,7 @@ impl Source<'_> {
     fn panel(&self, title: impl Into<String>, height: u32, content: Content) -> Panel {
         let mut panel = Panel::new(title, self.x_range(), height, content).over(MOTION_TIME);
         panel.marks = self.marks();
+        panel.marked = "event";
         panel.on_clock = true;
         panel
     }
