@@ -42,7 +42,7 @@ export class Pauses {
     const recent = ({ ms, at_ms }) => (now - at_ms <= RECENT_MS ? ms : 0);
     const [page, line] = [recent(this.longest.page), recent(this.longest.line)];
     if (page > 0) return `For ${fixed(page / 1000, 2)} s this page did not run; the computer may be busy.`;
-    return line > 0 ? `For ${fixed(line / 1000, 2)} s nothing came over the line, or from the robot's computer.` : LOST;
+    return line > 0 ? `An answer took ${fixed(line / 1000, 2)} s: the line or the robot's computer is slow.` : LOST;
   }
 }
 

@@ -20,7 +20,7 @@ const DRAWN_STEP_MM = 10;
 /** Between two marks of the distance. */
 const MARK_MM = 500;
 /** Begin of the picture, and where a label begins at the latest: none is cut off at the edge. */
-const LABELS_MM = [-392, 760];
+const LABELS_MM = [-392, 730];
 /** A foot that is higher above the ground has no shadow. */
 const SHADOW_MM = 120;
 

@@ -307,7 +307,6 @@ function build({ robot, commands: list, faults: injectable }) {
       ),
     ),
   );
-  new ResizeObserver(([entry]) => pictures.side.style.setProperty("--u", (1310 / Math.max(entry.contentRect.width, entry.contentRect.height * 2.16, 1)).toFixed(2))).observe(pictures.side);
 }
 
 const ROLE = { armed: "ARMED", disarmed: "disarmed" };

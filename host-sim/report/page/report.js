@@ -57,8 +57,6 @@ function showMotion(place, motion, player) {
     ),
     transport(player, motion),
   );
-  // Letters keep their size whatever the scale of the drawing.
-  new ResizeObserver(([entry]) => pictures.side.style.setProperty("--u", (1310 / Math.max(entry.contentRect.width, entry.contentRect.height * 2.16, 1)).toFixed(2))).observe(pictures.side);
   player.on((t) => {
     const now = pose(motion, t);
     side.update(now);

@@ -68,8 +68,15 @@ function chassisSide(root) {
 /** The robot from its right side, on a level floor or on a terrain. @param {SVGElement} picture @param {Geometry} g
  * @param {import("./ground.js").Heights} [heights] */
 export function sideView(picture, g, heights) {
-  set(picture, { viewBox: "-392 -492 1310 606", role: "img", preserveAspectRatio: "xMidYMax meet" });
+  // On a slope the raised legs are higher in the picture.
+  const [top, bottom] = heights ? [-590, 124] : [-492, 114];
+  set(picture, { viewBox: `-392 ${top} 1310 ${bottom - top}`, role: "img", preserveAspectRatio: "xMidYMax meet" });
   picture.classList.add("robot");
+  // Letters keep their size whatever the scale of the drawing.
+  new ResizeObserver(([{ contentRect: { width, height } }]) => {
+    const scale = Math.min(width / 1310, height / (bottom - top));
+    if (scale > 0) picture.style.setProperty("--u", (1 / scale).toFixed(2));
+  }).observe(picture);
   const title = svg("title", {}, picture);
   const moveGround = heights ? terrainSide(picture, g, heights) : floorSide(picture);
   // The axle stays where it is in the picture; what is on it pitches about its middle.

@@ -32,7 +32,7 @@ void main() {
 }`;
 
 /** Width over height of a picture that shows the whole robot; a narrower one is seen from farther away. */
-const WHOLE = 1.4;
+const WHOLE = 1.1;
 /** Middle of the robot, ahead of its axle. */
 const MIDDLE_MM = 220;
 
