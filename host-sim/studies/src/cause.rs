@@ -52,7 +52,7 @@ impl FaultEvent {
     /// Whether it is no more than what comes of `cause`: the master holds, a board says why, other
     /// boards report the same.
     fn follows(&self, cause: &Self) -> bool {
-        self.t_ns - cause.t_ns <= FOLLOWS_NS
+        self.t_ns.abs_diff(cause.t_ns) <= FOLLOWS_NS
             && match self.code.as_str() {
                 "hold" => HOLDS_THAT_FOLLOW.contains(&self.detail.as_str()),
                 "diagnosis" | "run_failed" => true,
