@@ -21,6 +21,8 @@ const DRAWN_STEP_MM = 10;
 const MARK_MM = 500;
 /** Begin of the picture, and where a label begins at the latest: none is cut off at the edge. */
 const LABELS_MM = [-392, 730];
+/** Nor below. */
+const LOWEST_LABEL_MM = 116;
 /** A foot that is higher above the ground has no shadow. */
 const SHADOW_MM = 120;
 
@@ -130,7 +132,7 @@ export function terrainSide(picture, g, heights) {
       const z = height(at - pose.travel_mm, -half);
       const [x, y] = Number.isFinite(z) ? oblique(at - pose.travel_mm, -half, z) : [LABELS_MM[1] + 1, 0];
       set(line, { x1: x, x2: x, y1: y, y2: y + 14, visibility: Number.isFinite(z) ? "visible" : "hidden" });
-      set(text, { x: x + 6, y: y + 26, visibility: fits(x) });
+      set(text, { x: x + 6, y: y + 26, visibility: y + 26 < LOWEST_LABEL_MM ? fits(x) : "hidden" });
       say(text, `${(at / 1000).toFixed(1)} m`);
     });
     feet.forEach((foot, i) => castShadow(shadows[i], foot, height(foot[0], foot[1])));
