@@ -235,7 +235,7 @@ impl Inputs {
 }
 
 /// Commands that neither write nor compute for long, and why they are not on the list.
-const BRIEF: [(&str, &str); 24] = [
+const BRIEF: [(&str, &str); 27] = [
     ("list", "prints"),
     ("params", "prints"),
     ("faults list", "prints"),
@@ -260,6 +260,9 @@ const BRIEF: [(&str, &str); 24] = [
     ("ctl stop", "asks a server"),
     ("ctl inject", "asks a server"),
     ("ctl end-fault", "asks a server"),
+    ("ctl param get", "asks a server"),
+    ("ctl param set", "asks a server"),
+    ("ctl param save", "asks a server"),
     ("ctl pause", "asks a server"),
     ("ctl resume", "asks a server"),
     ("ctl step", "asks a server"),

@@ -125,8 +125,10 @@ fn a_robot_with_another_leg_walks_and_turns_as_it_is_told() {
     (geometry.leg.crank_m, geometry.leg.p4_m[0]) = (0.232, 0.232);
     geometry.leg.stroke_zero_m[1] = 0.11;
     let drag_mm = drag_of(&recording, &geometry);
-    println!("another leg: feet slide {drag_mm:.0} mm");
-    assert!(drag_mm < 100.0, "{drag_mm}");
+    let paper = sil::run(&scenario, &builtin::robot("wheeleg").expect("built in"), 1);
+    let paper_mm = drag_of(&paper, &WalkGeometry::default());
+    println!("another leg: feet slide {drag_mm:.0} mm, the paper's {paper_mm:.0} mm");
+    assert!(drag_mm < 1.25 * paper_mm, "{drag_mm} {paper_mm}");
 }
 
 #[test]

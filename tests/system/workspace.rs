@@ -156,6 +156,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
             "wheeleg-board",
             "wheeleg-config",
             "wheeleg-console",
+            "wheeleg-kinematics",
             "wheeleg-master",
             "wheeleg-node",
             "wheeleg-protocol",

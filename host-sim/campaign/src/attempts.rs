@@ -13,7 +13,7 @@ use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
-use crate::store::opened;
+use crate::files::opened;
 use crate::{CampaignError, host};
 
 /// One line.

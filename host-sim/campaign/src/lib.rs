@@ -25,6 +25,7 @@ mod columns;
 mod compute;
 mod draw;
 mod error;
+mod files;
 mod host;
 mod identity;
 mod isolate;

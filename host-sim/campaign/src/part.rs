@@ -4,9 +4,9 @@ use std::fs::File;
 use std::path::Path;
 
 use crate::columns::{Column, Columns, FACT, Kind};
+use crate::files::opened;
 use crate::panics::caught;
 use crate::row::{self, Row};
-use crate::store::opened;
 use crate::table::{Data, Table, TableReader, TableWriter};
 use crate::{host, program};
 

@@ -8,11 +8,12 @@ use wheeleg_studies::run::Run;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
 use crate::cases::Cases;
+use crate::files::opened;
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
 use crate::simulate::simulate;
-use crate::store::{PlanFile, Store, opened};
+use crate::store::{PlanFile, Store};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
 

@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
 
+use crate::files::opened;
 use crate::part::NotAPart;
 use crate::row::Row;
 use crate::table::Table;
@@ -390,14 +391,6 @@ impl Store {
         rows.retain(|row| cases.contains(&row.index));
         Ok((rows, files))
     }
-}
-
-/// Opens a file of a campaign to read it: a pipe may have no writer, a device no end.
-pub(crate) fn opened(path: &Path) -> std::io::Result<File> {
-    if fs::metadata(path)?.is_file() {
-        return File::open(path);
-    }
-    Err(std::io::Error::other("it is not a file"))
 }
 
 /// Writes a file whole: under another name, synced, renamed, and the folder synced.

@@ -152,7 +152,7 @@ fn every_argument_of_every_command_is_read_up_to_its_limits_and_no_step_beyond()
             }
         }
     }
-    assert_eq!(arguments, 49);
+    assert_eq!(arguments, 50);
 }
 
 #[test]

@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 use wheeleg_studies::export::{same_file, write_new};
 
 use crate::columns::Columns;
+use crate::files::opened;
 use crate::part::PROGRAM;
-use crate::store::{PlanFile, opened};
+use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 

@@ -131,7 +131,7 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
     assert_eq!(findings.worst.len(), 20);
     let told = |place: usize| findings.worst[place].nearest.clone().expect("near to one");
     // Of 20 cases the last has 12 % of room left, the first 50.
-    assert_eq!(told(0), format!("{id} met by 12 %"));
-    assert_eq!(told(19), format!("{id} met by 50 %"));
+    assert_eq!(told(0), format!("{id} within its limit by 12 %"));
+    assert_eq!(told(19), format!("{id} within its limit by 50 %"));
     assert!(findings.worst.iter().all(|worst| worst.passed));
 }

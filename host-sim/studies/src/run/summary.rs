@@ -301,8 +301,8 @@ mod tests {
         ];
         let times = [
             " (2 times)",
-            "clear the fault.",
-            "clear the fault.",
+            "releases the emergency stop.",
+            "releases the emergency stop.",
             " (2 times)",
         ];
         assert_eq!(found.len(), begins.len(), "{found:?}");
