@@ -178,7 +178,6 @@ fn without_the_ledge_the_foot_comes_down_flat_and_later() {
         .iter()
         .find(|row| row.t_ns >= flat_ns && row.v.switches == 15)
         .map(|row| row.t_ns - flat_ns);
-    // At 60 mm/s the foot takes its time to tilt.
-    let soon = flat.is_some_and(|ns| ns < 200_000_000);
+    let soon = flat.is_some_and(|ns| ns < 100_000_000);
     assert!(soon, "four switches {flat:?} ns after touchdown");
 }

@@ -128,7 +128,7 @@ fn a_robot_with_another_leg_walks_and_turns_as_it_is_told() {
     let paper = sil::run(&scenario, &builtin::robot("wheeleg").expect("built in"), 1);
     let paper_mm = drag_of(&paper, &WalkGeometry::default());
     println!("another leg: feet slide {drag_mm:.0} mm, the paper's {paper_mm:.0} mm");
-    assert!(drag_mm < 1.25 * paper_mm, "{drag_mm} {paper_mm}");
+    assert!(drag_mm < 2.0 * paper_mm, "{drag_mm} {paper_mm}");
 }
 
 #[test]
