@@ -1,6 +1,6 @@
 //! The parameter store as commissioning leaves it in a board's flash memory.
 //!
-//! Format of a page (`firmware/board/src/store`): 64-bit words, little-endian:
+//! Format of a page (`firmware/node/src/store`): 64-bit words, little-endian:
 //! magic, count, sequence; the records; CRC-32C of all that and its complement.
 
 use crc::{CRC_32_ISCSI, Crc};

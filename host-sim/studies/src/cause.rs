@@ -1,8 +1,7 @@
 //! What went wrong first: the faults of a run or a log, without those that only follow from one.
 
-use wheeleg_master::finding::Finding;
 use wheeleg_protocol::Fault;
-use wheeleg_telemetry::{Event, EventKind};
+use wheeleg_telemetry::{Event, EventKind, finding_of_name};
 
 /// What comes so soon after a fault may follow from it, ns.
 const FOLLOWS_NS: u64 = 1_000_000_000;
@@ -30,14 +29,7 @@ impl FaultEvent {
         is_fault.then(|| {
             let sample = event.sample();
             let board = event.cause.board().map(|board| board.to_string());
-            let named = board.and_then(|who| {
-                let what = sample.text.strip_prefix(&who)?.strip_prefix(": ")?;
-                Some((who, what.to_owned()))
-            });
-            let (who, what) = match named {
-                Some((who, what)) => (vec![who], what),
-                None => (Vec::new(), sample.text),
-            };
+            let (who, what) = named(board, sample.text);
             Self {
                 t_ns,
                 code: sample.code,
@@ -61,6 +53,15 @@ impl FaultEvent {
     }
 }
 
+/// A text that begins with the name of its board, as that name and what is the same for all boards.
+pub(crate) fn named(board: Option<String>, text: String) -> (Vec<String>, String) {
+    let split = board.and_then(|who| {
+        let what = text.strip_prefix(&who)?.strip_prefix(": ")?.to_owned();
+        Some((vec![who], what))
+    });
+    split.unwrap_or((Vec::new(), text))
+}
+
 /// A fault with what to do about it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cause {
@@ -72,23 +73,18 @@ pub(crate) struct Cause {
 
 impl Cause {
     fn of(event: &FaultEvent) -> Self {
-        let number = u8::try_from(event.fault).ok();
-        let latched = number.filter(|_| event.code == "fault_latched");
-        let (what, remedy) = match latched.and_then(Fault::from_code) {
-            Some(fault) => (fault.sentence(), Some(fault.remedy())),
-            None => {
-                let what = event.what.trim_start_matches("master: ");
-                let findings = Finding::ALL.iter().map(|finding| finding.remedy());
-                let mut remedies = findings.chain(Fault::ALL.iter().map(|fault| fault.remedy()));
-                let remedy = remedies.find(|remedy| what.ends_with(remedy));
-                (
-                    what.strip_suffix(remedy.unwrap_or_default())
-                        .unwrap_or(what),
-                    remedy,
-                )
-            }
+        let row = match event.code.as_str() {
+            "fault_latched" => u8::try_from(event.fault)
+                .ok()
+                .and_then(Fault::from_code)
+                .map(|fault| (fault.sentence(), fault.remedy())),
+            "finding" => finding_of_name(&event.detail)
+                .map(|finding| (finding.sentence(), finding.remedy())),
+            _ => None,
         };
-        let what = what.trim().trim_end_matches('.');
+        let what = row.map_or(event.what.as_str(), |(sentence, _)| sentence);
+        let remedy = row.map(|(_, remedy)| remedy);
+        let what = what.trim_start_matches("master: ").trim_end_matches('.');
         let headline = match event.who.as_slice() {
             [] => what.to_owned(),
             who => format!("{}: {}", who.join(", "), within(what)),
@@ -137,6 +133,8 @@ pub(crate) fn sentence(cause: &Cause, count: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use wheeleg_master::finding::Finding;
+
     use super::*;
 
     fn event(ms: u64, code: &str, detail: &str, fault: u64, who: &str, what: &str) -> FaultEvent {

@@ -13,7 +13,7 @@ use wheeleg_protocol::{
 
 use crate::samples::EventSample;
 pub(crate) use names::parameter_name;
-pub use names::{hold_name, reject_name};
+pub use names::{finding_of_name, hold_name, reject_name};
 use names::{master_board, master_code, master_detail, master_kind, side_name, snake_case};
 
 /// Something that happened.

@@ -260,17 +260,8 @@ impl Content {
         }
         let board = Address::new(logged.number("board").unwrap_or_default() as u8);
         let fault = logged.number("fault").unwrap_or_default() as u64;
-        // A text that begins with the board whose event it is, is the same for all boards behind it.
-        let named = board.filter(|board| board.is_node());
-        let named = named.map(|board| board.to_string());
-        let rest = named.as_ref().and_then(|who| {
-            let rest = text.strip_prefix(who.as_str())?.strip_prefix(": ")?;
-            Some(rest.to_owned())
-        });
-        let (who, what) = match rest {
-            Some(rest) => (named.into_iter().collect(), rest),
-            None => (Vec::new(), text),
-        };
+        let board = board.filter(|board| board.is_node());
+        let (who, what) = cause::named(board.map(|board| board.to_string()), text);
         let event = LoggedEvent {
             t_ns: logged.t_ns,
             kind: EventKind::of_name(&kind),

@@ -4,6 +4,7 @@ use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::contact::Side;
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::{Event as MasterEvent, HoldReason};
+use wheeleg_master::finding::Finding;
 use wheeleg_protocol::LogEvent;
 use wheeleg_protocol::param::params_at;
 
@@ -97,7 +98,7 @@ pub(super) const fn master_code(event: &MasterEvent) -> &'static str {
 pub(super) fn master_detail(event: &MasterEvent) -> String {
     match event {
         MasterEvent::Refused { reason, .. } => refusal_name(reason).to_owned(),
-        MasterEvent::Found { finding, .. } => snake_case(&format!("{finding:?}")),
+        MasterEvent::Found { finding, .. } => finding_name(*finding),
         MasterEvent::Diagnosis { record, .. } => snake_case(record.disarm_reason.name()),
         MasterEvent::Log { entry, .. } => snake_case(entry.event.name()),
         MasterEvent::Parameter { node, id, .. } => parameter_name(*node, *id),
@@ -111,6 +112,18 @@ pub(super) fn master_detail(event: &MasterEvent) -> String {
         }
         _ => String::new(),
     }
+}
+
+/// The name of a finding in the log, which stays the same.
+fn finding_name(finding: Finding) -> String {
+    snake_case(&format!("{finding:?}"))
+}
+
+/// The finding that has a name in the log.
+#[must_use]
+pub fn finding_of_name(name: &str) -> Option<Finding> {
+    let mut all = Finding::ALL.iter().copied();
+    all.find(|finding| finding_name(*finding) == name)
 }
 
 pub(super) const fn master_board(event: &MasterEvent) -> Option<u8> {
