@@ -565,8 +565,8 @@ def looks(page, folder, axe):
             expect(hit and seen, f"{name}: STOP is at {box}")
             page.screenshot(path=folder / f"{name}.png")
             page.screenshot(path=folder / f"{name}-whole.png", full_page=True)
-        for finding in findings(page, axe):
-            problems.append(f"{scheme}: {finding}")
+            for finding in findings(page, axe):
+                problems.append(f"{name}: {finding}")
 
 
 def main(program, folder, axe):

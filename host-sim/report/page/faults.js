@@ -6,9 +6,9 @@ import { html, say, sign, fixed } from "./dom.js";
 const BOARDS = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8"];
 /** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
 const HOLDS = {
-  operator_lost: ["Operator lost: the robot holds.", "Then take the control, clear the fault, and press Ready."],
+  operator_lost: ["Operator lost: the robot holds.", "Take the control, clear the fault, and press Ready."],
 };
-const LOST = "Nothing was seen of who drove for 0.4 s. Check that the page is in front and the line is good.";
+const LOST = "The operator saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
 /** A pause of the page, or of the line, that is shorter does not lose an operator, ms. */
 const PAUSE_MS = 250;
 /** What was longer ago is not why an operator is lost now, ms. */
@@ -72,7 +72,7 @@ export function faultsView(ours) {
       else if (why === "") why = drove ? pauses.reason() : LOST;
       const rows = new Map();
       for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
-      const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Mend what the boards and events tell, then clear the fault and press Ready."];
+      const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Fix what the boards and events report, then clear the fault and press Ready."];
       // A stop is told by the boards.
       const held = state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault";
       const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`, f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));

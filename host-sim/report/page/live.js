@@ -51,7 +51,7 @@ const cell = (name, minor = false) => {
 const button = (name, hint, act, code = "") => html("button", { class: "btn", type: "button", title: code || null, onclick: act }, html("span", {}, name), hint && (hint instanceof Node ? hint : html("small", {}, hint)));
 
 // ---- answers ----
-const answer = html("p", { class: "answer", role: "status" }, "Nothing was asked yet.");
+const answer = html("p", { class: "answer", role: "status" }, "No command sent yet.");
 /** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
 function tell(what, { status, text, reason, holder }, places = [answer]) {
   const held = holder ? ` (${holder} is in control)` : "";
@@ -78,11 +78,13 @@ async function inTurn(...names) {
 }
 
 // ---- stop ----
+/** A stop that is not answered for so long is not confirmed. */
+const UNCONFIRMED_MS = 200;
 const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", { class: "key" }, "Esc"));
 async function stop() {
   byHand.letGo();
   if (!link) return unconfirmed();
-  const timer = setTimeout(unconfirmed, 250);
+  const timer = setTimeout(unconfirmed, UNCONFIRMED_MS);
   const given = await link.stop();
   clearTimeout(timer);
   if (given.status !== "done") return unconfirmed();
@@ -379,7 +381,7 @@ const listener = {
     while (events.childElementCount > EVENTS) events.lastElementChild?.remove();
   },
   asked(by) {
-    tell(`${by} asks for the control`, { status: "done" });
+    say(answer, `${by} asks for the control.`);
   },
   closed(why) {
     lost = `${why}. Nothing is sent any more; reload the page to look again.`;

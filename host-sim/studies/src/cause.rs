@@ -78,8 +78,9 @@ impl Cause {
                 .ok()
                 .and_then(Fault::from_code)
                 .map(|fault| (fault.sentence(), fault.remedy())),
-            "finding" => finding_of_name(&event.detail)
-                .map(|finding| (finding.sentence(), finding.remedy())),
+            "finding" => {
+                finding_of_name(&event.detail).map(|finding| (finding.sentence(), finding.remedy()))
+            }
             _ => None,
         };
         let what = row.map_or(event.what.as_str(), |(sentence, _)| sentence);

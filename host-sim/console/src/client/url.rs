@@ -118,9 +118,16 @@ impl Url {
     }
 
     fn tcp(&self) -> Result<TcpStream, ConsoleError> {
-        let mut addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
-        let address = addresses.next().ok_or_else(|| self.error("no such host"))?;
-        let stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e))?;
+        let addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
+        let mut stream = Err(self.error("no such host"));
+        // `localhost` may have an address at which nobody listens before the right one.
+        for address in addresses {
+            stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e));
+            if stream.is_ok() {
+                break;
+            }
+        }
+        let stream = stream?;
         let set = stream
             .set_nodelay(true)
             .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))

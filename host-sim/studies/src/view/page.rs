@@ -22,11 +22,15 @@ const MARKS: usize = 20;
 /// Share of an axis that stays free above and below.
 const MARGIN: f64 = 0.05;
 
-/// By this a page of a log is known, near its begin.
+/// By this a page of a log is known, near its start.
 const OURS: &str = "<meta name=\"generator\" content=\"wheeleg view\">";
 
 /// Whether a file is such a page, which is made anew.
 pub(super) fn is_ours(page: &Path) -> bool {
+    // A pipe has nothing to say, and would be waited for.
+    if !page.symlink_metadata().is_ok_and(|page| page.is_file()) {
+        return false;
+    }
     let mut begin = [0; 256];
     let read = File::open(page).and_then(|mut file| file.read(&mut begin));
     let begin = begin.get(..read.unwrap_or(0)).unwrap_or_default();

@@ -202,7 +202,10 @@ fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
         200 => print("stopped: the stop is in SYNC, and latched\n"),
         504 => Ok(not_confirmed()),
         403 => stop_by_session(reach, key),
-        _ => Ok(not_answered(&answer)),
+        _ => {
+            not_answered(&answer);
+            Ok(not_confirmed())
+        }
     }
 }
 
@@ -211,8 +214,12 @@ fn stop_by_session(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
     let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
     let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
     match client.prompt_outcome(n) {
+        Outcome::Done => reach.print_outcome(&Outcome::Done),
         Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
-        end => reach.print_outcome(&end),
+        refused @ Outcome::Refused { .. } => {
+            reach.print_outcome(&refused)?;
+            Ok(not_confirmed())
+        }
     }
 }
 

@@ -24,11 +24,15 @@ fn acts(c: char) -> bool {
     (c.is_control() && c != '\n' && c != '\t') || turns
 }
 
-/// Bytes of the colour with which the text begins: `ESC [`, numbers, `m`.
+/// Bytes of the colour with which the text begins: `ESC [`, numbers, `m`. What conceals is none.
 fn colour(text: &str) -> Option<usize> {
+    const CONCEAL: &str = "8";
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
-    numbers[end..].starts_with('m').then_some(2 + end + 1)
+    let conceals = numbers[..end]
+        .split(';')
+        .any(|n| n.trim_start_matches('0') == CONCEAL);
+    (numbers[end..].starts_with('m') && !conceals).then_some(2 + end + 1)
 }
 
 #[cfg(test)]
@@ -47,6 +51,8 @@ mod tests {
         for (acts, shown) in [
             ("a\u{1b}]0;title\u{7}b", "a�]0;title�b"),
             ("a\u{1b}[2Jb", "a�[2Jb"),
+            ("a\u{1b}[8mb", "a�[8mb"),
+            ("a\u{1b}[31;08mb", "a�[31;08mb"),
             ("\u{1b}[31", "�[31"),
             ("\u{1b}", "�"),
             ("a\rb\u{8}\u{7f}", "a�b��"),

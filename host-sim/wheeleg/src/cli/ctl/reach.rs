@@ -125,7 +125,8 @@ impl Reach {
 /// Tells what a server refuses over HTTP; its exit code.
 pub(super) fn not_answered(problem: &Value) -> ExitCode {
     let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
-    tell(&format!("{}: {}", text("detail"), text("remedy")));
+    // A false server may have written it.
+    tell(&plain(&format!("{}: {}", text("detail"), text("remedy"))));
     ExitCode::from(REFUSED)
 }
 
