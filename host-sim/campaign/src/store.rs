@@ -266,7 +266,7 @@ impl Store {
     /// [`CampaignError::Refused`] if there is no plan in it, [`CampaignError::Unreadable`] if it is none.
     pub fn open(folder: &Path) -> Result<Self, CampaignError> {
         let plan = folder.join(PLAN_FILE);
-        if !plan.exists() {
+        if plan.try_exists().is_ok_and(|there| !there) {
             let what = format!("there is no campaign in `{}`", folder.display());
             let help =
                 format!("give the folder of a `wheeleg campaign run`, which has a `{PLAN_FILE}`");

@@ -114,7 +114,7 @@ fn within(sentence: &str) -> String {
 pub(crate) fn first(events: impl Iterator<Item = FaultEvent>) -> Option<(Cause, usize)> {
     let mut causes: Vec<FaultEvent> = Vec::new();
     for event in events.filter(|event| event.code != "faults_cleared") {
-        // What is latched anew while it lasts is one.
+        // What is latched again within the second is the same.
         if !causes.iter().any(|cause| event.follows(cause)) {
             causes.push(event);
         }

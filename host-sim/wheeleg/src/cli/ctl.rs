@@ -114,8 +114,8 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
         CtlCommand::Status => status(reach, &reach.key(VIEW_FILE)?),
         CtlCommand::Watch { channels, hz } => watch(reach, &reach.key(VIEW_FILE)?, channels, *hz),
         CtlCommand::Stop => {
-            let key = reach.key(VIEW_FILE)?;
-            stop(reach, &key).or_else(|why| match why {
+            let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
+            stopped.or_else(|why| match why {
                 StudyError::Stdout(_) => Err(why),
                 // Whatever kept the answer away, nobody knows of a stop.
                 _ => {

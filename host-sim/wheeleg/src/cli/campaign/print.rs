@@ -67,7 +67,7 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -
         let each_s = took.as_secs_f64() / ran.computed as f64;
         let _ = writeln!(
             out,
-            "time    {:.1} s, {each_s:.2} s a case with {threads} threads",
+            "time    {:.1} s, {each_s:.2} s a case ({threads} at a time)",
             took.as_secs_f64()
         );
     }
