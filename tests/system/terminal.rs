@@ -64,6 +64,6 @@ fn texts_of_a_server_do_not_act_on_a_terminal() {
     });
     let output = wheeleg(&["ctl", "--url", &address, "stop"], home.path());
     server.join().expect("it ends");
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(3));
     assert_harmless(&output, "refused");
 }
