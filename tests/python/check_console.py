@@ -464,13 +464,8 @@ def journey(browser, console, folder):
     expect(targets == [f"joint{n}" for n in range(1, 7)], f"targets: {targets}")
     page.select_option("select[aria-label=Target]", "joint3")
     expect(page.locator("input[aria-label=Value]").is_hidden(), "a fault without a value asks for one")
-    for _ in range(ATTEMPTS):
-        page.get_by_role("button", name="Inject").click()
-        try:
-            page.wait_for_selector(".fault:has-text('Board 3')", timeout=5000)
-            break
-        except Exception:
-            continue
+    inject = page.get_by_role("button", name="Inject")
+    done_until_seen(page, inject.click, ".fault:has-text('Board 3')", 5000)
     remedy = page.inner_text(".faults")
     expect("Board 3" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
     expect("Injected by you: pot-open:joint3. Press End" in remedy, f"what is in the way: {remedy!r}")
@@ -523,16 +518,25 @@ def ground(browser, program, folder):
             console.end()
 
 
-def page_hangs(page):
-    """A page that did not run for so long that its operator was lost says that it was the page."""
+def done_until_seen(page, act, selector, timeout):
+    """Does something, again if what should come of it is not seen in time, ms."""
     for _ in range(ATTEMPTS):
-        expect(becomes_ready(page), f"Ready before a pause: {page.inner_text('.answer')!r}")
-        page.evaluate("() => { const end = performance.now() + 900; while (performance.now() < end); }")
+        act()
         try:
-            page.wait_for_selector(".fault:has-text('Operator lost')", timeout=3000)
-            break
+            page.wait_for_selector(selector, timeout=timeout)
+            return
         except Exception:
             continue
+
+
+def page_hangs(page):
+    """A page that did not run for so long that its operator was lost says that it was the page."""
+
+    def hang():
+        expect(becomes_ready(page), f"Ready before a pause: {page.inner_text('.answer')!r}")
+        page.evaluate("() => { const end = performance.now() + 900; while (performance.now() < end); }")
+
+    done_until_seen(page, hang, ".fault:has-text('Operator lost')", 3000)
     told = page.inner_text(".faults")
     seconds = re.search(r"For ([0-9.]+) s this page did not run", told)
     expect(seconds and 0.5 < float(seconds[1]) < 5, f"a page that did not run: {told!r}")

@@ -53,13 +53,18 @@ fn walk(order: WalkOrder, bars: &[(Measure, f64, f64)]) -> Scenario {
     scenario
 }
 
-#[test]
-fn a_turn_is_the_one_asked_for() {
-    let order = WalkOrder {
+/// A circle of 1.2 m.
+fn in_a_circle() -> WalkOrder {
+    WalkOrder {
         speed_mm_s: VelocityMmS::from_int(60),
         turn_rad_s: "0.05".parse().expect("a number"),
         ..WalkOrder::default()
-    };
+    }
+}
+
+#[test]
+fn a_turn_is_the_one_asked_for() {
+    let order = in_a_circle();
     // 20 s at 0.05 rad/s, less the start; the radius is speed over rate of turning.
     let bars = [
         (Measure::Heading, 0.85, 1.02),
@@ -101,11 +106,7 @@ fn a_robot_with_another_leg_walks_and_turns_as_it_is_told() {
     for leg in [0, 3] {
         plant.stroke_zero_m[leg + 1] = 0.11;
     }
-    let order = WalkOrder {
-        speed_mm_s: VelocityMmS::from_int(60),
-        turn_rad_s: "0.05".parse().expect("a number"),
-        ..WalkOrder::default()
-    };
+    let order = in_a_circle();
     let bars = [
         (Measure::Heading, 0.85, 1.02),
         (Measure::Radius, 1.08, 1.32),

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
+use wheeleg_config::open_file;
 
-use crate::files::opened;
 use crate::{CampaignError, host};
 
 /// One line.
@@ -65,7 +65,7 @@ pub(crate) struct Attempts {
 impl Attempts {
     /// Reads what is there; a line that was cut off is none.
     pub(crate) fn read(path: PathBuf) -> Self {
-        let text = opened(&path)
+        let text = open_file(&path)
             .and_then(std::io::read_to_string)
             .unwrap_or_default();
         let mut known: BTreeMap<u64, Known> = BTreeMap::new();

@@ -25,7 +25,6 @@ mod columns;
 mod compute;
 mod draw;
 mod error;
-mod files;
 mod host;
 mod identity;
 mod isolate;

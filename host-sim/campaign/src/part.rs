@@ -3,8 +3,9 @@
 use std::fs::File;
 use std::path::Path;
 
+use wheeleg_config::{open_file, word};
+
 use crate::columns::{Column, Columns, FACT, Kind};
-use crate::files::opened;
 use crate::panics::caught;
 use crate::row::{self, Row};
 use crate::table::{Data, Table, TableReader, TableWriter};
@@ -15,9 +16,6 @@ pub(crate) const PLAN: &str = "wheeleg.plan";
 pub(crate) const PROGRAM: &str = "wheeleg.program";
 /// Key of the hash of the values: bytes that were damaged are found, wherever they are.
 const ROWS: &str = "wheeleg.rows";
-
-/// Most characters of a wrong fact in a message.
-const SHOWN: usize = 60;
 
 /// What it took to compute a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +120,7 @@ pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
 }
 
 fn open(path: &Path) -> Result<File, NotAPart> {
-    opened(path).map_err(|e| match e.kind() {
+    open_file(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => NotAPart::Missing,
         _ => NotAPart::Torn(e.to_string()),
     })
@@ -134,9 +132,7 @@ fn of(reader: &TableReader<File>, plan: &str) -> Result<(), NotAPart> {
         let found = reader.fact(key).unwrap_or("nothing");
         if found != own {
             // A merged table has its whole plan there.
-            let begin: String = found.chars().take(SHOWN).collect();
-            let more = if begin == found { "" } else { "…" };
-            let what = format!("its {key} is {begin}{more}, not {own}");
+            let what = format!("its {key} is {}, not {own}", word(found));
             return Err(NotAPart::Foreign(what));
         }
     }

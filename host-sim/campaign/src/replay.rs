@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use wheeleg_config::word;
+use wheeleg_config::{open_file, word};
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::run::Run;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
 use crate::cases::Cases;
-use crate::files::opened;
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
@@ -121,7 +120,7 @@ pub fn replay(
 
 /// The plan in a merged table.
 pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
-    let file = opened(path).map_err(|e| CampaignError::unreadable(path, e))?;
+    let file = open_file(path).map_err(|e| CampaignError::unreadable(path, e))?;
     let reader = TableReader::new(file).map_err(|e| CampaignError::unreadable(path, e))?;
     // A part has the hash of its plan alone.
     let text = reader.fact(PLAN).filter(|text| text.starts_with('{'));
@@ -174,7 +173,7 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             Ok(rows)
         }
         From::Table(path) => {
-            let file = opened(path).map_err(|e| CampaignError::unreadable(path, e))?;
+            let file = open_file(path).map_err(|e| CampaignError::unreadable(path, e))?;
             let read = TableReader::new(file).and_then(|reader| reader.read());
             let table = read.map_err(|e| CampaignError::unreadable(path, e))?;
             row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, "rows that are none"))

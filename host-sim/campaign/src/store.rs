@@ -18,9 +18,9 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
 
-use crate::files::opened;
 use crate::part::NotAPart;
 use crate::row::Row;
 use crate::table::Table;
@@ -96,7 +96,7 @@ impl PlanFile {
     /// # Errors
     /// [`CampaignError::Unreadable`] if it is none.
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
-        let text = opened(path).and_then(std::io::read_to_string);
+        let text = open_file(path).and_then(std::io::read_to_string);
         let text = text.map_err(|e| CampaignError::unreadable(path, e))?;
         Self::parse(path, &text)
     }

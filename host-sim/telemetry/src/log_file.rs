@@ -7,6 +7,7 @@ use std::path::Path;
 
 use mcap::records::MessageHeader;
 use mcap::{Compression, MAGIC};
+use wheeleg_config::open_file;
 
 use super::contact::Contact;
 use super::derived::{Attached, Derive, derived};
@@ -39,14 +40,10 @@ pub(crate) fn options() -> mcap::WriteOptions {
 /// end.
 pub(crate) fn opened(path: &Path) -> Result<File, LogError> {
     let failed = |e| LogError::read(path, e);
-    let about = std::fs::metadata(path).map_err(failed)?;
-    if about.is_dir() {
+    if path.is_dir() {
         return Err(failed(std::io::ErrorKind::IsADirectory.into()));
     }
-    if !about.is_file() {
-        return Err(failed(std::io::Error::other("it is not a file")));
-    }
-    File::open(path).map_err(failed)
+    open_file(path).map_err(failed)
 }
 
 /// Takes the first bytes of a log.

@@ -9,10 +9,10 @@ mod worst;
 
 use std::path::{Path, PathBuf};
 
+use wheeleg_config::open_file;
 use wheeleg_studies::export::{same_file, write_new};
 
 use crate::columns::Columns;
-use crate::files::opened;
 use crate::part::PROGRAM;
 use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
@@ -44,7 +44,7 @@ impl Merged {
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
         let failed = |e: &dyn std::fmt::Display| CampaignError::unreadable(path, e);
         let plan = replay::plan_of_table(path)?;
-        let file = opened(path).map_err(|e| failed(&e))?;
+        let file = open_file(path).map_err(|e| failed(&e))?;
         let reader = TableReader::new(file).map_err(|e| failed(&e))?;
         let program = reader.fact(PROGRAM).unwrap_or_default().to_owned();
         let table = reader.read().map_err(|e| failed(&e))?;

@@ -6,6 +6,7 @@ use std::io::{BufWriter, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use wheeleg_config::open_file;
 use wheeleg_telemetry::{LogFile, OwnedSample, Sink as _, Taken};
 
 use super::inputs::Line;
@@ -255,11 +256,7 @@ const SUMMARY_MAX: u64 = 64 * 1024;
 /// # Errors
 /// What is wrong, with the path.
 pub(crate) fn opened(path: &Path) -> Result<File, String> {
-    let about = fs::metadata(path).map_err(|e| said(path, &e))?;
-    if !about.is_file() {
-        return Err(format!("{}: it is not a file", path.display()));
-    }
-    File::open(path).map_err(|e| said(path, &e))
+    open_file(path).map_err(|e| said(path, &e))
 }
 
 /// Reads the `recording.json` of a folder.

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use wheeleg_config::{Drawing, builtin};
 
 use self::content::{Content, Span};
-pub use self::plain::plain;
+pub use self::plain::{acts, plain};
 use self::signals::Signal;
 use crate::StudyError;
 use crate::export::{same_file, write_new};

@@ -4,10 +4,6 @@
 /// characters, and those that turn the direction of a text, become `�`.
 #[must_use]
 pub fn plain(text: &str) -> String {
-    let acts = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
     text.chars()
         .map(|c| {
             if acts(c) {
@@ -17,4 +13,12 @@ pub fn plain(text: &str) -> String {
             }
         })
         .collect()
+}
+
+/// Whether a terminal or a page does something other than to show this character.
+#[must_use]
+pub fn acts(c: char) -> bool {
+    let turns =
+        matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || turns
 }

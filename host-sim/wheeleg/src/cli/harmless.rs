@@ -1,5 +1,7 @@
 //! What the program says, on a terminal: texts of files and of servers stand in it.
 
+use wheeleg_studies::view::acts;
+
 /// A text in which colours alone act on a terminal. All else that would, such as moving the cursor,
 /// setting the title or turning the direction of the text, becomes `�`.
 pub(super) fn harmless(text: &str) -> String {
@@ -8,20 +10,13 @@ pub(super) fn harmless(text: &str) -> String {
     while let Some(c) = rest.chars().next() {
         let length = colour(rest).unwrap_or(c.len_utf8());
         let (piece, after) = rest.split_at(length);
-        match length == c.len_utf8() && acts(c) {
+        match length == c.len_utf8() && acts(c) && !matches!(c, '\n' | '\t') {
             true => out.push(char::REPLACEMENT_CHARACTER),
             false => out.push_str(piece),
         }
         rest = after;
     }
     out
-}
-
-/// Whether a terminal does something other than to show this character.
-fn acts(c: char) -> bool {
-    let turns =
-        matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    (c.is_control() && c != '\n' && c != '\t') || turns
 }
 
 /// Bytes of the colour with which the text begins: `ESC [`, numbers, `m`. What conceals is none.
