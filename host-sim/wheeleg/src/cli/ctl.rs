@@ -9,7 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
-use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
 use wheeleg_console::{Key, SPEED};
 use wheeleg_studies::StudyError;
@@ -193,15 +193,16 @@ fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
 }
 
 fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
-    if reach.url().is_exposed() {
-        return stop_by_session(reach, key);
+    let url = reach.url().prompt();
+    if url.is_exposed() {
+        return stop_by_session(reach, &url, key);
     }
-    let (code, answer) = http(&reach.url(), "POST", "stop", key).map_err(refused)?;
+    let (code, answer) = http(&url, "POST", "stop", key).map_err(refused)?;
     match code {
         200 if reach.json => print(&format!("{answer}\n")),
         200 => print("stopped: the stop is in SYNC, and latched\n"),
         504 => Ok(not_confirmed()),
-        403 => stop_by_session(reach, key),
+        403 => stop_by_session(reach, &url, key),
         _ => {
             not_answered(&answer);
             Ok(not_confirmed())
@@ -210,10 +211,10 @@ fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
 }
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.
-fn stop_by_session(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
-    let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
-    match client.prompt_outcome(n) {
+fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(url, "view", "ctl", key).map_err(refused)?;
+    let stopped = client.prompt(json!({ "op": "stop" })).map_err(refused)?;
+    match stopped {
         Outcome::Done => reach.print_outcome(&Outcome::Done),
         Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
         refused @ Outcome::Refused { .. } => {
