@@ -57,7 +57,7 @@ impl Place {
     /// A campaign of six cases that are given up after `limit`, and its table.
     fn campaign(&self, limit: &str) {
         let plan = format!(
-            "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nsamples = 6\n[base]\nscenario = \"stand\"\n"
+            "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nreplicates = 6\n[base]\nscenario = \"stand\"\n"
         );
         self.write("plan.toml", &plan);
         for arguments in [

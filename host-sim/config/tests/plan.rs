@@ -400,6 +400,10 @@ fn a_plan_needs_its_head() {
              [base]\nscenario = \"stand\"\n",
             "`block` = 4 makes 16384000000 part files",
         ),
+        (
+            "name = \"x\"\nroot = 1\nsamples = 5\n[base]\nscenario = \"stand\"\n",
+            "`samples` = 5 would compute each case as often: no factor is drawn",
+        ),
         ("name = ", "not valid TOML"),
     ] {
         let error = Plan::of(sources(text)).expect_err(text);

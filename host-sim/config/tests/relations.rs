@@ -398,14 +398,14 @@ fn what_a_refusal_proposes_is_accepted_by_every_relation() {
     for (_, file, text) in wheeleg_config::axis::AXES {
         let listed = AxisConfig::parse(file, text).expect("built in").parameters;
         let fields = fields_of_relations(&listed);
-        for _ in 0..100 {
+        for _ in 0..60 {
             let text = random_file(&mut rng, text, &fields);
             tried += ensure_advice_is_accepted(&text, &axis);
         }
     }
     let listed = RobotConfig::parse("robot.toml", ROBOT).expect("built in");
     let fields = fields_of_relations(&listed.parameters);
-    for _ in 0..60 {
+    for _ in 0..25 {
         let text = random_file(&mut rng, ROBOT, &fields);
         tried += ensure_advice_is_accepted(&text, &robot);
     }
@@ -417,7 +417,7 @@ fn what_a_refusal_proposes_is_accepted_by_every_relation() {
         tried += ensure_advice_is_accepted(&text, read);
     }
     println!("{tried} values tried");
-    assert!(tried > 300, "{tried}");
+    assert!(tried > 200, "{tried}");
 }
 
 /// Light mass on hard bristles and a hard stop: a step for the bristles alone would be refused for the

@@ -223,21 +223,6 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         factors: factors?,
         sources: sources.clone(),
     };
-    let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
-    if r.is_clean() && plan.samples > 1 && !plan.factors.iter().any(drawn) {
-        r.problem(
-            top.get("samples").map(|(key, _)| key),
-            format!(
-                "`samples` = {} would compute each case as often: no factor is drawn, and allowed is \
-                 then 1",
-                plan.samples
-            ),
-            "the same again",
-            Some(
-                "for other noise write `replicates`; for other values let a factor be drawn".into(),
-            ),
-        );
-    }
     let cells = plan.factors.iter().map(Factor::grid_len);
     let numbers = cells.chain([plan.samples, plan.replicates]);
     let cases = numbers.fold(1_u128, |n, m| n.saturating_mul(u128::from(m)));
@@ -261,6 +246,21 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
             ),
             "too many files",
             Some(format!("a campaign has at most {MOST_BLOCKS} part files")),
+        );
+    }
+    let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
+    if r.is_clean() && plan.samples > 1 && !plan.factors.iter().any(drawn) {
+        r.problem(
+            top.get("samples").map(|(key, _)| key),
+            format!(
+                "`samples` = {} would compute each case as often: no factor is drawn, and allowed is \
+                 then 1",
+                plan.samples
+            ),
+            "the same again",
+            Some(
+                "for other noise write `replicates`; for other values let a factor be drawn".into(),
+            ),
         );
     }
     Some(plan)

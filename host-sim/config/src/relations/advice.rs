@@ -11,7 +11,7 @@ use super::{Facts, Found};
 use crate::quantity::{pretty, suffix};
 
 /// Files that are tried at most for one relation: each is read as a whole.
-const TRIES: usize = 60;
+const TRIES: usize = 24;
 /// Offers that are put together at most.
 const TOGETHER: usize = 4;
 /// From a limit that is not allowed itself, the value that is tried is this share of it away.

@@ -11,7 +11,7 @@ use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
-use wheeleg_console::{Key, SPEED};
+use wheeleg_console::{Key, SPEED, STEP_MAX};
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
@@ -40,7 +40,7 @@ enum CtlCommand {
         /// Channels, as `wheeleg channels` has them; events always come.
         #[arg(value_name = "CHANNEL")]
         channels: Vec<String>,
-        /// Samples per second of a channel.
+        /// Samples per second of a channel, 1 to 50.
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
         hz: u32,
     },
@@ -71,14 +71,20 @@ enum CtlCommand {
     Resume,
     /// Simulate some bus cycles of a paused robot.
     Step {
-        /// Number of cycles, 10 ms each.
-        #[arg(default_value_t = 1, value_parser = whole(1_u32, 1_000))]
+        #[arg(
+            default_value_t = 1,
+            value_parser = whole(1, STEP_MAX),
+            help = format!("Number of cycles, 10 ms each, 1 to {STEP_MAX}")
+        )]
         cycles: u32,
     },
     /// Set the pace.
     Speed {
-        /// Simulated time per wall-clock time, 0.1 to 10.
-        #[arg(allow_negative_numbers = true, value_parser = parse_pace)]
+        #[arg(
+            allow_negative_numbers = true,
+            value_parser = parse_pace,
+            help = format!("Simulated time per wall-clock time, {} to {}", SPEED.0, SPEED.1)
+        )]
         speed: f64,
     },
     /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
