@@ -1,7 +1,8 @@
 //! The address of a server, and the connection to it.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{IpAddr, Ipv6Addr, TcpStream, ToSocketAddrs as _};
+use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs as _};
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use rustls::pki_types::ServerName;
@@ -139,8 +140,25 @@ impl Url {
         Ok(Stream::Tls(Box::new(stream)))
     }
 
+    /// Addresses of the host. Whoever knows its name may take long to say so: the system's look-up has
+    /// no deadline of its own, and goes on in a thread that nobody waits for.
+    fn addresses(&self, end: Instant) -> Result<Vec<SocketAddr>, ConsoleError> {
+        let (found, addresses) = mpsc::channel();
+        let host = self.host.clone();
+        std::thread::spawn(move || {
+            let all = host.to_socket_addrs().map(Iterator::collect);
+            // Nobody may listen any more.
+            let _ = found.send(all);
+        });
+        let left = end.saturating_duration_since(Instant::now());
+        match addresses.recv_timeout(left) {
+            Ok(all) => all.map_err(|e| self.error(e)),
+            Err(_) => Err(self.broken(ErrorKind::TimedOut.into())),
+        }
+    }
+
     fn tcp(&self, end: Instant) -> Result<Timed, ConsoleError> {
-        let addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
+        let addresses = self.addresses(end)?;
         let mut stream = Err(self.error("no such host"));
         // `localhost` may have an address at which nobody listens before the right one.
         for address in addresses {
