@@ -394,7 +394,10 @@ fn look_only_server(pause: Duration) -> String {
                     let _ = stream.write_all(b"HTTP/1.1 403 Forbidden\r\n\r\n{}");
                     return;
                 }
-                while stream.write_all(b"HTTP/1.1 101 Switching Protocols\r\nX: ").is_ok() {
+                while stream
+                    .write_all(b"HTTP/1.1 101 Switching Protocols\r\nX: ")
+                    .is_ok()
+                {
                     std::thread::sleep(pause);
                 }
             });
@@ -433,10 +436,23 @@ fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
     }
     // A handshake of TLS that does not end, and a session that is not begun: one after the other, the
     // answer before them included, is waited for no longer than one.
-    let record = [&b"\x16\x03\x03\x40\x00\x02\x00\x3f\xfc\x03\x03"[..], &[7; 400]].concat();
+    let record = [
+        &b"\x16\x03\x03\x40\x00\x02\x00\x3f\xfc\x03\x03"[..],
+        &[7; 400],
+    ]
+    .concat();
     let address = format!("https://{}", server(record.leak(), drip));
     let fingerprint = "ab".repeat(32);
-    let ctl = ["ctl", "--url", &address, "--key", "key", "--fingerprint", &fingerprint, "stop"];
+    let ctl = [
+        "ctl",
+        "--url",
+        &address,
+        "--key",
+        "key",
+        "--fingerprint",
+        &fingerprint,
+        "stop",
+    ];
     let words = ["NOT CONFIRMED: CUT THE AIR", "no answer within 3 s"];
     place.refusal(&ctl, 3, &words);
     let address = look_only_server(drip);

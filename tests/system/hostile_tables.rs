@@ -40,7 +40,10 @@ fn written(path: &Path, rows: u64) -> Table {
             Data::Number((0..rows).map(|n| (n % 3 > 0).then_some(n as f64)).collect()),
         ],
     };
-    let facts = [("wheeleg.plan", "{\"plan\":\"no plan\"}"), ("wheeleg.program", "another")];
+    let facts = [
+        ("wheeleg.plan", "{\"plan\":\"no plan\"}"),
+        ("wheeleg.program", "another"),
+    ];
     table.write_to(path, &facts).expect("written");
     table
 }
@@ -49,7 +52,11 @@ fn written(path: &Path, rows: u64) -> Table {
 fn claims(bytes: &[u8]) -> Vec<u8> {
     // Kind of the page, then the size as a number of four groups of seven bits.
     let at = bytes.windows(7).position(|b| {
-        b[0] == 0x15 && b[1] <= 0x06 && b[2] == 0x15 && b[3..6].iter().all(|b| b & 0x80 != 0) && b[6] < 0x80
+        b[0] == 0x15
+            && b[1] <= 0x06
+            && b[2] == 0x15
+            && b[3..6].iter().all(|b| b & 0x80 != 0)
+            && b[6] < 0x80
     });
     let at = at.expect("a large page") + 3;
     let mut claims = bytes.to_vec();

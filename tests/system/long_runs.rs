@@ -93,13 +93,19 @@ fn ensure_time_goes_on(log: &Path, duration_s: u32) {
         assert!(before <= now, "{topic}: {now} ns after {before}");
         // The slowest of the regular channels comes every 100 ms.
         let regular = topic != "/event" && before > 0;
-        assert!(!regular || now - before <= 1_000_000_000, "{topic}: {before} to {now} ns");
+        assert!(
+            !regular || now - before <= 1_000_000_000,
+            "{topic}: {before} to {now} ns"
+        );
         ControlFlow::Continue(())
     });
     assert!(end.expect("a log").whole);
     let duration_ns = u64::from(duration_s) * 1_000_000_000;
     let ended = newest.iter().flatten().max().expect("messages");
-    assert!(duration_ns.abs_diff(*ended) <= 1_000_000_000, "it ends at {ended} ns");
+    assert!(
+        duration_ns.abs_diff(*ended) <= 1_000_000_000,
+        "it ends at {ended} ns"
+    );
 }
 
 /// Required targets that a run has missed.

@@ -41,7 +41,9 @@ pub(crate) fn check<R: ChunkReader>(
             let begin = column
                 .dictionary_page_offset()
                 .unwrap_or_else(|| column.data_page_offset());
-            let range = u64::try_from(begin).ok().zip(u64::try_from(column.compressed_size()).ok());
+            let range = u64::try_from(begin)
+                .ok()
+                .zip(u64::try_from(column.compressed_size()).ok());
             let end = range.and_then(|(begin, size)| begin.checked_add(size));
             let (Some((begin, _)), Some(end)) = (range, end.filter(|end| *end <= length)) else {
                 return Err(damaged("a column ends behind its end"));
@@ -62,14 +64,18 @@ fn check_column<R: ChunkReader>(
         let window = (end - at).min(HEADER_MOST);
         let bytes = from.get_bytes(at, usize::try_from(window)?)?;
         let header = Header::read(&bytes).ok_or_else(|| damaged("a page has no header"))?;
-        let most = MOST_PACKED.saturating_mul(header.packed).saturating_add(MOST_PACKED);
+        let most = MOST_PACKED
+            .saturating_mul(header.packed)
+            .saturating_add(MOST_PACKED);
         if header.unpacked > most {
             return Err(damaged("a page claims more bytes than it can hold"));
         }
         if header.values > rows || header.entries > header.unpacked {
             return Err(damaged("a page claims more values than it can hold"));
         }
-        at = at.saturating_add(header.length).saturating_add(header.packed);
+        at = at
+            .saturating_add(header.length)
+            .saturating_add(header.packed);
     }
     Ok(())
 }
@@ -259,6 +265,9 @@ mod tests {
     fn what_is_deep_or_long_is_no_header() {
         assert_eq!(Header::read(&[0x19; 4000]), None);
         assert_eq!(Header::read(&[0x1c; 4000]), None);
-        assert_eq!(Header::read(&[0x19, 0xf8, 0xff, 0xff, 0xff, 0xff, 0x0f]), None);
+        assert_eq!(
+            Header::read(&[0x19, 0xf8, 0xff, 0xff, 0xff, 0xff, 0x0f]),
+            None
+        );
     }
 }

@@ -220,7 +220,9 @@ impl AxisConfig {
             description,
             axis,
         } = Parts::read(&mut r);
-        relations::check(&mut r, &facts(axis.as_ref()), &|values| tried(file, text, values));
+        relations::check(&mut r, &facts(axis.as_ref()), &|values| {
+            tried(file, text, values)
+        });
         if let (true, Some(axis)) = (r.is_clean(), &axis) {
             relations::check_plant(&mut r, Axis::new(axis).map(drop));
         }
@@ -278,7 +280,10 @@ fn facts(axis: Option<&AxisParams>) -> relations::Read<'_> {
 fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
     let mut r = Reader::with(file, text, values)?;
     let axis = Parts::read(&mut r).axis;
-    let built = || axis.as_ref().map_or(Ok(()), |axis| Axis::new(axis).map(drop));
+    let built = || {
+        axis.as_ref()
+            .map_or(Ok(()), |axis| Axis::new(axis).map(drop))
+    };
     Some(relations::tried(&mut r, &facts(axis.as_ref()), built))
 }
 

@@ -233,6 +233,10 @@ fn facts(robot: Option<&PlantParams>) -> relations::Read<'_> {
 fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
     let mut r = Reader::with(file, text, values)?;
     let plant = Parts::read(&mut r).plant.map(|(plant, _)| plant);
-    let built = || plant.as_ref().map_or(Ok(()), |plant| Plant::new(plant).map(drop));
+    let built = || {
+        plant
+            .as_ref()
+            .map_or(Ok(()), |plant| Plant::new(plant).map(drop))
+    };
     Some(relations::tried(&mut r, &facts(plant.as_ref()), built))
 }

@@ -431,8 +431,17 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
         panic!("{}", report(&error))
     };
     assert!(problem.to_string().contains("friction"), "{problem}");
-    let paths: Vec<&str> = problem.advice().iter().map(|set| set[0].path.as_str()).collect();
-    assert_eq!(paths, ["numerics.step", "moving.mass"], "{}", report(&error));
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(
+        paths,
+        ["numerics.step", "moving.mass"],
+        "{}",
+        report(&error)
+    );
 }
 
 /// What the plant refuses for itself is told by its field, in the unit of the file.

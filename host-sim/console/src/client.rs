@@ -12,8 +12,8 @@ use tungstenite::handshake::HandshakeError;
 use tungstenite::http::Uri;
 use tungstenite::{Message, WebSocket};
 
-pub use self::url::Url;
 use self::url::Stream;
+pub use self::url::Url;
 use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
 use crate::hex;

@@ -278,7 +278,10 @@ fn a_measurement_that_the_plant_cannot_play_is_told_with_both_files() {
     let mut text = "time_s,position_mm,fill_a,vent_a,fill_b,vent_b,load_n\n".to_owned();
     for tick in 0..400 {
         let load_n = if tick < 200 { 10_000 } else { -10_000 };
-        text += &format!("0.{tick:03},{},0,1,0,1,{load_n}\n", 40.0 + 0.2 * f64::from(tick));
+        text += &format!(
+            "0.{tick:03},{},0,1,0,1,{load_n}\n",
+            40.0 + 0.2 * f64::from(tick)
+        );
     }
     let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let told = fitted(&problem(&config, &lab), 1, &Progress::silent()).expect_err("no fit");

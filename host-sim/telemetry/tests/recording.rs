@@ -238,13 +238,19 @@ fn a_log_with_a_damaged_schema_keeps_every_message() {
     let path = |name: &str| folder.path().join(name);
     let file = std::fs::File::create(path("log.mcap")).expect("created");
     let options = mcap::WriteOptions::new().use_chunks(false);
-    let mut writer = options.create(std::io::BufWriter::new(file)).expect("begun");
+    let mut writer = options
+        .create(std::io::BufWriter::new(file))
+        .expect("begun");
     let mut written = Vec::new();
     for topic in ["/one", "/two"] {
         let schema = format!("schema of {topic}");
-        let schema = writer.add_schema(&schema, "jsonschema", b"{}").expect("added");
+        let schema = writer
+            .add_schema(&schema, "jsonschema", b"{}")
+            .expect("added");
         let none = std::collections::BTreeMap::new();
-        let channel = writer.add_channel(schema, topic, "json", &none).expect("added");
+        let channel = writer
+            .add_channel(schema, topic, "json", &none)
+            .expect("added");
         for t in 0..100 {
             let header = mcap::records::MessageHeader {
                 channel_id: channel,
@@ -253,7 +259,9 @@ fn a_log_with_a_damaged_schema_keeps_every_message() {
                 publish_time: u64::from(t),
             };
             let data = format!("{{\"n\":{t}}}");
-            writer.write_to_known_channel(&header, data.as_bytes()).expect("written");
+            writer
+                .write_to_known_channel(&header, data.as_bytes())
+                .expect("written");
             written.push((topic.to_owned(), header.log_time, data));
         }
     }

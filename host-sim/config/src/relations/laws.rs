@@ -231,7 +231,12 @@ fn wide_enough(f: &Facts<'_>, half_m: f64) -> Option<Broken> {
     let offers = [
         Offer::new(f, "spatial.track", Bound::From, least_m)
             .which_is("the width of the chassis and that of a wheel"),
-        Offer::new(f, "spatial.wheel_width", Bound::UpTo, track_m - 2.0 * half_m),
+        Offer::new(
+            f,
+            "spatial.wheel_width",
+            Bound::UpTo,
+            track_m - 2.0 * half_m,
+        ),
     ];
     offered(String::new(), offers.to_vec())
 }

@@ -19,8 +19,8 @@ use wheeleg_plant::{PlantError, PlantParams};
 use wheeleg_protocol::param::JointParam;
 
 pub use advice::Advised;
-pub(crate) use advice::{Tried, Try};
 use advice::{Bound, Offer, Search};
+pub(crate) use advice::{Tried, Try};
 pub use laws::SENSOR_TRACK;
 pub(crate) use moved::Moved;
 use standing::AtRest;
@@ -164,7 +164,8 @@ impl Relation {
                 (!holds).then(|| {
                     offers(vec![
                         Offer::new(facts, first, Bound::UpTo, most).which_is(&of),
-                        Offer::new(facts, self.fields[1], Bound::From, low / share).which_is(&other),
+                        Offer::new(facts, self.fields[1], Bound::From, low / share)
+                            .which_is(&other),
                     ])
                 })
             }

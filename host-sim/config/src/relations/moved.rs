@@ -111,11 +111,7 @@ impl Oscillator {
 
     /// A tenth below the step at which k/4 h² + c h − m = 0, in whole microseconds.
     fn longest_step_s(&self) -> f64 {
-        let (a, b, m) = (
-            0.25 * self.stiffness_n_m,
-            self.damping_n_s_m,
-            self.mass_kg,
-        );
+        let (a, b, m) = (0.25 * self.stiffness_n_m, self.damping_n_s_m, self.mass_kg);
         let longest_s = 2.0 * m / (b + (b * b + 4.0 * a * m).sqrt());
         (0.9 * longest_s * 1e6).floor().max(1.0) * 1e-6
     }
@@ -136,7 +132,13 @@ impl Oscillator {
         let mass_kg = self.least_mass_kg().max(other.least_mass_kg());
         // Where neither range reaches: a tenth of the step, and the mass that this takes.
         let short_s = (0.1 * self.step_s).max(SHORTEST_STEP_S);
-        let stepped = |it: &Self| Self { step_s: short_s, ..*it }.least_mass_kg();
+        let stepped = |it: &Self| {
+            Self {
+                step_s: short_s,
+                ..*it
+            }
+            .least_mass_kg()
+        };
         Some(Broken {
             figures: format!(
                 "damping × step / mass + stiffness × step² / (4 × mass) = {:.2}, allowed below \
@@ -231,7 +233,11 @@ pub(super) fn volume(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         ),
         offers: vec![
             f.offer(it.fields[0], Bound::From, dead_m3),
-            f.offer("end_stop.stiffness", Bound::From, (stiffer_n_m * 1e-3).ceil() * 1e3),
+            f.offer(
+                "end_stop.stiffness",
+                Bound::From,
+                (stiffer_n_m * 1e-3).ceil() * 1e3,
+            ),
         ],
         words: String::new(),
     })
@@ -256,8 +262,16 @@ pub(super) fn supply(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
     Some(Broken {
         figures: String::new(),
         offers: vec![
-            f.offer("supply.reservoir", Bound::From, (1.1 * least_m3 * 1e6).ceil() * 1e-6),
-            f.offer("supply.droop", Bound::From, (more * supply.droop_pa * 1e-2).ceil() * 1e2),
+            f.offer(
+                "supply.reservoir",
+                Bound::From,
+                (1.1 * least_m3 * 1e6).ceil() * 1e-6,
+            ),
+            f.offer(
+                "supply.droop",
+                Bound::From,
+                (more * supply.droop_pa * 1e-2).ceil() * 1e2,
+            ),
             f.offer(STEP, Bound::UpTo, step_s),
         ],
         words: String::new(),

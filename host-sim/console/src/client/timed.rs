@@ -28,9 +28,9 @@ impl Timed {
 
     /// What is left of a time.
     fn left(&self, of: Duration) -> Result<Duration> {
-        let until = self.until.map_or(of, |until| {
-            until.saturating_duration_since(Instant::now())
-        });
+        let until = self
+            .until
+            .map_or(of, |until| until.saturating_duration_since(Instant::now()));
         match until.min(of) {
             Duration::ZERO => Err(ErrorKind::TimedOut.into()),
             left => Ok(left),
@@ -47,7 +47,8 @@ impl Read for Timed {
 
 impl Write for Timed {
     fn write(&mut self, buf: &[u8]) -> Result<usize> {
-        self.tcp.set_write_timeout(Some(self.left(self.patience)?))?;
+        self.tcp
+            .set_write_timeout(Some(self.left(self.patience)?))?;
         self.tcp.write(buf)
     }
 

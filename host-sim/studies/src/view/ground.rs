@@ -285,7 +285,10 @@ mod tests {
         };
         let blocks = ground.blocks();
         assert_eq!(blocks.len(), 2, "{blocks:?}");
-        assert_eq!((blocks[0][0], blocks[1][3]), ([1000.0, 4000.0], [2000.0, 7000.0]));
+        assert_eq!(
+            (blocks[0][0], blocks[1][3]),
+            ([1000.0, 4000.0], [2000.0, 7000.0])
+        );
         let strip = Strip::around([0.0, 1.0].into_iter());
         assert_eq!(ground.rocks(&strip).len(), 1);
     }

@@ -313,10 +313,15 @@ mod tests {
         use clap::CommandFactory as _;
         fn walk(command: &clap::Command, path: &[String], found: &mut Vec<String>) {
             let path = [path, &[command.get_name().to_owned()]].concat();
-            for arg in command.get_arguments().filter(|arg| arg.get_action().takes_values()) {
+            for arg in command
+                .get_arguments()
+                .filter(|arg| arg.get_action().takes_values())
+            {
                 let help = arg.get_long_help().or(arg.get_help());
                 let help = help.map(ToString::to_string).unwrap_or_default();
-                let Some([low, high]) = range(&help) else { continue };
+                let Some([low, high]) = range(&help) else {
+                    continue;
+                };
                 let name = format!("{} {}", path.join(" "), arg.get_id());
                 // The next value: of whole numbers 1 away, of others a hundredth.
                 let whole = !takes(&path, arg, low + 0.5 * (high - low).min(1.0));
@@ -349,7 +354,10 @@ mod tests {
             "wheeleg delay load",
             "wheeleg identify hold_out",
         ] {
-            assert!(found.iter().any(|name| name == wanted), "{wanted}: {found:?}");
+            assert!(
+                found.iter().any(|name| name == wanted),
+                "{wanted}: {found:?}"
+            );
         }
     }
 }

@@ -56,7 +56,9 @@ fn table(text: &str) -> Table {
 
 /// First the number of changes, then each as a place and a byte; what is left is the text.
 pub fn run(data: &[u8]) {
-    let count = data.first().map_or(0, |first| usize::from(*first) % (CHANGES + 1));
+    let count = data
+        .first()
+        .map_or(0, |first| usize::from(*first) % (CHANGES + 1));
     let rest = data.get(1..).unwrap_or_default();
     let (changes, text) = rest.split_at((3 * count).min(rest.len()));
     let text = String::from_utf8_lossy(&text[..text.len().min(LENGTH_MAX)]);
@@ -76,7 +78,11 @@ pub fn run(data: &[u8]) {
         let at = bytes.len() - 1 - place % bytes.len();
         bytes[at] = change[2];
     }
-    if let Some(last) = changes.chunks_exact(3).last().filter(|change| change[2] % 8 == 0) {
+    if let Some(last) = changes
+        .chunks_exact(3)
+        .last()
+        .filter(|change| change[2] % 8 == 0)
+    {
         bytes.truncate(usize::from(u16::from_le_bytes([last[0], last[1]])));
     }
     fs::write(&path, bytes).expect("written");
