@@ -12,6 +12,8 @@ use crate::quantity::{pretty, suffix};
 
 /// Files that are tried at most for one relation: each is read as a whole.
 const TRIES: usize = 24;
+/// The same for all relations of a file.
+const ALL_TRIES: usize = 120;
 /// Offers that are put together at most.
 const TOGETHER: usize = 4;
 /// From a limit that is not allowed itself, the value that is tried is this share of it away.
@@ -126,7 +128,9 @@ pub(super) struct Search<'a> {
     before: BTreeSet<&'static str>,
     others: usize,
     attempt: &'a Try<'a>,
+    /// Tries that are left for a relation, and for all.
     left: Cell<usize>,
+    all_left: Cell<usize>,
 }
 
 impl<'a> Search<'a> {
@@ -137,12 +141,18 @@ impl<'a> Search<'a> {
             others,
             attempt,
             left: Cell::new(0),
+            all_left: Cell::new(ALL_TRIES),
         }
+    }
+
+    /// Whether so much is wrong that not everything was tried.
+    pub(super) fn is_cut_short(&self) -> bool {
+        self.left.get() == 0
     }
 
     /// Sets of offers that are each accepted: of one field if there are any, otherwise of several.
     pub(super) fn accepted(&self, broken: &Found) -> Vec<Vec<Offer>> {
-        self.left.set(TRIES);
+        self.left.set(TRIES.min(self.all_left.get()));
         let offers = &broken.broken.offers;
         let (single, several): (Vec<_>, Vec<_>) = offers.iter().partition(|set| set.len() == 1);
         for sets in [single, several] {
@@ -163,6 +173,7 @@ impl<'a> Search<'a> {
             return Answer::Refused;
         };
         self.left.set(left);
+        self.all_left.set(self.all_left.get().saturating_sub(1));
         let values: Vec<Advised> = set.iter().map(|offer| offer.advised.clone()).collect();
         let Some(tried) = (self.attempt)(&values).filter(|tried| tried.others <= self.others)
         else {

@@ -209,7 +209,7 @@ impl Relation {
         }
     }
 
-    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>]) {
+    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], cut_short: bool) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
@@ -217,6 +217,9 @@ impl Relation {
         let mut fields = self.fields.to_vec();
         fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         let allowed = match (advice::text(accepted), broken.words.as_str()) {
+            (offers, "") if offers.is_empty() && cut_short => {
+                "what is allowed depends on other fields: mend what else is wrong first".to_owned()
+            }
             (offers, "") if offers.is_empty() => {
                 "no value of one of them is allowed with the rest of the file".to_owned()
             }
@@ -267,7 +270,9 @@ pub(crate) fn check(r: &mut Reader, read: &Read<'_>, attempt: &Try<'_>) {
     let found = broken(r, read);
     let search = Search::new(&found, r.problem_count(), attempt);
     for one in &found {
-        one.relation.report(r, &one.broken, &search.accepted(one));
+        let accepted = search.accepted(one);
+        one.relation
+            .report(r, &one.broken, &accepted, search.is_cut_short());
     }
 }
 
