@@ -383,6 +383,15 @@ fn a_plan_needs_its_head() {
             "`samples` = 0 must be a whole number from 1",
         ),
         (
+            "name = \"x\"\nroot = 1\ncases = 0\n[base]\nscenario = \"stand\"\n",
+            "`cases` cannot be given: it is grid cells × `samples` × `replicates`",
+        ),
+        (
+            "name = \"x\"\nroot = 1\n[base]\nscenario = \"stand\"\n\
+             [factor.a]\nparameter = \"robot.friction.coulomb\"\ngrid = []\n",
+            "`factor.a.grid` = [] must be a list of at least one number",
+        ),
+        (
             "name = \"x\"\nroot = 1\nsampler = \"sobbol\"\n[base]\nscenario = \"stand\"\n",
             "`sampler` = \"sobbol\" is not known",
         ),

@@ -164,7 +164,15 @@ impl Plan {
 
 fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
     let top = r.table("")?;
-    r.reject_unknown(&top, &TOP);
+    r.reject_unknown(&top, &[&TOP[..], &["cases"]].concat());
+    if let Some((key, _)) = top.get("cases") {
+        r.problem(
+            Some(key),
+            "`cases` cannot be given: it is grid cells × `samples` × `replicates`".to_owned(),
+            "follows from others",
+            Some("write `samples` or `replicates`, from 1".to_owned()),
+        );
+    }
     let name = r.name(&top, "name");
     let mut count = |key: &str, most: u64| match top.get(key) {
         Some(_) => r.whole(&top, key, 1..=most),
