@@ -464,7 +464,7 @@ fn the_record_names_tests_that_exist() {
 #[test]
 fn a_log_whose_head_has_no_room_leaves_nothing() {
     let folder = tempfile::tempdir().expect("temporary folder");
-    for kilobytes in [1, 8, 40] {
+    for kilobytes in [1, 8] {
         let shell = format!("ulimit -f {kilobytes}; exec \"$0\" run stand --out out-{kilobytes}");
         let output = std::process::Command::new("bash")
             .current_dir(folder.path())
@@ -494,7 +494,7 @@ fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("log.mcap") && said.contains("File too large"),
+        said.contains("cannot write the log: File too large"),
         "{said}"
     );
     assert!(folder.path().join("out/summary.json").is_file(), "{said}");
