@@ -155,6 +155,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
         "wheeleg-fuzz-targets",
         &[
             "wheeleg-board",
+            "wheeleg-campaign",
             "wheeleg-config",
             "wheeleg-console",
             "wheeleg-kinematics",

@@ -7,8 +7,8 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
 
-use crate::table::GROUP_ROWS;
-
+/// Rows of a row group in a table of many parts; a part has no more.
+pub(crate) const GROUP_ROWS: usize = 65_536;
 /// Snappy packs 64 bytes in 3 at best.
 const MOST_PACKED: u64 = 22;
 /// Longest header, bytes: it has the least and the greatest value of its page.

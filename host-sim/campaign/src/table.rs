@@ -21,8 +21,6 @@ use crate::columns::{Column, Kind};
 use crate::panics::caught;
 use crate::{CampaignError, pages};
 
-/// Rows of a row group in a table of many parts.
-pub(crate) const GROUP_ROWS: usize = 65_536;
 /// Bytes of the texts of a column in a row group.
 const GROUP_TEXT: usize = 1 << 25;
 
