@@ -676,7 +676,7 @@ mod tests {
             }
         }
         // Both happen often, or the frames are not what they are meant to be.
-        assert!(read > 10_000 && refused > 10_000, "{read} {refused}");
+        assert!(read > 1_000 && refused > 1_000, "{read} {refused}");
     }
 
     #[test]
