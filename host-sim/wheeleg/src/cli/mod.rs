@@ -277,7 +277,9 @@ mod tests {
     #[test]
     fn command_line_is_consistent() {
         use clap::CommandFactory as _;
-        Cli::command().debug_assert();
+        let command = Cli::command();
+        assert!(command.get_subcommands().count() > 10);
+        command.debug_assert();
     }
 
     /// The first range `A to B` of a text.
