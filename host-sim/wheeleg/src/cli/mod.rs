@@ -40,7 +40,7 @@ use clap::{Args, Parser, Subcommand};
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::study::{Finished, Settings, Stop};
+use wheeleg_studies::study::{Finished, Settings, Stop, outlive_file_limit};
 
 use exit::{FAILED, TARGETS_MISSED};
 use harmless::harmless;
@@ -126,6 +126,11 @@ enum Command {
 pub(crate) fn main() -> ExitCode {
     let cli = usage::parse::<Cli>(std::env::args_os());
     let cli = cli.unwrap_or_else(|wrong| usage::refuse(&wrong));
+    if let Err(error) = outlive_file_limit() {
+        tell(&format!(
+            "a file that reaches the limit on its size will end the program without a message: {error}"
+        ));
+    }
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
