@@ -35,16 +35,16 @@ pub(super) struct CtlArgs {
 enum CtlCommand {
     /// Print the state of the robot.
     Status,
-    /// Print samples and events as they come.
+    /// Print samples and events as they arrive.
     Watch {
-        /// Channels, as `wheeleg channels` has them; events always come.
+        /// Channels, as listed by `wheeleg channels`; events are always included.
         #[arg(value_name = "CHANNEL")]
         channels: Vec<String>,
         /// Samples per second of a channel, 1 to 50.
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
         hz: u32,
     },
-    /// Take the control, give one command, wait for its end, and release the control.
+    /// Take control, send one command, wait until it has finished, and release control.
     Take {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
         #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
@@ -57,7 +57,7 @@ enum CtlCommand {
     Param(ParamCommand),
     /// Begin a fault, such as pot-open:joint3.
     Inject {
-        /// Fault and target, as `wheeleg faults list` has them.
+        /// Fault and target, as listed by `wheeleg faults list`.
         fault: String,
     },
     /// End a fault.
@@ -78,7 +78,7 @@ enum CtlCommand {
         )]
         cycles: u32,
     },
-    /// Set the pace.
+    /// Set the simulation speed.
     Speed {
         #[arg(
             allow_negative_numbers = true,
@@ -338,7 +338,7 @@ fn value(field: &FieldDef, rest: &mut &[u8]) -> Option<Value> {
 fn argument(text: &str) -> Result<(String, Value), StudyError> {
     let (name, value) = text.split_once('=').ok_or_else(|| {
         StudyError::refused(
-            format!("`{text}` is no argument"),
+            format!("`{text}` is not an argument"),
             "write arguments as NAME=VALUE; `wheeleg commands` lists them",
         )
     })?;
