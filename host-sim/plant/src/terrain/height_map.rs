@@ -232,14 +232,24 @@ impl HeightMap {
                 column.map(|c| self.heights_m[row + c])
             }
         };
-        let rows: [[f64; 4]; 4] = std::array::from_fn(four);
-        let lines = along.map(|weights| rows.map(|row| dot(&weights, &row)));
+        let rows = [four(0), four(1), four(2), four(3)];
+        let line = |order: usize| {
+            let [a, b, c, d] = &rows;
+            let weights = &along[order];
+            [
+                dot(weights, a),
+                dot(weights, b),
+                dot(weights, c),
+                dot(weights, d),
+            ]
+        };
+        let lines = [line(0), line(1)];
         // Beyond the map nothing changes outwards.
         let per = |inside: bool| if inside { 1.0 / self.cell_m } else { 0.0 };
         let (per_x, per_y) = (per(inside_x), per(inside_y));
         let bend = if BEND {
             [
-                dot(&up[0], &lines[2]) * per_x * per_x,
+                dot(&up[0], &line(2)) * per_x * per_x,
                 dot(&up[1], &lines[1]) * per_x * per_y,
                 dot(&up[2], &lines[0]) * per_y * per_y,
             ]
