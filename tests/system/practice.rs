@@ -137,7 +137,7 @@ fn tuning_never_makes_an_axis_worse() {
 /// everything that reads the file.
 #[test]
 fn the_longest_standard_stroke_is_tuned() {
-    tuned(HEAVY, &rodless(500.0));
+    assert_eq!(tuned(HEAVY, &rodless(500.0)), 0);
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out");
     let path = axis(folder.path(), HEAVY, &rodless(600.0));
@@ -456,4 +456,55 @@ fn the_record_names_tests_that_exist() {
         seen += 1;
     }
     assert!(seen > 30, "{seen}");
+}
+
+/// A disk without room for the head of a log: nothing is begun, and no part of a log stays. A limit of the
+/// shell on the size of a file is such a disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_log_whose_head_has_no_room_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    for kilobytes in [1, 8] {
+        let shell = format!("ulimit -f {kilobytes}; exec \"$0\" run stand --out out-{kilobytes}");
+        let output = std::process::Command::new("bash")
+            .current_dir(folder.path())
+            .args(["-c", &shell])
+            .arg(program::path())
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{kilobytes}: {said}");
+        assert!(said.contains("File too large"), "{kilobytes}: {said}");
+        assert!(said.contains("log.mcap"), "{kilobytes}: {said}");
+        let out = folder.path().join(format!("out-{kilobytes}"));
+        let left = std::fs::read_dir(&out).map_or_else(
+            |_| Vec::new(),
+            |entries| {
+                let names = entries.map(|entry| entry.expect("an entry").file_name());
+                names.filter(|name| name != ".lock").collect()
+            },
+        );
+        assert!(left.is_empty(), "{kilobytes}: {left:?}");
+    }
+}
+
+/// A limit on the size of a file that is met later: verdict and summary are there, and what is missing is
+/// named.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let output = std::process::Command::new("bash")
+        .current_dir(folder.path())
+        .args(["-c", "ulimit -f 1000; exec \"$0\" run three-step --out out"])
+        .arg(program::path())
+        .output()
+        .expect("start");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("cannot write the log: File too large"),
+        "{said}"
+    );
+    assert!(folder.path().join("out/summary.json").is_file(), "{said}");
 }

@@ -46,7 +46,7 @@ mod session;
 mod tls;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, command_list};
+pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list};
 pub use error::ConsoleError;
 pub use live::{Live, Port};
 pub use mac::Key;

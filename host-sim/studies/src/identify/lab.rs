@@ -41,6 +41,8 @@ pub struct Sample {
 /// A measurement, in ticks of 1 ms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lab {
+    /// Its file, as messages name it.
+    pub file: String,
     /// On-times of each tick \[µs\].
     pub on_us: Vec<[u16; 4]>,
     /// Force on the rod in each tick \[N\], positive extends; `None`: the axis file's.
@@ -197,7 +199,7 @@ fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError
         if map[..place].iter().any(|earlier| earlier.name == *name) {
             let help = "leave one of them out";
             return Err(StudyError::refused(
-                format!("`--map` tells twice where `{name}` is"),
+                format!("{file}: `--map` is given twice for `{name}`"),
                 help,
             ));
         }
@@ -293,7 +295,7 @@ fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
     }
     let line = error.position().map_or(1, csv::Position::line);
     StudyError::refused(
-        format!("{file}, line {line}: it is no row of a CSV table"),
+        format!("{file}, line {line}: it is not a row of a CSV table"),
         HELP,
     )
 }
@@ -324,7 +326,7 @@ fn row(
         value.ok_or_else(|| {
             let what = match text {
                 "" => "there is no value".to_owned(),
-                text => format!("\"{}\" is no number", shown(text)),
+                text => format!("\"{}\" is not a number", shown(text)),
             };
             let help = format!("a number with a decimal point, from {min} to {max}");
             at.wrong(name, &what, &help)
@@ -357,7 +359,7 @@ fn row(
         };
         let value = ranged(column, [0.0, most], help)?;
         if value.fract() != 0.0 {
-            let what = format!("{} is no whole number", pretty(value));
+            let what = format!("{} is not a whole number", pretty(value));
             return Err(at.wrong(name, &what, help));
         }
         *on = if columns.on_times {
@@ -414,7 +416,7 @@ fn units(
         if metres {
             "they look like metres: multiply them by 1000"
         } else {
-            "a piston that stands tells nothing: move it over a good part of its stroke"
+            "a piston at rest gives no information: move it over a good part of its stroke"
         },
     ))
 }
@@ -476,6 +478,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
             .collect()
     };
     Ok(Lab {
+        file: file.to_owned(),
         on_us: rows
             .iter()
             .flat_map(|(_, row)| std::iter::repeat_n(row.on_us, held))

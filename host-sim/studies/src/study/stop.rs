@@ -56,6 +56,17 @@ impl Signal {
     }
 }
 
+/// From here on a file that has reached the limit on its size (`ulimit -f`, a batch system) is an error
+/// of the write, as a full disk is. Its signal would end the program without a message.
+///
+/// # Errors
+/// What the operating system says if a handler cannot be set.
+pub fn outlive_file_limit() -> std::io::Result<()> {
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+    Ok(())
+}
+
 /// Whether a study is to stop. Copies of it are one.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
