@@ -172,9 +172,13 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         for i in 0..C {
             let model = &self.cylinders[i];
             let cylinder = &mut state.cylinders[i];
-            let friction = model.friction(model.pressures_pa(cylinder, after[i]));
-            cylinder.bristle_m = friction.advance_bristle_m(cylinder.bristle_m, middle[i], h);
-            net[i] = model.forces(cylinder, after[i], predicted[i]).net_n();
+            let pressures_pa = model.pressures_pa(cylinder, after[i]);
+            let friction = model.friction(pressures_pa);
+            let bristle_m = friction.advance_bristle_m(cylinder.bristle_m, middle[i], h);
+            cylinder.bristle_m = bristle_m;
+            let motion = (after[i], predicted[i]);
+            let forces = model.forces_with(&friction, pressures_pa, bristle_m, motion);
+            net[i] = forces.net_n();
         }
         mechanics.evaluate(&mut state.motion, &net, h)?;
         mechanics.kick(&mut state.motion, 0.5 * h);

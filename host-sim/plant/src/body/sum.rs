@@ -123,13 +123,13 @@ impl<'a, 'n> Pressing<'a, 'n> {
 
     /// The closest place of one part, by its number from 1.
     #[inline]
-    pub(super) fn on(&mut self, number: u32, near: &Near, material: Material) {
+    pub(super) fn on(&mut self, number: u32, near: &Near, material: &Material) {
         let law = self.law;
         self.with(law, number, near, material);
     }
 
     #[inline]
-    pub(super) fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: Material) {
+    pub(super) fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: &Material) {
         let depth_m = self.radius_m - near.distance_m;
         if depth_m <= 0.0 {
             return;
@@ -149,7 +149,7 @@ impl<'a, 'n> Pressing<'a, 'n> {
             normal: near.normal,
             velocity_m_s: velocity(&sum.now, &arm),
             moved_m: sum.step_s * velocity(&sum.during, &arm),
-            material,
+            material: *material,
         };
         let force = law.force(&mut grips[slot].stretch_m, &touch);
         sum.add(force.normal_n, &near.normal, &force.force_n, &arm);
@@ -158,7 +158,7 @@ impl<'a, 'n> Pressing<'a, 'n> {
             normal: &near.normal,
             depth_m,
             slip_m_s: across(&touch.velocity_m_s, &near.normal),
-            friction: law.friction_on(&material)[0],
+            friction: law.friction_on(material)[0],
             soft: false,
         });
     }

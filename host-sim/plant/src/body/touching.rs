@@ -17,6 +17,8 @@ use crate::terrain::{Disc, Index, Near, Rim, Shape, Surface, Terrain};
 /// Rocks and solids farther than this from a foot are not looked for, where its height over the
 /// ground is asked for \[m\].
 const SIGHT_M: f64 = 0.3;
+/// More than the error of a distance \[m\].
+const ROUNDING_M: f64 = 1e-6;
 
 /// Ground on one wheel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -225,7 +227,7 @@ impl Touching {
             let part = &self.terrain.parts[number as usize];
             let near = part.shape.to_point(centre);
             if part.material.soil.is_none() || !soft(pressing.sum, number + 1, &near) {
-                pressing.on(number + 1, &near, part.material);
+                pressing.on(number + 1, &near, &part.material);
             }
         });
         pressing.end()
@@ -244,6 +246,11 @@ impl Touching {
         let law = &self.laws[1];
         self.index.near(&disc.centre_m, disc.radius_m, |number| {
             let part = &self.terrain.parts[number as usize];
+            if let Shape::Ellipsoid(rock) = &part.shape
+                && rock.is_clear_of(disc)
+            {
+                return;
+            }
             let mut is_soft = |near: &Near, share: f64| {
                 part.material.soil.is_some()
                     && self
@@ -256,13 +263,13 @@ impl Touching {
                     let Some(touch) = touch else { continue };
                     if !is_soft(&touch.near, touch.share) {
                         let law = law.scaled(touch.share);
-                        pressing.with(&law, (number + 1) | second, &touch.near, part.material);
+                        pressing.with(&law, (number + 1) | second, &touch.near, &part.material);
                     }
                 }
             } else if let Some(near) = part.shape.to_disc(disc)
                 && !is_soft(&near, 1.0)
             {
-                pressing.on(number + 1, &near, part.material);
+                pressing.on(number + 1, &near, &part.material);
             }
         });
         pressing.end();
@@ -274,16 +281,16 @@ impl Touching {
         let sole = kin.points_m()[leg];
         let axes = kin.foot_axes(leg);
         let radius = self.params.foot.sphere_radius_m;
-        let heights = SOLE.map(|direction| {
+        let mut least = f64::INFINITY;
+        for direction in SOLE {
             let centre = self.sphere_m(&sole, &axes, direction);
-            let mut least = f64::INFINITY;
-            self.index.near(&centre, SIGHT_M, |part| {
+            self.index.nearest(&centre, SIGHT_M, |part| {
                 let near = self.terrain.parts[part as usize].shape.to_point(&centre);
                 least = least.min(near.distance_m - radius);
+                SIGHT_M.min(least + radius + ROUNDING_M)
             });
-            least
-        });
-        heights.into_iter().fold(f64::INFINITY, f64::min)
+        }
+        least
     }
 
     /// Centre of a sphere of a sole, in the ground's frame \[m\].

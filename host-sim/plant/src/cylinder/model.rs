@@ -264,10 +264,23 @@ impl CylinderModel {
     #[must_use]
     #[inline]
     pub fn forces(&self, state: &CylinderState, stroke_m: f64, v_m_s: f64) -> CylinderForces {
-        let [a, b] = self.pressures_pa(state, stroke_m);
+        let pressures_pa = self.pressures_pa(state, stroke_m);
+        let friction = self.friction(pressures_pa);
+        self.forces_with(&friction, pressures_pa, state.bristle_m, (stroke_m, v_m_s))
+    }
+
+    /// The same with pressures \[Pa\] and friction that are known.
+    #[inline]
+    pub(crate) fn forces_with(
+        &self,
+        friction: &FrictionParams,
+        [a, b]: [f64; 2],
+        bristle_m: f64,
+        (stroke_m, v_m_s): (f64, f64),
+    ) -> CylinderForces {
         CylinderForces {
             pressure_n: self.pressure_force_n(a, b),
-            friction_n: -self.friction([a, b]).force_n(state.bristle_m, v_m_s),
+            friction_n: -friction.force_n(bristle_m, v_m_s),
             end_stop_n: self
                 .params
                 .end_stop

@@ -168,6 +168,21 @@ impl Ellipsoid {
         None
     }
 
+    /// Whether a plane square to the rock's surface towards the disc's centre tells the two apart.
+    /// Most rocks near a wheel need no more than this; where it is false, they may be apart as well.
+    #[must_use]
+    #[inline]
+    pub fn is_clear_of(&self, disc: &Disc) -> bool {
+        let centre = self.own(&(disc.centre_m - self.centre_m));
+        let axis = self.own(&disc.axis);
+        let normal = centre.component_div(&self.squares());
+        let along = normal.dot(&axis);
+        let across = (normal.norm_squared() - along * along).max(0.0).sqrt();
+        // Both reach so far along the normal; the rock by the root of the centre's place on it.
+        let centre = normal.dot(&centre);
+        centre - disc.radius_m * across > centre.sqrt() * (1.0 + 1e-9)
+    }
+
     /// The rim tried all round, then halved down.
     fn round_rim(&self, rim: &Rim) -> (Found, Vector3<f64>) {
         let across = rim.axis.cross(&rim.down);

@@ -220,26 +220,35 @@ impl HeightMap {
         let (i, u, inside_x) = self.locate(x_m, self.origin_m[0], self.columns);
         let (j, v, inside_y) = self.locate(y_m, self.origin_m[1], self.rows);
         let (along, up) = (weights::<BEND>(u), weights::<BEND>(v));
-        let last = [self.columns - 1, self.rows - 1];
-        // Along X, on each of four rows.
-        let four = |k: usize| {
-            let row = (j + k).saturating_sub(1).min(last[1]) * self.columns;
-            if i > 0 && i + 2 < self.columns {
-                let h = &self.heights_m[row + i - 1..row + i + 3];
+        let inner = i > 0 && i + 2 < self.columns && j > 0 && j + 2 < self.rows;
+        let rows = if inner {
+            let row = |k: usize| {
+                let first = (j + k - 1) * self.columns + i - 1;
+                let h = &self.heights_m[first..first + 4];
                 [h[0], h[1], h[2], h[3]]
-            } else {
-                let column = [i.saturating_sub(1), i, i + 1, (i + 2).min(last[0])];
-                column.map(|c| self.heights_m[row + c])
-            }
+            };
+            [row(0), row(1), row(2), row(3)]
+        } else {
+            self.rows_at_edge(i, j)
         };
-        let rows: [[f64; 4]; 4] = std::array::from_fn(four);
-        let lines = along.map(|weights| rows.map(|row| dot(&weights, &row)));
+        // Along X, on each of the four rows.
+        let line = |order: usize| {
+            let [a, b, c, d] = &rows;
+            let weights = &along[order];
+            [
+                dot(weights, a),
+                dot(weights, b),
+                dot(weights, c),
+                dot(weights, d),
+            ]
+        };
+        let lines = [line(0), line(1)];
         // Beyond the map nothing changes outwards.
         let per = |inside: bool| if inside { 1.0 / self.cell_m } else { 0.0 };
         let (per_x, per_y) = (per(inside_x), per(inside_y));
         let bend = if BEND {
             [
-                dot(&up[0], &lines[2]) * per_x * per_x,
+                dot(&up[0], &line(2)) * per_x * per_x,
                 dot(&up[1], &lines[1]) * per_x * per_y,
                 dot(&up[2], &lines[0]) * per_y * per_y,
             ]
@@ -254,6 +263,16 @@ impl HeightMap {
             ],
             bend,
         }
+    }
+
+    /// The four rows of four values around a cell at the map's edge, which goes on level.
+    #[cold]
+    fn rows_at_edge(&self, i: usize, j: usize) -> [[f64; 4]; 4] {
+        let [columns, rows] = [(i, self.columns), (j, self.rows)].map(|(cell, count)| {
+            let around = [cell.saturating_sub(1), cell, cell + 1, cell + 2];
+            around.map(|k| k.min(count - 1))
+        });
+        rows.map(|row| columns.map(|column| self.heights_m[row * self.columns + column]))
     }
 
     /// Distance of a point from the tangent plane below it.

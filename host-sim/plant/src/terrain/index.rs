@@ -186,28 +186,44 @@ impl Index {
     /// not depend on the place.
     #[inline]
     pub fn near(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32)) {
-        self.everywhere.iter().for_each(|part| f(*part));
+        self.nearest(centre_m, reach_m, |part| {
+            f(part);
+            reach_m
+        });
+    }
+
+    /// As [`Self::near`]; `f` gives the distance beyond which further parts are no matter \[m\],
+    /// at most the one before.
+    #[inline]
+    pub fn nearest(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32) -> f64) {
+        let mut reach_m = reach_m;
+        for part in &self.everywhere {
+            reach_m = f(*part);
+        }
         let mut grid = Some(self);
         while let Some(index) = grid {
-            index.near_in_grid(centre_m, reach_m, &mut f);
+            index.near_in_grid(centre_m, &mut reach_m, &mut f);
             grid = index.coarse.as_deref();
-            grid.iter()
-                .flat_map(|g| &g.everywhere)
-                .for_each(|part| f(*part));
+            for part in grid.iter().flat_map(|g| &g.everywhere) {
+                reach_m = f(*part);
+            }
         }
     }
 
     #[inline]
-    fn near_in_grid(&self, centre_m: &Vector3<f64>, reach_m: f64, f: &mut impl FnMut(u32)) {
+    fn near_in_grid(
+        &self,
+        centre_m: &Vector3<f64>,
+        reach_m: &mut f64,
+        f: &mut impl FnMut(u32) -> f64,
+    ) {
         if self.items.is_empty() {
             return;
         }
-        let low: [f64; 3] = std::array::from_fn(|i| centre_m[i] - reach_m);
-        let high: [f64; 3] = std::array::from_fn(|i| centre_m[i] + reach_m);
-        let Some(covered) = self.covered([low[0], low[1]], [high[0], high[1]]) else {
+        let corner = |reach_m: f64| [centre_m.x + reach_m, centre_m.y + reach_m];
+        let Some([from, to]) = self.covered(corner(-*reach_m), corner(*reach_m)) else {
             return;
         };
-        let [from, to] = covered;
         for y in from[1]..=to[1] {
             for x in from[0]..=to[0] {
                 let cell = y as usize * self.size[0] as usize + x as usize;
@@ -216,10 +232,11 @@ impl Index {
                     // A part in several of these cells is given in the first of them.
                     let first = [item.first[0].max(from[0]), item.first[1].max(from[1])];
                     let meets = |i: usize| {
-                        item.bounds.low_m[i] <= high[i] && item.bounds.high_m[i] >= low[i]
+                        item.bounds.low_m[i] <= centre_m[i] + *reach_m
+                            && item.bounds.high_m[i] >= centre_m[i] - *reach_m
                     };
                     if first == [x, y] && meets(0) && meets(1) && meets(2) {
-                        f(item.part);
+                        *reach_m = f(item.part);
                     }
                 }
             }

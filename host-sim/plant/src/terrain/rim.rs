@@ -9,6 +9,8 @@
 //! Two peaks that run into each other are one. Each then bears less, to half, so that the force
 //! does not jump.
 
+use std::sync::LazyLock;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +22,13 @@ use crate::hash::StateHasher;
 const LOOKS: usize = 25;
 /// Farthest of them from the lowest point \[rad\]: 84°.
 const SIDE: f64 = 1.466_076_571_675_237;
+/// These angles, with their sine and cosine.
+static DIRECTIONS: LazyLock<[(f64, (f64, f64)); LOOKS]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let angle = (2.0 * k as f64 / (LOOKS - 1) as f64 - 1.0) * SIDE;
+        (angle, libm::sincos(angle))
+    })
+});
 /// Time until it is looked at again \[s\].
 const AGAIN_S: f64 = 1e-3;
 /// Peaks farther than this above the ground are let go \[m\].
@@ -164,19 +173,20 @@ impl Rim {
             return;
         }
         let Some(axes) = Axes::of(disc) else { return };
-        let angle = |k: usize| (2.0 * k as f64 / (LOOKS - 1) as f64 - 1.0) * SIDE;
-        let far = |angle: f64| {
-            let [out, _] = axes.at(angle);
-            map.near(&(disc.centre_m + disc.radius_m * out)).distance_m
-        };
-        let distances: [f64; LOOKS] = std::array::from_fn(|k| far(angle(k)));
+        let directions = &*DIRECTIONS;
+        let [down, across] = &axes.0;
+        let mut distances = [0.0; LOOKS];
+        for (distance_m, (_, (s, c))) in distances.iter_mut().zip(directions) {
+            let out = *c * down + *s * across;
+            *distance_m = map.near(&(disc.centre_m + disc.radius_m * out)).distance_m;
+        }
         let mut best: [Option<(f64, f64)>; 2] = [None; 2];
         for k in 1..LOOKS - 1 {
             let here = distances[k];
             if here >= distances[k - 1] || here > distances[k + 1] || here > NEAR_M {
                 continue;
             }
-            let found = Some((here, angle(k)));
+            let found = Some((here, directions[k].0));
             let deeper = |other: &Option<(f64, f64)>| other.is_none_or(|(d, _)| here < d);
             if deeper(&best[0]) {
                 best = [found, best[0]];
@@ -185,8 +195,14 @@ impl Rim {
             }
         }
         for (_, start) in best.into_iter().flatten() {
-            let climb = |a: f64, _| a + look(map, disc, &axes, a).step;
-            let peak = (0..FIRST).fold(start, climb);
+            let mut peak = start;
+            for _ in 0..FIRST {
+                let before = peak;
+                peak += look(map, disc, &axes, before).step;
+                if peak == before {
+                    break;
+                }
+            }
             let same = |k: &usize| before.there[*k] && (before.angle_rad[*k] - peak).abs() < SAME;
             let place = (0..2).find(same);
             self.put(place.unwrap_or(usize::from(before.there[0])), peak);

@@ -56,7 +56,7 @@ fn the_closest_place_of_a_rock_is_the_foot_of_its_normal() {
 #[test]
 fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
     let mut rng = Pcg64Mcg::seed_from_u64(2);
-    let (mut rims, mut sides) = (0, 0);
+    let (mut rims, mut sides, mut clear, mut apart) = (0, 0, 0, 0);
     for _ in 0..1500 {
         let (rock, [centre, _], _) = rock(&mut rng);
         let axis = vector(&mut rng, -1.0, 1.0).normalize();
@@ -66,6 +66,10 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
             radius_m: 0.15,
         };
         let near = rock.to_disc(&disc).unwrap();
+        if rock.is_clear_of(&disc) {
+            assert!(near.distance_m > 0.0, "{near:?} {rock:?} {disc:?}");
+            clear += 1;
+        }
         let u = axis.cross(&Vector3::new(0.3, 0.5, 0.81)).normalize();
         let w = axis.cross(&u);
         let mut least = f64::INFINITY;
@@ -77,6 +81,7 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
                 least = least.min(rock.to_point(&point).distance_m);
             }
         }
+        apart += u32::from(least > 0.0);
         // Deeper than any contact: the nearest way out may be another.
         if least < -2e-3 {
             continue;
@@ -103,6 +108,8 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
         }
     }
     assert!(rims > 500 && sides > 100, "{rims} {sides}");
+    // Most of those that are apart are told without the search.
+    assert!(2 * clear > apart, "{clear} {apart}");
 }
 
 /// A sphere of the same radius as a wheel: sin gamma as on an edge of its height.
@@ -232,6 +239,41 @@ fn the_index_misses_nothing_and_gives_nothing_twice() {
         }
     }
     assert!(found > 1000, "{found}");
+}
+
+/// A search that narrows as it finds gives the same least distance from fewer parts.
+#[test]
+fn a_search_that_narrows_finds_the_nearest_part() {
+    let mut rng = Pcg64Mcg::seed_from_u64(6);
+    let rocks = field().scatter(|_, _| 0.0).unwrap();
+    let part = |rock| Part {
+        shape: Shape::Ellipsoid(rock),
+        material: Material::ROUGH,
+    };
+    let parts: Vec<Part> = rocks.into_iter().map(part).collect();
+    let index = Index::new(&parts);
+    let (mut asked, mut all) = (0, 0);
+    for _ in 0..5000 {
+        let at = Vector3::new(
+            rng.random_range(0.0..10.0),
+            rng.random_range(-3.0..3.0),
+            rng.random_range(-0.1..0.2),
+        );
+        let far = |number: u32| parts[number as usize].shape.to_point(&at).distance_m;
+        let mut least = 0.3_f64;
+        index.near(&at, 0.3, |number| {
+            least = least.min(far(number));
+            all += 1;
+        });
+        let mut narrowed = 0.3_f64;
+        index.nearest(&at, 0.3, |number| {
+            narrowed = narrowed.min(far(number));
+            asked += 1;
+            narrowed + 1e-6
+        });
+        assert_eq!(least.to_bits(), narrowed.to_bits(), "{at}");
+    }
+    assert!(4 * asked < 3 * all, "{asked} of {all}");
 }
 
 /// The robot over a field: it stands, and stands on the same rocks with or without many others.
