@@ -25,7 +25,7 @@ use wheeleg_telemetry::channels;
 use crate::api::{self, Peer};
 use crate::error::ConsoleError;
 use crate::foxglove::{self, Viewers};
-use crate::guard::{Hosts, Places, WrongKeys, is_host, is_origin};
+use crate::guard::{Hosts, Places, WrongKeys, is_host, is_local, is_origin};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
@@ -409,7 +409,12 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<Tls
         let place = Arc::new(place);
         let router = router
             .clone()
-            .layer(Extension(Peer(peer)))
+            .layer(Extension(Peer {
+                ip: peer.ip(),
+                is_local: stream
+                    .local_addr()
+                    .is_ok_and(|own| is_local(peer.ip(), own.ip())),
+            }))
             .layer(Extension(Arc::clone(&place)));
         let tls = tls.clone();
         tokio::spawn(async move {

@@ -2,16 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
-use super::{Asked, Inner, Pending, Role, TICKET};
+use super::{Asked, Client, Inner, Pending, Role, TICKET};
 use crate::desk::{ClientId, Denied};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use crate::reason::Reason;
 use crate::request::{HostCommand, Order, Spoken};
 
+const RELEASE: CommandCode = CommandCode::ReleaseControl;
 /// The holder of the control is told of one who asks for it so often at most: who asks without end
 /// fills no queue of theirs.
 const ASKED: Duration = Duration::from_secs(1);
@@ -33,6 +34,7 @@ impl Inner {
             return self.tell(id, &refused(n, Reason::Role, text));
         }
         let holds = self.desk.holds(id);
+        let now = Instant::now();
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
                 let text = "a stop is no command that waits: send {\"op\":\"stop\"}";
@@ -41,19 +43,18 @@ impl Inner {
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
                 let who = (&*client.name, &*client.session);
-                match self.desk.ask(id, who, takes) {
+                match self.desk.ask(id, who, takes, now) {
                     Ok(()) => {}
                     Err(Denied::Held) => {
-                        let now = Instant::now();
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
                         if !told {
                             client.asked = Some(now);
-                            let asked = json!({ "op": "asked", "by": client.name });
+                            let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
                             if let Some(holder) = self.desk.holder() {
                                 self.tell(holder.client, &asked);
                             }
                         }
-                        return self.tell(id, &self.held(n));
+                        return self.tell(id, &self.held(n, now));
                     }
                     Err(Denied::NotInControl) => {
                         let text = "take the control first";
@@ -75,9 +76,44 @@ impl Inner {
                 };
                 (input, what)
             }
+            Order::HandOver(to) => {
+                if !holds {
+                    let text = "take the control first";
+                    return self.tell(id, &refused(n, Reason::NotInControl, text));
+                }
+                let drives = |(other, client): &(&ClientId, &Client)| {
+                    client.session == to && client.role == Role::Control && **other != id
+                };
+                let Some((&heir, _)) = self.clients.iter().find(drives) else {
+                    let text = "`to`: no other client that may drive has this session";
+                    return self.tell(id, &refused(n, Reason::BadArgument, text));
+                };
+                let spoken = Spoken {
+                    cmd: RELEASE.name().to_owned(),
+                    args: Map::new(),
+                };
+                let input = Input::Request {
+                    id: self.next_request,
+                    seen_us,
+                    valid_us,
+                    command: Command::ReleaseControl,
+                    spoken,
+                    by: None,
+                };
+                (input, Asked::HandOver(heir))
+            }
+            Order::Host(HostCommand::Revoke) => {
+                if !client.is_local {
+                    let text = "the control is taken away at the robot's own computer alone";
+                    return self.tell(id, &refused(n, Reason::Role, text));
+                }
+                let id = self.next_request;
+                let command = HostCommand::Revoke;
+                (Input::Host { id, command }, Asked::Revoke)
+            }
             Order::Host(command) => {
                 if self.desk.holder().is_some() && !holds {
-                    return self.tell(id, &self.held(n));
+                    return self.tell(id, &self.held(n, now));
                 }
                 let what = match &command {
                     HostCommand::Inject(fault) => Asked::Inject(*fault),
@@ -101,7 +137,7 @@ impl Inner {
         let pending = Pending {
             client: id,
             n,
-            since: Instant::now(),
+            since: now,
             accepted: false,
             what,
         };
@@ -110,9 +146,12 @@ impl Inner {
     }
 
     /// The answer to who wants what another holds.
-    fn held(&self, n: u64) -> Value {
-        let name = self.desk.holder().map_or("", |holder| &holder.name);
-        let text = format!("{name:?} holds the control");
+    fn held(&self, n: u64, now: Instant) -> Value {
+        let name = self.desk.name(now).unwrap_or_default();
+        let text = match self.desk.holder() {
+            Some(_) => format!("{name:?} holds the control"),
+            None => format!("the control is kept for {name:?}, for 2 s"),
+        };
         let mut answer = refused(n, Reason::ControlHeld, &text);
         answer["holder"] = json!(name);
         answer["age_ms"] = json!(self.age_ms());
@@ -146,10 +185,13 @@ impl Inner {
                 self.desk.grant(client, time_us);
                 if let Some(holder) = self.desk.holder() {
                     self.last_holder.clone_from(&holder.name);
+                    self.revoked_by = None;
                 }
             }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
+            Some(Asked::HandOver(heir)) if is_done => self.handed_over(client, heir),
+            Some(Asked::Revoke) if is_done => self.revoked(client),
             Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
@@ -160,6 +202,28 @@ impl Inner {
             _ => {}
         }
         self.tell(client, &message);
+    }
+
+    fn handed_over(&mut self, client: ClientId, heir: ClientId) {
+        // Where one of them is gone by now, it is a release.
+        self.desk.release(client);
+        let [from, to] = [client, heir].map(|id| Some(&*self.clients.get(&id)?.name));
+        let (Some(from), Some(to)) = (from, to) else {
+            return;
+        };
+        let offered = json!({ "op": "offered", "by": from });
+        self.desk.hand_over(client, (heir, to), Instant::now());
+        self.tell(heir, &offered);
+    }
+
+    fn revoked(&mut self, by: ClientId) {
+        let name = self.clients.get(&by).map(|client| client.name.clone());
+        let name = name.unwrap_or_default();
+        if let Some(holder) = self.desk.holder() {
+            let revoked = json!({ "op": "revoked", "by": name });
+            self.tell(holder.client, &revoked);
+            self.revoked_by = Some(name);
+        }
     }
 
     pub(super) fn take_status(&mut self, status: Status) {
