@@ -56,13 +56,9 @@ impl Desk {
 
     /// Name of the client that has the control, or for which it is kept.
     #[must_use]
-    pub fn name(&self, now: Instant) -> Option<&str> {
+    pub fn name(&self) -> Option<&str> {
         let holder = self.holder.as_ref().map(|holder| &*holder.name);
-        holder.or_else(|| Some(&*self.heir(now)?.name))
-    }
-
-    fn heir(&self, now: Instant) -> Option<&Heir> {
-        self.heir.as_ref().filter(|heir| now < heir.until)
+        holder.or_else(|| Some(&*self.heir.as_ref()?.name))
     }
 
     /// Whether this client does.
@@ -80,9 +76,9 @@ impl Desk {
         client: ClientId,
         (name, session): (&str, &str),
         takes: bool,
-        now: Instant,
     ) -> Result<(), Denied> {
-        let kept = self.heir(now).is_some_and(|heir| heir.client != client);
+        let heir = self.heir.as_ref();
+        let kept = heir.is_some_and(|heir| heir.client != client);
         match &self.holder {
             Some(holder) if holder.client == client => Ok(()),
             Some(_) if takes => Err(Denied::Held),
@@ -129,6 +125,11 @@ impl Desk {
         });
     }
 
+    /// It is `now`: what was kept for too long is free.
+    pub fn free(&mut self, now: Instant) {
+        self.heir.take_if(|heir| now >= heir.until);
+    }
+
     /// A client is gone: nothing is kept for it. What it holds ends with its beats, at the master.
     pub fn leave(&mut self, client: ClientId) {
         self.heir.take_if(|heir| heir.client == client);
@@ -150,13 +151,12 @@ mod tests {
 
     #[test]
     fn one_drives_until_it_releases_or_the_master_says_that_it_is_gone() {
-        let now = Instant::now();
         let mut desk = Desk::default();
-        assert_eq!(desk.ask(1, A, false, now), Err(Denied::NotInControl));
-        assert_eq!(desk.ask(1, A, true, now), Ok(()));
+        assert_eq!(desk.ask(1, A, false), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(1, A, true), Ok(()));
         // Asked for, and not yet granted.
-        assert_eq!(desk.ask(2, B, true, now), Err(Denied::Held));
-        assert_eq!(desk.ask(2, B, false, now), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(2, B, true), Err(Denied::Held));
+        assert_eq!(desk.ask(2, B, false), Err(Denied::NotInControl));
         desk.grant(2, 10);
         desk.grant(1, 10);
         desk.withdraw(1);
@@ -168,7 +168,7 @@ mod tests {
         assert!(desk.holds(1));
         desk.look(11, false);
         assert_eq!(desk.holder(), None);
-        assert_eq!(desk.ask(2, B, true, now), Ok(()));
+        assert_eq!(desk.ask(2, B, true), Ok(()));
         desk.withdraw(1);
         assert!(desk.holds(2));
         desk.withdraw(2);
@@ -180,36 +180,38 @@ mod tests {
         let now = Instant::now();
         let held_by_a = || {
             let mut desk = Desk::default();
-            assert_eq!(desk.ask(1, A, true, now), Ok(()));
+            assert_eq!(desk.ask(1, A, true), Ok(()));
             desk.grant(1, 10);
             desk.hand_over(1, (2, "b"), now);
             desk
         };
         let mut desk = held_by_a();
-        assert_eq!((desk.holder(), desk.name(now)), (None, Some("b")));
+        assert_eq!((desk.holder(), desk.name()), (None, Some("b")));
         for other in [1, 3] {
-            assert_eq!(desk.ask(other, A, true, now), Err(Denied::Held));
+            assert_eq!(desk.ask(other, A, true), Err(Denied::Held));
         }
         // It is nobody's yet, the heir's neither.
-        assert_eq!(desk.ask(2, B, false, now), Err(Denied::NotInControl));
-        assert_eq!(desk.ask(2, B, true, now), Ok(()));
+        assert_eq!(desk.ask(2, B, false), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(2, B, true), Ok(()));
         // The master may refuse it; it is kept all the same.
         desk.withdraw(2);
-        assert_eq!(desk.ask(3, A, true, now), Err(Denied::Held));
-        assert_eq!(desk.ask(2, B, true, now), Ok(()));
+        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
+        assert_eq!(desk.ask(2, B, true), Ok(()));
         desk.grant(2, 20);
         desk.release(2);
-        assert_eq!(desk.ask(3, A, true, now), Ok(()), "kept once, not for ever");
+        assert_eq!(desk.ask(3, A, true), Ok(()), "kept once, not for ever");
 
         let mut desk = held_by_a();
-        let later = now + KEPT;
-        assert_eq!(desk.name(later), None);
-        assert_eq!(desk.ask(3, A, true, later), Ok(()));
+        desk.free(now + KEPT / 2);
+        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
+        desk.free(now + KEPT);
+        assert_eq!(desk.name(), None);
+        assert_eq!(desk.ask(3, A, true), Ok(()));
 
         let mut desk = held_by_a();
         desk.leave(3);
-        assert_eq!(desk.ask(3, A, true, now), Err(Denied::Held));
+        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
         desk.leave(2);
-        assert_eq!(desk.ask(3, A, true, now), Ok(()));
+        assert_eq!(desk.ask(3, A, true), Ok(()));
     }
 }

@@ -242,7 +242,7 @@ const byHand = driver(command);
 const parameters = parametersView(command, () => (link ? link.ask("parameters") : Promise.reject(new Error(lost))));
 /** Who asked for the control last, and how long that is offered here. @type {{session: string, until_ms: number} | null} */
 let heir = null;
-const handOver = html("button", { class: "btn", type: "button", hidden: true, onclick: () => heir && command("HandOver", { to: heir.session }) });
+const handOver = html("div", { class: "row", hidden: true }, html("button", { class: "btn", type: "button", onclick: () => heir && command("HandOver", { to: heir.session }) }));
 const mine = () => Boolean(link && now.state?.control?.session === link.session);
 const stepping = () => Boolean(now.state?.stepping);
 
@@ -301,7 +301,7 @@ function build({ robot, commands: list, faults: injectable }) {
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), html("div", { class: "row" }, handOver), answer),
+        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), handOver, answer),
         faults.root,
         boards.root,
         byHand.root,
@@ -385,7 +385,7 @@ const listener = {
   asked(by, session) {
     say(answer, `${by} asks for the control.`);
     heir = { session, until_ms: performance.now() + ASKED_MS };
-    say(handOver, `Hand the control over to ${by}`);
+    say(handOver.firstElementChild, `Hand the control over to ${by}`);
     handOver.hidden = false;
   },
   offered(by) {

@@ -33,8 +33,9 @@ impl Inner {
             let text = "the view key may look and stop; connect with the control key";
             return self.tell(id, &refused(n, Reason::Role, text));
         }
-        let holds = self.desk.holds(id);
         let now = Instant::now();
+        self.desk.free(now);
+        let holds = self.desk.holds(id);
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
                 let text = "a stop is no command that waits: send {\"op\":\"stop\"}";
@@ -43,7 +44,7 @@ impl Inner {
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
                 let who = (&*client.name, &*client.session);
-                match self.desk.ask(id, who, takes, now) {
+                match self.desk.ask(id, who, takes) {
                     Ok(()) => {}
                     Err(Denied::Held) => {
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
@@ -54,7 +55,7 @@ impl Inner {
                                 self.tell(holder.client, &asked);
                             }
                         }
-                        return self.tell(id, &self.held(n, now));
+                        return self.tell(id, &self.held(n));
                     }
                     Err(Denied::NotInControl) => {
                         let text = "take the control first";
@@ -113,7 +114,7 @@ impl Inner {
             }
             Order::Host(command) => {
                 if self.desk.holder().is_some() && !holds {
-                    return self.tell(id, &self.held(n, now));
+                    return self.tell(id, &self.held(n));
                 }
                 let what = match &command {
                     HostCommand::Inject(fault) => Asked::Inject(*fault),
@@ -146,8 +147,8 @@ impl Inner {
     }
 
     /// The answer to who wants what another holds.
-    fn held(&self, n: u64, now: Instant) -> Value {
-        let name = self.desk.name(now).unwrap_or_default();
+    fn held(&self, n: u64) -> Value {
+        let name = self.desk.name().unwrap_or_default();
         let text = match self.desk.holder() {
             Some(_) => format!("{name:?} holds the control"),
             None => format!("the control is kept for {name:?}, for 2 s"),

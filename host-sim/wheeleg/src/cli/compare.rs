@@ -162,7 +162,12 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
     };
     let settings = settings(&args.out, args.drawing.png)?;
     let finished = compare::compare(&options, &settings)?;
-    end(finished, args.json, |f| text(&f.result, &f.report, args.verbose), true)
+    end(
+        finished,
+        args.json,
+        |f| text(&f.result, &f.report, args.verbose),
+        true,
+    )
 }
 
 /// The tables of the axes, false alarms, and where the report is.

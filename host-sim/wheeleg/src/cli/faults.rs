@@ -140,7 +140,11 @@ fn verdicts(outcomes: &[Outcome], report: &Path, all: bool) -> String {
         count(Verdict::Pass),
         count(Verdict::Fail),
         count(Verdict::NotImplemented),
-        if all { "" } else { "; --verbose shows them all" },
+        if all {
+            ""
+        } else {
+            "; --verbose shows them all"
+        },
     );
     out.push_str(&place(report, 8));
     out
@@ -213,7 +217,9 @@ mod tests {
 
     #[test]
     fn what_failed_comes_first_and_what_passed_is_told_if_it_is_wanted() {
-        let missing = matrix::ROWS.iter().find(|row| row.not_implemented().is_some());
+        let missing = matrix::ROWS
+            .iter()
+            .find(|row| row.not_implemented().is_some());
         let missing = missing.expect("a row that is not implemented");
         let outcomes = matrix::run(&[missing], 1, &Progress::silent()).expect("listed");
         let [missing] = &outcomes[..] else {
@@ -238,7 +244,10 @@ mod tests {
         };
         let (few, text) = rows(false);
         assert_eq!(few, ["FAIL", ""], "{text}");
-        assert!(text.contains("1 rows passed, 1 failed, 1 not implemented; --verbose"), "{text}");
+        assert!(
+            text.contains("1 rows passed, 1 failed, 1 not implemented; --verbose"),
+            "{text}"
+        );
         let (all, text) = rows(true);
         assert_eq!(all, ["FAIL", "", "PASS", "not implemented", ""], "{text}");
         assert!(!text.contains("--verbose"), "{text}");
