@@ -281,7 +281,11 @@ impl Seen {
             },
         );
         let board = &self.state["boards"][n - 1];
-        let mode = board["mode"].as_str().map_or("missing".to_owned(), plain);
+        let mode = match &board["mode"] {
+            Value::String(mode) => plain(mode),
+            _ if board.is_null() => "-".to_owned(),
+            _ => "missing".to_owned(),
+        };
         format!(
             "{n} {name:18}{:>9}{:>9}{error:>9}{:>8}{:>8}  {valves:10}{mode}",
             self.number(&topic, "commanded_mm", 1),
