@@ -13,6 +13,9 @@ const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
 const FIRST_WHEEL = 7;
 const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "text"];
 
+/** A board tells of its own log. */
+const DIAGNOSIS = "diagnosis";
+
 /** A board as texts of events name it. @param {number} board */
 const name = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
 
@@ -84,7 +87,12 @@ export function eventsView() {
     const before = at < 0 ? event.text : event.text.slice(0, at);
     const after = at < 0 ? "" : event.text.slice(at + name(event.board).length);
     /** @param {Line} line */
-    const alike = (line) => line.boards.length > 0 && line.before === before && line.after === after && line.events[0].kind === event.kind && line.events[0].code === event.code && !line.boards.includes(event.board);
+    const alike = (line) => {
+      const [other] = line.events;
+      // Each board says for itself how long ago its first fault was.
+      const told = event.code === DIAGNOSIS || (line.before === before && line.after === after);
+      return told && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
+    };
     const known = at < 0 ? undefined : lines.find((line, i) => i < RECENT && Math.abs(event.t_ns - line.events[0].t_ns) <= ALIKE_NS && alike(line));
     if (known) {
       known.events.push(event);

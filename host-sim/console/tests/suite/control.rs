@@ -471,10 +471,10 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     look(&mut viewer, "state");
     assert_eq!(refusal(&mut viewer, "Revoke", &nothing), "role");
     done(&mut local, "Revoke");
+    assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
     // It asks anew before it is gone: that gains nothing.
     assert_eq!(refusal(&mut driver, "TakeControl", &nothing), "revoked");
-    assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     // It goes on to beat all the while.
     let state = until_driven(&rig, &mut driver, |state| state["control"].is_null());
     assert_eq!(
