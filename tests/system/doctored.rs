@@ -57,7 +57,7 @@ impl Place {
     /// A campaign of six cases that are given up after `limit`, and its table.
     fn campaign(&self, limit: &str) {
         let plan = format!(
-            "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nsamples = 6\n[base]\nscenario = \"stand\"\n"
+            "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nreplicates = 6\n[base]\nscenario = \"stand\"\n"
         );
         self.write("plan.toml", &plan);
         for arguments in [
@@ -379,6 +379,33 @@ fn server(answer: &'static [u8], pause: Duration) -> String {
     address
 }
 
+/// A server that refuses a request for a stop, as one does that lets look alone, and begins a session
+/// byte by byte.
+fn look_only_server(pause: Duration) -> String {
+    use std::io::{Read as _, Write as _};
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for (number, stream) in listener.incoming().flatten().enumerate() {
+            std::thread::spawn(move || {
+                let mut stream = stream;
+                let _ = stream.read(&mut [0; 4096]);
+                if number == 0 {
+                    let _ = stream.write_all(b"HTTP/1.1 403 Forbidden\r\n\r\n{}");
+                    return;
+                }
+                while stream
+                    .write_all(b"HTTP/1.1 101 Switching Protocols\r\nX: ")
+                    .is_ok()
+                {
+                    std::thread::sleep(pause);
+                }
+            });
+        }
+    });
+    address
+}
+
 /// Who stops a robot is told that nobody confirms, whatever answers in its place: nothing, something
 /// else, or something that does not end.
 #[cfg(unix)]
@@ -407,6 +434,30 @@ fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
         let status = [&ctl[..], &["status"]].concat();
         place.refusal(&status, 2, &[&address, words]);
     }
+    // A handshake of TLS that does not end, and a session that is not begun: one after the other, the
+    // answer before them included, is waited for no longer than one.
+    let record = [
+        &b"\x16\x03\x03\x40\x00\x02\x00\x3f\xfc\x03\x03"[..],
+        &[7; 400],
+    ]
+    .concat();
+    let address = format!("https://{}", server(record.leak(), drip));
+    let fingerprint = "ab".repeat(32);
+    let ctl = [
+        "ctl",
+        "--url",
+        &address,
+        "--key",
+        "key",
+        "--fingerprint",
+        &fingerprint,
+        "stop",
+    ];
+    let words = ["NOT CONFIRMED: CUT THE AIR", "no answer within 3 s"];
+    place.refusal(&ctl, 3, &words);
+    let address = look_only_server(drip);
+    let ctl = ["ctl", "--url", &address, "--key", "key", "stop"];
+    place.refusal(&ctl, 3, &words);
     // Over a session, too, another server is told as one.
     for answer in [&b"\x00\xff\x00\xff\r\n\r\n"[..], page] {
         let address = server(answer, none);

@@ -457,3 +457,45 @@ fn the_record_names_tests_that_exist() {
     }
     assert!(seen > 30, "{seen}");
 }
+
+/// A disk without room for the head of a log: nothing is begun, and no part of a log stays. A limit of the
+/// shell on the size of a file is such a disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_log_whose_head_has_no_room_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    for kilobytes in [1, 8] {
+        let shell = format!("ulimit -f {kilobytes}; exec \"$0\" run stand --out out-{kilobytes}");
+        let output = std::process::Command::new("bash")
+            .current_dir(folder.path())
+            .args(["-c", &shell])
+            .arg(program::path())
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{kilobytes}: {said}");
+        let log = folder.path().join(format!("out-{kilobytes}/log.mcap"));
+        assert!(!log.exists(), "{kilobytes}: {said}");
+    }
+}
+
+/// A limit on the size of a file that is met later: verdict and summary are there, and what is missing is
+/// named.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let output = std::process::Command::new("bash")
+        .current_dir(folder.path())
+        .args(["-c", "ulimit -f 1000; exec \"$0\" run three-step --out out"])
+        .arg(program::path())
+        .output()
+        .expect("start");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("cannot write the log: File too large"),
+        "{said}"
+    );
+    assert!(folder.path().join("out/summary.json").is_file(), "{said}");
+}

@@ -29,6 +29,7 @@ mod field;
 mod figures;
 mod foot_sides;
 mod hostile_logs;
+mod hostile_tables;
 mod long_runs;
 mod moving_mass;
 mod mutated_files;

@@ -20,7 +20,7 @@ pub(crate) const VERSION: &str = "0.13.2";
 const FOLDER: &str = "tests/fuzz";
 
 /// The targets, and the longest input that each is given.
-const TARGETS: [(&str, u32); 12] = [
+const TARGETS: [(&str, u32); 13] = [
     ("decoder", 2000),
     ("frames", 4000),
     ("parse", 200),
@@ -32,11 +32,12 @@ const TARGETS: [(&str, u32); 12] = [
     ("scenario", 40_000),
     ("files", 60_000),
     ("written", 16_000),
+    ("tables", 4_000),
     ("console", 4_096),
 ];
 
 /// Targets that read the simulator's files; a long build.
-const OF_THE_SIMULATOR: [&str; 4] = ["scenario", "files", "written", "console"];
+const OF_THE_SIMULATOR: [&str; 5] = ["scenario", "files", "written", "tables", "console"];
 
 /// Seconds for each target in the test suite.
 const SUITE_SECONDS: u64 = 4;

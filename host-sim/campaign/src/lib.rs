@@ -29,6 +29,7 @@ mod host;
 mod identity;
 mod isolate;
 mod merge;
+mod pages;
 mod panics;
 mod part;
 mod program;

@@ -9,10 +9,11 @@ use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Stop;
 
 use crate::columns::{Columns, FACT};
+use crate::pages::GROUP_ROWS;
 use crate::part::{self, PLAN, PROGRAM};
 use crate::row::{self, Row};
 use crate::store::Store;
-use crate::table::{Data, GROUP_ROWS, Table, TableWriter};
+use crate::table::{Data, Table, TableWriter};
 use crate::{CampaignError, Cases, host};
 
 /// What was merged.

@@ -6,7 +6,6 @@ use std::path::Path;
 use wheeleg_config::{open_file, word};
 
 use crate::columns::{Column, Columns, FACT, Kind};
-use crate::panics::caught;
 use crate::row::{self, Row};
 use crate::table::{Data, Table, TableReader, TableWriter};
 use crate::{host, program};
@@ -105,18 +104,14 @@ pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), N
 /// Table of a part, if it is one of this plan and program.
 pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
     let file = open(path)?;
-    // Damaged bytes must not end the program, whatever the library does with them.
-    let read = caught(|| {
-        let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
-        let reader = TableReader::new(file).map_err(torn)?;
-        of(&reader, plan)?;
-        let table = reader.read().map_err(torn)?;
-        if reader.fact(ROWS) != Some(table.digest().as_str()) {
-            return Err(NotAPart::Torn("its values were changed".to_owned()));
-        }
-        Ok(table)
-    });
-    read.unwrap_or_else(|_| Err(NotAPart::Torn("its bytes are damaged".to_owned())))
+    let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
+    let reader = TableReader::new(file).map_err(torn)?;
+    of(&reader, plan)?;
+    let table = reader.read().map_err(torn)?;
+    if reader.fact(ROWS) != Some(table.digest().as_str()) {
+        return Err(NotAPart::Torn("its values were changed".to_owned()));
+    }
+    Ok(table)
 }
 
 fn open(path: &Path) -> Result<File, NotAPart> {
@@ -126,7 +121,7 @@ fn open(path: &Path) -> Result<File, NotAPart> {
     })
 }
 
-fn of(reader: &TableReader<File>, plan: &str) -> Result<(), NotAPart> {
+fn of(reader: &TableReader, plan: &str) -> Result<(), NotAPart> {
     let own = program();
     for (key, own) in [(PLAN, plan), (PROGRAM, own.as_str())] {
         let found = reader.fact(key).unwrap_or("nothing");

@@ -1,5 +1,7 @@
 //! A table in memory, a column at a time, and as Parquet.
 
+use std::fs::File;
+use std::path::Path;
 use std::sync::Arc;
 
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
@@ -9,15 +11,18 @@ use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{ChunkReader, FileReader as _};
+use parquet::file::reader::FileReader as _;
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
+use wheeleg_config::open_file;
 
 use crate::columns::{Column, Kind};
+use crate::panics::caught;
+use crate::{CampaignError, pages};
 
-/// Rows of a row group in a table of many parts.
-pub(crate) const GROUP_ROWS: usize = 65_536;
+/// Bytes of the texts of a column in a row group.
+const GROUP_TEXT: usize = 1 << 25;
 
 /// Values of one column; `None` is null.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,6 +141,40 @@ impl Table {
             Some(Data::Text(v)) => v,
             _ => &[],
         }
+    }
+
+    /// Writes it to a new file that says `facts` of itself, besides its columns.
+    ///
+    /// # Errors
+    /// What the operating system or the library says.
+    pub fn write_to(&self, path: &Path, facts: &[(&str, &str)]) -> std::io::Result<()> {
+        let columns = serde_json::to_string(&self.columns)?;
+        let mut all = vec![(crate::columns::FACT, columns.as_str())];
+        all.extend(facts);
+        let write = || {
+            let file = File::create_new(path)?;
+            let mut writer = TableWriter::new(file, &self.columns, &all)?;
+            writer.write(self)?;
+            writer.finish().map(drop)
+        };
+        write().map_err(|e: ParquetError| std::io::Error::other(e))
+    }
+
+    /// Reads a file, and of what it says of itself the values of these keys.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] for one that is no table, damaged, or made to look like one.
+    pub fn read_from(
+        path: &Path,
+        keys: &[&str],
+    ) -> Result<(Self, Vec<Option<String>>), CampaignError> {
+        let file = open_file(path).map_err(|e| CampaignError::unreadable(path, e))?;
+        let read = || {
+            let reader = TableReader::new(file)?;
+            let facts = keys.iter().map(|key| reader.fact(key).map(str::to_owned));
+            Ok((reader.read()?, facts.collect()))
+        };
+        read().map_err(|e: ParquetError| CampaignError::unreadable(path, e))
     }
 
     /// Hash of all columns and values, hexadecimal.
@@ -266,16 +305,27 @@ fn schema(columns: &[Column]) -> Result<Arc<Type>, ParquetError> {
     Ok(Arc::new(schema))
 }
 
+/// Damaged bytes must not end the program, whatever the library does with them.
+fn sound<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    let read = caught(read);
+    read.unwrap_or_else(|_| Err(ParquetError::General("its bytes are damaged".to_owned())))
+}
+
 /// Reads tables that [`TableWriter`] has written.
-pub(crate) struct TableReader<R: ChunkReader + 'static> {
-    file: SerializedFileReader<R>,
+pub(crate) struct TableReader {
+    file: SerializedFileReader<File>,
     columns: Vec<Column>,
 }
 
-impl<R: ChunkReader + 'static> TableReader<R> {
-    /// Reads the footer, and from it the columns.
-    pub(crate) fn new(from: R) -> Result<Self, ParquetError> {
-        let file = SerializedFileReader::new(from)?;
+impl TableReader {
+    /// Reads the footer, and from it the columns; what it claims is compared with its bytes.
+    pub(crate) fn new(from: File) -> Result<Self, ParquetError> {
+        sound(|| Self::open(from))
+    }
+
+    fn open(from: File) -> Result<Self, ParquetError> {
+        let file = SerializedFileReader::new(from.try_clone()?)?;
+        pages::check(&from, file.metadata())?;
         let mut reader = Self {
             file,
             columns: Vec::new(),
@@ -317,6 +367,10 @@ impl<R: ChunkReader + 'static> TableReader<R> {
 
     /// One row group.
     fn read_group(&self, group: usize) -> Result<Table, ParquetError> {
+        sound(|| self.group(group))
+    }
+
+    fn group(&self, group: usize) -> Result<Table, ParquetError> {
         let group = self.file.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows())
             .map_err(|e| ParquetError::General(e.to_string()))?;
@@ -341,6 +395,12 @@ impl<R: ChunkReader + 'static> TableReader<R> {
                 (ColumnReader::ByteArrayColumnReader(mut r), Kind::Text) => {
                     let bytes: Vec<Option<ByteArray>> =
                         read_column(rows, |d, v| r.read_records(rows, Some(d), None, v))?;
+                    // Many rows may share a long text of a dictionary.
+                    let length = bytes.iter().flatten().map(ByteArray::len).sum::<usize>();
+                    if length > GROUP_TEXT {
+                        let large = format!("its texts have more than {GROUP_TEXT} bytes");
+                        return Err(ParquetError::General(large));
+                    }
                     let texts = bytes.into_iter().map(|b| match b {
                         Some(b) => String::from_utf8(b.data().to_vec()).map(Some),
                         None => Ok(None),

@@ -18,7 +18,7 @@ const PLAN: &str = "name = \"planted\"\nroot = 1\nsamples = 12\nblock = 4\n[base
      uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
 
 /// One block that takes longer than anybody waits, of cases of a few ms.
-const LONG: &str = "name = \"long\"\nroot = 1\nsamples = 2000\nblock = 4096\n[base]\n\
+const LONG: &str = "name = \"long\"\nroot = 1\nreplicates = 2000\nblock = 4096\n[base]\n\
      scenario = \"stand\"\n";
 /// Time that a case of it takes, and after which its rows are saved.
 const CASE: Duration = Duration::from_millis(5);

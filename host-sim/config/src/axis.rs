@@ -18,7 +18,7 @@ use super::params::{ParameterInfo, params};
 use super::plant::pneumatics::{self, Pneumatics, Sensing};
 use super::plant::sections::{MASS, STROKE};
 use super::reader::Reader;
-use super::relations::{self, Moved};
+use super::relations::{self, Advised, Moved, Tried};
 use super::suggest::closest;
 
 params! {
@@ -202,7 +202,7 @@ impl AxisConfig {
             allowed,
         } in reasons
         {
-            r.contradiction(fields, why, allowed);
+            r.contradiction(fields, why, allowed, Vec::new());
         }
         r.refusal(&what)
     }
@@ -215,19 +215,14 @@ impl AxisConfig {
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         let what = format!("the axis file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, true)?;
-        let top = r.table("");
-        if let Some(top) = &top {
-            r.reject_unknown(top, &[&OWN[..], &pneumatics::SECTIONS].concat());
-        }
-        let name = top.as_ref().and_then(|t| r.name(t, "name"));
-        let description = top.as_ref().and_then(|t| r.text(t, "description"));
-        let axis = read(&mut r);
-        let facts = relations::Read {
-            moved: axis.as_ref().map(moved),
-            axis: axis.as_ref(),
-            robot: None,
-        };
-        relations::check(&mut r, &facts);
+        let Parts {
+            name,
+            description,
+            axis,
+        } = Parts::read(&mut r);
+        relations::check(&mut r, &facts(axis.as_ref()), &|values| {
+            tried(file, text, values)
+        });
         if let (true, Some(axis)) = (r.is_clean(), &axis) {
             relations::check_plant(&mut r, Axis::new(axis).map(drop));
         }
@@ -251,6 +246,46 @@ impl AxisConfig {
 
 /// Names at the top of an axis file besides those of [`pneumatics`].
 const OWN: [&str; 5] = ["name", "description", "chamber", "moving", "start"];
+
+/// What an axis file is made of, as far as it could be read.
+struct Parts {
+    name: Option<String>,
+    description: Option<String>,
+    axis: Option<AxisParams>,
+}
+
+impl Parts {
+    fn read(r: &mut Reader) -> Self {
+        let top = r.table("");
+        if let Some(top) = &top {
+            r.reject_unknown(top, &[&OWN[..], &pneumatics::SECTIONS].concat());
+        }
+        Self {
+            name: top.as_ref().and_then(|t| r.name(t, "name")),
+            description: top.as_ref().and_then(|t| r.text(t, "description")),
+            axis: read(r),
+        }
+    }
+}
+
+fn facts(axis: Option<&AxisParams>) -> relations::Read<'_> {
+    relations::Read {
+        moved: axis.map(moved),
+        axis,
+        robot: None,
+    }
+}
+
+/// What the file would be refused for with other values in it.
+fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
+    let mut r = Reader::with(file, text, values)?;
+    let axis = Parts::read(&mut r).axis;
+    let built = || {
+        axis.as_ref()
+            .map_or(Ok(()), |axis| Axis::new(axis).map(drop))
+    };
+    Some(relations::tried(&mut r, &facts(axis.as_ref()), built))
+}
 
 fn read(r: &mut Reader) -> Option<AxisParams> {
     let pneumatics = Pneumatics::read(r);

@@ -8,6 +8,8 @@ use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
 };
 
+use crate::relations::Advised;
+
 /// Problems of a file that are printed; of more there is the number.
 const SHOWN: usize = 20;
 /// Longest line of a file that is shown, bytes.
@@ -103,6 +105,7 @@ pub struct Problem {
     label: String,
     span: Option<Range<usize>>,
     help: Option<String>,
+    advice: Vec<Vec<Advised>>,
 }
 
 impl Problem {
@@ -126,6 +129,7 @@ impl Problem {
             label: label.into(),
             span: shown.then_some(span),
             help: help.map(shortened),
+            advice: Vec::new(),
         }
     }
 
@@ -139,6 +143,7 @@ impl Problem {
             label: String::new(),
             span: None,
             help: help.map(shortened),
+            advice: Vec::new(),
         }
     }
 
@@ -155,6 +160,16 @@ impl Problem {
     #[must_use]
     pub fn help_text(&self) -> Option<&str> {
         self.help.as_deref()
+    }
+
+    /// Sets of values that the help names, each of which mends this without another contradiction.
+    #[must_use]
+    pub fn advice(&self) -> &[Vec<Advised>] {
+        &self.advice
+    }
+
+    pub(crate) fn advise(&mut self, advice: Vec<Vec<Advised>>) {
+        self.advice = advice;
     }
 
     pub(crate) fn position(&self) -> usize {

@@ -72,13 +72,25 @@ pub(crate) fn set_quantity(
         [one] => number(*one),
         many => Value::Array(many.iter().map(|v| number(*v)).collect()),
     };
+    let unit = (!flag).then_some(unit);
+    set_stated(document, &info.path, value, unit, source)
+}
+
+/// Writes a value with its unit and source; false where the path leads nowhere.
+pub(crate) fn set_stated(
+    document: &mut DocumentMut,
+    path: &str,
+    value: Value,
+    unit: Option<&str>,
+    source: &str,
+) -> bool {
     let mut table = InlineTable::new();
     table.insert("value", value);
-    if !flag {
+    if let Some(unit) = unit {
         table.insert("unit", unit.into());
     }
     table.insert("source", source.into());
-    set(document, &info.path, Value::InlineTable(table))
+    set(document, path, Value::InlineTable(table))
 }
 
 /// Writes a plain value; false where the path leads nowhere.

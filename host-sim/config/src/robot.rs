@@ -13,7 +13,7 @@ use super::params::{ParameterInfo, params};
 use super::plant;
 pub use super::plant::sections::SpatialParams;
 use super::reader::Reader;
-use super::relations;
+use super::relations::{self, Advised, Tried};
 
 params! {
     /// Serial bus. The reply slots of the boards are built for one rate and one cycle.
@@ -115,40 +115,20 @@ impl RobotConfig {
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         let what = format!("the robot file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, true)?;
-        let top = r.table("");
-        if let Some(top) = &top {
-            let mut known = vec![
-                "name",
-                "description",
-                "bus",
-                "homing",
-                "start_up",
-                "gait",
-                "reference",
-                "node",
-                "commissioned",
-            ];
-            known.extend(plant::SECTIONS);
-            known.extend(plant::pneumatics::SECTIONS);
-            r.reject_unknown(top, &known);
-        }
-        let name = top.as_ref().and_then(|t| r.name(t, "name"));
-        let description = top.as_ref().and_then(|t| r.text(t, "description"));
-        let bus = r.section::<BusParams>("bus");
-        let homing = r.section::<HomingParams>("homing");
-        let start_up = r.section::<StartUpParams>("start_up");
-        let gait = r.section::<GaitParams>("gait");
-        let reference = r.section::<ReferenceParams>("reference");
-        let plant = plant::read(&mut r);
-        let node = node::read(&mut r);
-        let commissioned = commissioned::read(&mut r);
+        let Parts {
+            name,
+            description,
+            bus,
+            homing,
+            start_up,
+            gait,
+            reference,
+            plant,
+            node,
+            commissioned,
+        } = Parts::read(&mut r);
         let whole = plant.as_ref().map(|(plant, _)| plant);
-        let facts = relations::Read {
-            moved: whole.map(plant::moved),
-            axis: None,
-            robot: whole,
-        };
-        relations::check(&mut r, &facts);
+        relations::check(&mut r, &facts(whole), &|values| tried(file, text, values));
         if let (true, Some(plant)) = (r.is_clean(), whole) {
             relations::check_plant(&mut r, Plant::new(plant).map(drop));
         }
@@ -191,4 +171,72 @@ impl RobotConfig {
         }
         hasher.finalize().to_hex().to_string()
     }
+}
+
+/// What a robot file is made of, as far as it could be read.
+struct Parts {
+    name: Option<String>,
+    description: Option<String>,
+    bus: Option<BusParams>,
+    homing: Option<HomingParams>,
+    start_up: Option<StartUpParams>,
+    gait: Option<GaitParams>,
+    reference: Option<ReferenceParams>,
+    plant: Option<(PlantParams, SpatialParams)>,
+    node: NodeParams,
+    commissioned: [Option<UniqueId>; 8],
+}
+
+impl Parts {
+    fn read(r: &mut Reader) -> Self {
+        let top = r.table("");
+        if let Some(top) = &top {
+            let mut known = vec![
+                "name",
+                "description",
+                "bus",
+                "homing",
+                "start_up",
+                "gait",
+                "reference",
+                "node",
+                "commissioned",
+            ];
+            known.extend(plant::SECTIONS);
+            known.extend(plant::pneumatics::SECTIONS);
+            r.reject_unknown(top, &known);
+        }
+        Self {
+            name: top.as_ref().and_then(|t| r.name(t, "name")),
+            description: top.as_ref().and_then(|t| r.text(t, "description")),
+            bus: r.section::<BusParams>("bus"),
+            homing: r.section::<HomingParams>("homing"),
+            start_up: r.section::<StartUpParams>("start_up"),
+            gait: r.section::<GaitParams>("gait"),
+            reference: r.section::<ReferenceParams>("reference"),
+            plant: plant::read(r),
+            node: node::read(r),
+            commissioned: commissioned::read(r),
+        }
+    }
+}
+
+fn facts(robot: Option<&PlantParams>) -> relations::Read<'_> {
+    relations::Read {
+        moved: robot.map(plant::moved),
+        axis: None,
+        robot,
+    }
+}
+
+/// What the file would be refused for with other values in it.
+fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
+    let mut r = Reader::with(file, text, values)?;
+    let plant = Parts::read(&mut r).plant.map(|(plant, _)| plant);
+    let built = || {
+        plant
+            .as_ref()
+            .map_or(Ok(()), |plant| Plant::new(plant).map(drop))
+    };
+    Some(relations::tried(&mut r, &facts(plant.as_ref()), built))
 }

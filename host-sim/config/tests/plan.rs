@@ -383,6 +383,15 @@ fn a_plan_needs_its_head() {
             "`samples` = 0 must be a whole number from 1",
         ),
         (
+            "name = \"x\"\nroot = 1\ncases = 0\n[base]\nscenario = \"stand\"\n",
+            "`cases` cannot be given: it is grid cells × `samples` × `replicates`",
+        ),
+        (
+            "name = \"x\"\nroot = 1\n[base]\nscenario = \"stand\"\n\
+             [factor.a]\nparameter = \"robot.friction.coulomb\"\ngrid = []\n",
+            "`factor.a.grid` = [] must be a list of at least one number",
+        ),
+        (
             "name = \"x\"\nroot = 1\nsampler = \"sobbol\"\n[base]\nscenario = \"stand\"\n",
             "`sampler` = \"sobbol\" is not known",
         ),
@@ -399,6 +408,10 @@ fn a_plan_needs_its_head() {
             "name = \"x\"\nroot = 1\nblock = 4\nsamples = 65536000000\n\
              [base]\nscenario = \"stand\"\n",
             "`block` = 4 makes 16384000000 part files",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsamples = 5\n[base]\nscenario = \"stand\"\n",
+            "`samples` = 5 would compute each case as often: no factor is drawn",
         ),
         ("name = ", "not valid TOML"),
     ] {

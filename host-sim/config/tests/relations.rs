@@ -7,7 +7,11 @@ use std::collections::BTreeMap;
 use std::panic::catch_unwind;
 
 use common::{assert_all, report};
-use wheeleg_config::{AxisConfig, ConfigError, RELATIONS, Relation, RobotConfig};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64Mcg;
+use wheeleg_config::{
+    Advised, AxisConfig, ConfigError, ParameterInfo, RELATIONS, Relation, RobotConfig,
+};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
@@ -143,6 +147,7 @@ const EXAMPLES: &[Example] = &[
     example("reach before push", ROBOT, &[], ("gait.reach", "{}", "s"), [2.0, 1.999]),
     example("lower before push", ROBOT, &[], ("gait.lower", "{}", "s"), [2.0, 1.999]),
     example("push before the end", ROBOT, QUICK_PUSH, ("gait.push", "{}", "s"), [30.0, 29.971]),
+    example("time to touch down", ROBOT, &[], ("gait.touchdown_speed", "{}", "mm/s"), [15.0, 15.02]),
     example("time to push", ROBOT, &[], ("gait.push_speed", "{}", "m/s"), [0.1, 0.18]),
     example("inertias of the chassis", ROBOT, &[], ("spatial.chassis_roll_inertia", "{}", "kg m2"), [0.1, 0.2]),
     example("inertias of a wheel", ROBOT, &[], ("spatial.wheel_transverse_inertia", "{}", "kg m2"), [0.008, 0.0081]),
@@ -324,6 +329,119 @@ fn relations_are_told_together_and_beside_missing_fields() {
         ],
     );
     assert_eq!(said.lines().count(), 3, "{said}");
+}
+
+/// Fields that relations and offers are about, each with the share of its sound value to which it
+/// goes, and back, in a random file.
+fn fields_of_relations(listed: &[ParameterInfo]) -> Vec<&ParameterInfo> {
+    let related = |p: &&ParameterInfo| {
+        let mut fields = RELATIONS.iter().flat_map(|relation| relation.fields);
+        p.value.len() == 1 && fields.any(|path| *path == p.path)
+    };
+    listed.iter().filter(related).collect()
+}
+
+/// A file in which one to three related fields are anywhere in their ranges.
+fn random_file(rng: &mut Pcg64Mcg, text: &str, fields: &[&ParameterInfo]) -> String {
+    let mut changed = text.to_owned();
+    for _ in 0..rng.random_range(1..=3) {
+        let field = fields[rng.random_range(0..fields.len())];
+        let sound = field.value[0];
+        // Most values are near the sound one: what is far away is out of range at once.
+        let value = match rng.random_range(0..3) {
+            0 => field.min + (field.max - field.min) * rng.random::<f64>(),
+            _ => sound * 10_f64.powf(rng.random_range(-1.5..1.5)),
+        };
+        let value = match field.whole {
+            true => value.round(),
+            false => format!("{value:.4e}").parse().expect("a number"),
+        };
+        let value = value.clamp(field.min, field.max);
+        changed = with(&changed, &field.path, &format!("{value:?}"), &field.unit);
+    }
+    changed
+}
+
+/// What a refusal proposes is accepted, of every relation: with the values in the file the relation
+/// holds, and no other one is broken by them; where nothing else was wrong, the file is read.
+fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), ConfigError>) -> usize {
+    let Err(error) = read(text) else { return 0 };
+    let mut tried = 0;
+    for problem in error.problems() {
+        for set in problem.advice() {
+            let mut mended = text.to_owned();
+            for Advised { path, value, unit } in set {
+                let help = problem.help_text().expect("a help");
+                assert!(help.contains(&format!("`{path}`")), "{path}: {help}");
+                mended = with(&mended, path, &format!("{value:?}"), unit);
+            }
+            let told = format!("{set:?} of {problem} ({:?})", problem.help_text());
+            let left = match read(&mended) {
+                Ok(()) => Vec::new(),
+                Err(error) => error.problems().to_vec(),
+            };
+            let alone = error.problems().len() == 1;
+            assert!(!alone || left.is_empty(), "{told}: {left:?}");
+            assert!(left.len() < error.problems().len(), "{told}: {left:?}");
+            tried += 1;
+        }
+    }
+    tried
+}
+
+#[test]
+fn what_a_refusal_proposes_is_accepted_by_every_relation() {
+    let mut rng = Pcg64Mcg::seed_from_u64(7);
+    let axis = |text: &str| AxisConfig::parse("my.toml", text).map(drop);
+    let robot = |text: &str| RobotConfig::parse("my.toml", text).map(drop);
+    let mut tried = 0;
+    for (_, file, text) in wheeleg_config::axis::AXES {
+        let listed = AxisConfig::parse(file, text).expect("built in").parameters;
+        let fields = fields_of_relations(&listed);
+        for _ in 0..60 {
+            let text = random_file(&mut rng, text, &fields);
+            tried += ensure_advice_is_accepted(&text, &axis);
+        }
+    }
+    let listed = RobotConfig::parse("robot.toml", ROBOT).expect("built in");
+    let fields = fields_of_relations(&listed.parameters);
+    for _ in 0..25 {
+        let text = random_file(&mut rng, ROBOT, &fields);
+        tried += ensure_advice_is_accepted(&text, &robot);
+    }
+    // And the examples of the table, one by one.
+    for example in EXAMPLES {
+        let text = example.text(example.broken);
+        let read: &dyn Fn(&str) -> Result<(), ConfigError> =
+            if example.file == AXIS { &axis } else { &robot };
+        tried += ensure_advice_is_accepted(&text, read);
+    }
+    println!("{tried} values tried");
+    assert!(tried > 200, "{tried}");
+}
+
+/// Light mass on hard bristles and a hard stop: a step for the bristles alone would be refused for the
+/// stop.
+#[test]
+fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
+    let text = with(AXIS, "moving.mass", "0.02", "kg");
+    let text = with(&text, "friction.bristle_damping", "900.0", "N s/m");
+    let error = AxisConfig::parse("my.toml", &text).expect_err("too light");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    assert!(problem.to_string().contains("friction"), "{problem}");
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(
+        paths,
+        ["numerics.step", "moving.mass"],
+        "{}",
+        report(&error)
+    );
 }
 
 /// What the plant refuses for itself is told by its field, in the unit of the file.

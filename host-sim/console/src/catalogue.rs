@@ -61,7 +61,7 @@ pub struct HostInfo {
 }
 
 /// Most bus cycles of one `Step`.
-pub(crate) const STEP_MAX: u32 = 1_000;
+pub const STEP_MAX: u32 = 1_000;
 /// Slowest and fastest pace.
 pub const SPEED: (f64, f64) = (0.1, 10.0);
 /// Fastest pace at which somebody may be in control.

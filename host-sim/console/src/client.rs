@@ -1,5 +1,6 @@
 //! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
 
+mod timed;
 mod url;
 
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -11,8 +12,8 @@ use tungstenite::handshake::HandshakeError;
 use tungstenite::http::Uri;
 use tungstenite::{Message, WebSocket};
 
+use self::url::Stream;
 pub use self::url::Url;
-use self::url::{PATIENCE, Stream};
 use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
 use crate::hex;
@@ -55,15 +56,11 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
     Ok((status.ok_or_else(odd)?, body))
 }
 
-/// Reads an answer to its end, which comes within [`PATIENCE`], however slowly a server writes.
+/// Reads an answer to its end.
 fn whole(stream: &mut Stream) -> std::io::Result<Vec<u8>> {
-    let begin = Instant::now();
     let mut answer = Vec::new();
     let mut part = [0; 4096];
     while answer.len() < LARGEST_ANSWER {
-        if begin.elapsed() >= PATIENCE {
-            return Err(ErrorKind::TimedOut.into());
-        }
         match stream.read(&mut part) {
             Ok(0) => break,
             Ok(n) => answer.extend_from_slice(&part[..n]),
@@ -169,7 +166,7 @@ impl Client {
             "mac": hex::encode(&transcript.of_client(key)),
         });
         let auth = Message::text(auth.to_string());
-        socket.send(auth).map_err(|e| url.error(e))?;
+        socket.send(auth).map_err(|e| failed(url, e))?;
         let welcome = text(url, &mut socket)?;
         if let Some(why) = welcome["text"].as_str() {
             return Err(url.error(why));
@@ -179,8 +176,7 @@ impl Client {
         if !transcript.is_server(key, session, &mac.ok_or_else(odd)?) {
             return Err(url.error("this is not your robot: it does not have the key"));
         }
-        let looks = socket.get_ref().set_read_timeout(LOOK);
-        looks.map_err(|e| url.error(e))?;
+        socket.get_mut().look(LOOK, None);
         Ok(Self {
             url: url.clone(),
             key: transcript.session_key(key),
@@ -220,7 +216,7 @@ impl Client {
     /// [`ConsoleError::Link`] if the connection has ended.
     pub fn send_raw(&mut self, bytes: Vec<u8>) -> Result<(), ConsoleError> {
         let sent = self.socket.send(Message::binary(bytes));
-        sent.map_err(|e| self.url.error(e))
+        sent.map_err(|e| failed(&self.url, e))
     }
 
     /// Leaves a number out, as a client does that loses a frame.
@@ -309,9 +305,17 @@ impl Client {
         self.outcome_until(n, None)
     }
 
-    /// The same of a request that is answered at once: unknown if it is not.
-    pub fn prompt_outcome(&mut self, n: u64) -> Outcome {
-        self.outcome_until(n, Some(Instant::now() + PATIENCE))
+    /// Sends a frame that is answered at once, and waits for its end: unknown if it is not.
+    ///
+    /// # Errors
+    /// As [`Client::send`].
+    pub fn prompt(&mut self, frame: Value) -> Result<Outcome, ConsoleError> {
+        let end = Some(self.url.end());
+        self.socket.get_mut().look(LOOK, end);
+        let n = self.send(frame)?;
+        let outcome = self.outcome_until(n, end);
+        self.socket.get_mut().look(LOOK, None);
+        Ok(outcome)
     }
 
     fn outcome_until(&mut self, n: u64, end: Option<Instant>) -> Outcome {
@@ -342,13 +346,17 @@ impl Client {
     }
 }
 
+fn failed(url: &Url, e: tungstenite::Error) -> ConsoleError {
+    match e {
+        tungstenite::Error::Io(e) => url.broken(e),
+        other => url.error(other),
+    }
+}
+
 /// The next JSON of a handshake.
 fn text(url: &Url, socket: &mut WebSocket<Stream>) -> Result<Value, ConsoleError> {
     loop {
-        let message = socket.read().map_err(|e| match e {
-            tungstenite::Error::Io(e) => url.broken(e),
-            other => url.error(other),
-        })?;
+        let message = socket.read().map_err(|e| failed(url, e))?;
         match message {
             Message::Text(text) => {
                 let odd = |_| url.error(NO_CONSOLE);

@@ -5,6 +5,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+use wheeleg_config::open_file;
+
 use crate::error::ConsoleError;
 use crate::hex;
 use crate::mac::Key;
@@ -113,10 +115,7 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
 pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
     // Nobody is to change who may read a device or a folder, nor to wait for who writes to a pipe.
-    if !fs::metadata(path).map_err(cannot)?.is_file() {
-        return Err(wrong(path, "is no key: it is not a file".to_owned()));
-    }
-    let file = File::open(path).map_err(cannot)?;
+    let file = open_file(path).map_err(cannot)?;
     match open_to_others(&file).map_err(cannot)? {
         None => Ok(file),
         Some(mode) => Err(ConsoleError::Key {

@@ -48,7 +48,7 @@ mod tls;
 pub mod unpack;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, command_list};
+pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list};
 pub use error::ConsoleError;
 pub use live::{Live, Port};
 pub use mac::Key;

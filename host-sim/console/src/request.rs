@@ -666,6 +666,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (seed >> 33) as usize % below
         };
+        let (mut read, mut refused) = (0, 0);
         for _ in 0..200_000 {
             let mut frame = SOUND[random(SOUND.len())].as_bytes().to_vec();
             for _ in 0..=random(4) {
@@ -680,8 +681,13 @@ mod tests {
                     break;
                 }
             }
-            let _ = parse(&frame);
+            match parse(&frame) {
+                Ok(_) => read += 1,
+                Err(_) => refused += 1,
+            }
         }
+        // Both happen often, or the frames are not what they are meant to be.
+        assert!(read > 1_000 && refused > 1_000, "{read} {refused}");
     }
 
     #[test]

@@ -87,6 +87,7 @@ fn truth(seed: u64) -> Logs {
 
 fn problem<'a>(config: &'a AxisConfig, lab: &'a Lab) -> Problem<'a> {
     Problem {
+        file: &config.source.file,
         axis: &config.axis,
         lab,
         ticks: lab.on_us.len(),
@@ -262,10 +263,31 @@ fn a_table_of_a_users_own_is_read_by_its_map() {
         (&long, &map, &["line 9, column `x [m]`: 7000 is outside"]),
     ] {
         let told = told(text, lines);
+        assert!(told.contains("mine.csv"), "{told}");
         assert!(
             words.iter().all(|word| told.contains(word)),
             "{words:?} in {told}"
         );
+    }
+}
+
+/// A force that would drive the piston far into its stop: the plant leaves its range.
+#[test]
+fn a_measurement_that_the_plant_cannot_play_is_told_with_both_files() {
+    let config = config();
+    let mut text = "time_s,position_mm,fill_a,vent_a,fill_b,vent_b,load_n\n".to_owned();
+    for tick in 0..400 {
+        let load_n = if tick < 200 { 10_000 } else { -10_000 };
+        text += &format!(
+            "0.{tick:03},{},0,1,0,1,{load_n}\n",
+            40.0 + 0.2 * f64::from(tick)
+        );
+    }
+    let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
+    let told = fitted(&problem(&config, &lab), 1, &Progress::silent()).expect_err("no fit");
+    let told = wheeleg_config::plain_text(&told);
+    for file in ["lab.csv", config.source.file.as_str()] {
+        assert!(told.contains(file), "{file}: {told}");
     }
 }
 
@@ -275,7 +297,9 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
     let sound = measured(&config.axis, 1, 300, |_| OUT, true);
     let told = |text: &str| {
         let wrong = Lab::parse("lab.csv", text, &config.axis, &[]);
-        wrong.err().map_or_else(String::new, |e| e.to_string())
+        let told = wrong.err().map_or_else(String::new, |e| e.to_string());
+        assert!(told.is_empty() || told.contains("lab.csv"), "{told}");
+        told
     };
     assert_eq!(told(&sound), "");
     let lines: Vec<&str> = sound.lines().collect();

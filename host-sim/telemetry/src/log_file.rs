@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use mcap::{Compression, MAGIC};
@@ -64,6 +64,7 @@ pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), L
 
 /// Writes an MCAP log in compressed chunks.
 pub struct LogFile {
+    path: PathBuf,
     file: OpenLog,
     derive: Option<Box<dyn Derive + Send>>,
     payload: Vec<u8>,
@@ -78,8 +79,15 @@ struct OpenLog {
     flushed_ns: u64,
 }
 
+/// Takes away a log that has no whole head: there is nothing in it. A device stays.
+fn discard(path: &Path) {
+    if path.is_file() {
+        let _ = std::fs::remove_file(path);
+    }
+}
+
 impl LogFile {
-    /// Creates the log with all its channels.
+    /// Creates the log with all its channels. Of one whose head cannot be written nothing stays.
     ///
     /// # Errors
     /// [`LogError::Output`] if the file cannot be created, [`LogError::Log`] if its header
@@ -87,6 +95,11 @@ impl LogFile {
     pub fn create(path: &Path) -> Result<Self, LogError> {
         let file =
             File::create(path).map_err(|e| LogError::output("create the log file", path, e))?;
+        let begun = Self::begin(file, path);
+        begun.inspect_err(|_| discard(path))
+    }
+
+    fn begin(file: File, path: &Path) -> Result<Self, LogError> {
         let mut log = options().create(BufWriter::new(file))?;
         let mut headers = Vec::new();
         for def in channels() {
@@ -102,6 +115,7 @@ impl LogFile {
             flushed_ns: 0,
         };
         Ok(Self {
+            path: path.to_owned(),
             file,
             derive: None,
             payload: Vec::with_capacity(1024),
@@ -112,7 +126,13 @@ impl LogFile {
     ///
     /// # Errors
     /// [`LogError::Log`] if they cannot be written.
-    pub fn with(mut self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
+    pub fn with(self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
+        let path = self.path.clone();
+        let with = self.with_derived(derive);
+        with.inspect_err(|_| discard(&path))
+    }
+
+    fn with_derived(mut self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
         let Some(log) = self.file.log.as_mut() else {
             return Ok(self);
         };

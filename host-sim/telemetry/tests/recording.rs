@@ -230,6 +230,68 @@ fn a_log_with_a_damaged_attachment_keeps_every_message() {
     assert!(attachments(&path("new.mcap")).expect("a log").is_empty());
 }
 
+/// A damaged schema says no longer what a message means, and costs none of them: in a log without chunks,
+/// as other programs write it, whose records stand by themselves.
+#[test]
+fn a_log_with_a_damaged_schema_keeps_every_message() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let file = std::fs::File::create(path("log.mcap")).expect("created");
+    let options = mcap::WriteOptions::new().use_chunks(false);
+    let mut writer = options
+        .create(std::io::BufWriter::new(file))
+        .expect("begun");
+    let mut written = Vec::new();
+    for topic in ["/one", "/two"] {
+        let schema = format!("schema of {topic}");
+        let schema = writer
+            .add_schema(&schema, "jsonschema", b"{}")
+            .expect("added");
+        let none = std::collections::BTreeMap::new();
+        let channel = writer
+            .add_channel(schema, topic, "json", &none)
+            .expect("added");
+        for t in 0..100 {
+            let header = mcap::records::MessageHeader {
+                channel_id: channel,
+                sequence: t,
+                log_time: u64::from(t),
+                publish_time: u64::from(t),
+            };
+            let data = format!("{{\"n\":{t}}}");
+            writer
+                .write_to_known_channel(&header, data.as_bytes())
+                .expect("written");
+            written.push((topic.to_owned(), header.log_time, data));
+        }
+    }
+    writer.finish().expect("finished");
+    let mut bytes = std::fs::read(path("log.mcap")).expect("written");
+    // No text any more; the first is the record, a later one that of the index.
+    let name = b"schema of /one";
+    let at = bytes.windows(name.len()).position(|part| part == name);
+    bytes[at.expect("its name")] = 0xff;
+    std::fs::write(path("damaged.mcap"), &bytes).expect("written");
+    let recovered = recover(&path("damaged.mcap"), &path("new.mcap"), &|| false);
+    let recovered = recovered.expect("a log").expect("to the end");
+    assert_eq!((recovered.messages, recovered.was_whole), (200, false));
+    let new = std::fs::read(path("new.mcap")).expect("written");
+    let mut read: Vec<(String, u64, String)> = mcap::MessageStream::new(&new)
+        .expect("an MCAP file")
+        .map(|m| {
+            let m = m.expect("a message");
+            let schema = m.channel.schema.as_ref().map(|schema| schema.name.clone());
+            let sound = m.channel.topic == "/two";
+            assert_eq!(schema, sound.then(|| "schema of /two".to_owned()));
+            let data = String::from_utf8(m.data.to_vec()).expect("text");
+            (m.channel.topic.clone(), m.log_time, data)
+        })
+        .collect();
+    read.sort();
+    written.sort();
+    assert_eq!(read, written);
+}
+
 #[test]
 fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     let folder = tempfile::tempdir().expect("temporary folder");

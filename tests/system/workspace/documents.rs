@@ -54,6 +54,18 @@ fn the_first_documents_are_short() {
     }
 }
 
+/// Each release fits into 60 lines, and so do the changes since.
+#[test]
+fn each_section_of_the_changelog_is_short() {
+    let text = fs::read_to_string(root().join("CHANGELOG.md")).expect("CHANGELOG.md");
+    let sections: Vec<&str> = text.split("\n## ").skip(1).collect();
+    assert!(sections.len() >= 2, "{} sections", sections.len());
+    for section in sections {
+        let lines = section.lines().count();
+        assert!(lines <= 60, "{lines} lines: {:?}", section.lines().next());
+    }
+}
+
 /// No sentence of the README has more than 30 words.
 #[test]
 fn the_readme_has_short_sentences() {

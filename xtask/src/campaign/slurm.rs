@@ -1,7 +1,8 @@
 //! A campaign on Slurm: two nodes on this computer, as root, without systemd.
 //!
 //! The array has a shard that is killed and one that is given back to the queue; it is submitted
-//! again for what is left, and its table must be that of one process.
+//! again for what is left, and its table must be that of one process. Then another array loses a
+//! whole node, daemon and tasks, in mid-run, and must come to the same table.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -97,6 +98,43 @@ impl Cluster {
 
     fn ask(&self, program: &str, arguments: &[&str]) -> Option<String> {
         ask(self.command(program).args(arguments))
+    }
+
+    /// Node `n2` goes as if its power were cut: its daemon, the daemons of its job steps and their
+    /// tasks are killed at once, none may say anything.
+    fn lose_second_node(&mut self) -> Result<()> {
+        let jobs = self
+            .ask(
+                "squeue",
+                &[
+                    "--noheader",
+                    "--nodelist=n2",
+                    "--states=RUNNING",
+                    "--format=%A",
+                ],
+            )
+            .context("the jobs of the second node")?;
+        let steps: Vec<String> = jobs
+            .lines()
+            .map(|job| format!("slurmstepd: [{}.", job.trim()))
+            .collect();
+        ensure!(!steps.is_empty(), "no job runs on the second node");
+        let daemon = self.daemons.last_mut().context("the daemons run")?;
+        daemon.kill()?;
+        daemon.wait()?;
+        for entry in fs::read_dir("/proc")?.flatten() {
+            let read = |name: &str| fs::read(entry.path().join(name)).unwrap_or_default();
+            let line = String::from_utf8_lossy(&read("cmdline")).into_owned();
+            let its_step = steps.iter().any(|step| line.starts_with(step.as_str()));
+            let its_task = read("environ")
+                .split(|byte| *byte == 0)
+                .any(|entry| entry == b"SLURMD_NODENAME=n2");
+            if its_step || its_task {
+                let id = entry.file_name();
+                Command::new("kill").arg("-KILL").arg(id).status()?;
+            }
+        }
+        Ok(())
     }
 
     /// Waits until no job is left.
@@ -235,16 +273,16 @@ pub(crate) fn check() -> Result<String> {
     };
     let expected = hash(&alone)?;
 
-    let cluster = Cluster::start(&home.join("cluster"))?;
-    let shared = home.join("shared");
-    let submit = || -> Result<String> {
+    let mut cluster = Cluster::start(&home.join("cluster"))?;
+    let submit = |cluster: &Cluster, folder: &Path| -> Result<String> {
         let mut command = cluster.command(&wheeleg);
         command.args(["campaign", "submit", &file_name, "--slurm", "--shards"]);
-        command.arg(SHARDS.to_string()).arg("--out").arg(&shared);
+        command.arg(SHARDS.to_string()).arg("--out").arg(folder);
         let text = ask(&mut command).context("submit")?;
         Ok(field(&text, "array ")?.to_owned())
     };
-    let array = submit()?;
+    let shared = home.join("shared");
+    let array = submit(&cluster, &shared)?;
     // Two tasks run at a time: one is killed, one given back to the queue.
     wait("a first shard", || process("0/4", &shared).is_some())?;
     sleep(Duration::from_secs(2));
@@ -270,7 +308,7 @@ pub(crate) fn check() -> Result<String> {
         .arg(&shared)
         .arg("--json"));
     let left = state.is_none();
-    submit()?;
+    submit(&cluster, &shared)?;
     cluster.drain()?;
     let found = hash(&shared)?;
     ensure!(
@@ -278,9 +316,31 @@ pub(crate) fn check() -> Result<String> {
         "the hash is {found}, of one process {expected}"
     );
     ensure!(left, "nothing was left to do: the kill came too late");
+
+    let lost = home.join("lost");
+    submit(&cluster, &lost)?;
+    wait("shards on both nodes", || {
+        process("0/4", &lost).is_some() && process("1/4", &lost).is_some()
+    })?;
+    sleep(Duration::from_secs(2));
+    cluster.lose_second_node()?;
+    let begun = Instant::now();
+    wait("loss of the second node", || {
+        let state = cluster.ask("sinfo", &["--noheader", "--nodes=n2", "--format=%t"]);
+        state.is_some_and(|state| state.starts_with("down"))
+    })?;
+    let noticed_s = begun.elapsed().as_secs();
+    // Slurm gives what ran there back to its queue, and the first node takes it.
+    cluster.drain()?;
+    let found = hash(&lost)?;
+    ensure!(
+        found == expected,
+        "after the loss of a node the hash is {found}, of one process {expected}"
+    );
     Ok(format!(
         "slurm: {} cases, {SHARDS} shards on two nodes, one killed, {}, the array submitted again: \
-         the hash of one process",
+         the hash of one process; another array whose second node was lost in mid-run \
+         (noticed after {noticed_s} s, its shard run again on the first): the same hash",
         2 * SAMPLES,
         if requeued {
             "one requeued"

@@ -1,8 +1,9 @@
 //! The `.fmu` archive.
 
-use std::io::{self, Cursor, Write as _};
+use std::io::{self, Cursor, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
+use wheeleg_config::open_file;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -49,12 +50,9 @@ fn read(library: &Path) -> Result<Vec<u8>, FmuError> {
         path: library.to_owned(),
         reason,
     };
-    // A device may have no end, a pipe no writer.
-    let about = std::fs::metadata(library).map_err(|e| no(e.to_string()))?;
-    if !about.is_file() {
-        return Err(no("it is not a file".to_owned()));
-    }
-    let code = std::fs::read(library).map_err(|e| no(e.to_string()))?;
+    let mut code = Vec::new();
+    let read = open_file(library).and_then(|mut file| file.read_to_end(&mut code));
+    read.map_err(|e| no(e.to_string()))?;
     let head: &[u8] = match std::env::consts::OS {
         "windows" => b"MZ",
         "macos" => &[0xCF, 0xFA, 0xED, 0xFE],

@@ -226,7 +226,8 @@ fn a_case_that_cannot_be_says_why() {
 /// A campaign of as many cases as a plan may have is begun, and its state told, in a moment.
 #[test]
 fn the_largest_plan_is_begun_and_told_in_a_moment() {
-    let text = "name = \"test\"\nroot = 7\nsamples = 65536000000\n[base]\nscenario = \"stand\"\n";
+    let text =
+        "name = \"test\"\nroot = 7\nreplicates = 65536000000\n[base]\nscenario = \"stand\"\n";
     let plan = plan_of(text);
     let begun = std::time::Instant::now();
     let folder = tempfile::tempdir().expect("a folder");

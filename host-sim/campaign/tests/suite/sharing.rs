@@ -162,7 +162,7 @@ fn a_pilot_is_taken_up() {
 /// cases are more than one.
 #[test]
 fn a_block_that_nobody_chose_is_a_minute_of_work() {
-    let text = "name = \"short\"\nroot = 1\nsamples = 1000\n[base]\nscenario = \"stand\"\n";
+    let text = "name = \"short\"\nroot = 1\nreplicates = 1000\n[base]\nscenario = \"stand\"\n";
     let plan = crate::common::plan_of(text);
     let block = |duration_s| PlanFile::of(&plan, duration_s).block;
     assert_eq!([0.3, 10.0, 60.0, 7200.0].map(block), [256, 64, 16, 1]);

@@ -145,6 +145,7 @@ impl Plan {
         let plan = read(&mut r, &sources);
         if let Some(plan) = plan.as_ref().filter(|_| r.is_clean()) {
             check::check(&mut r, plan)?;
+            ensure_samples_differ(&mut r, plan);
         }
         r.finish(&what, plan).map(|(plan, _)| plan)
     }
@@ -164,7 +165,15 @@ impl Plan {
 
 fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
     let top = r.table("")?;
-    r.reject_unknown(&top, &TOP);
+    r.reject_unknown(&top, &[&TOP[..], &["cases"]].concat());
+    if let Some((key, _)) = top.get("cases") {
+        r.problem(
+            Some(key),
+            "`cases` cannot be given: it is grid cells × `samples` × `replicates`".to_owned(),
+            "follows from others",
+            Some("write `samples` or `replicates`, from 1".to_owned()),
+        );
+    }
     let name = r.name(&top, "name");
     let mut count = |key: &str, most: u64| match top.get(key) {
         Some(_) => r.whole(&top, key, 1..=most),
@@ -249,6 +258,25 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         );
     }
     Some(plan)
+}
+
+/// Samples differ in what is drawn: without it each case would be computed once more.
+fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
+    let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
+    if !r.is_clean() || plan.samples == 1 || plan.factors.iter().any(drawn) {
+        return;
+    }
+    let top = r.table("");
+    let key = top.as_ref().and_then(|top| top.get("samples"));
+    r.problem(
+        key.map(|(key, _)| key),
+        format!(
+            "`samples` = {} would compute each case as often: no factor is drawn, and allowed is then 1",
+            plan.samples
+        ),
+        "the same again",
+        Some("for other noise write `replicates`; for other values let a factor be drawn".into()),
+    );
 }
 
 /// The bars as they stand in the plan, once they are known to be right.

@@ -43,8 +43,8 @@ pub(super) fn list(r: &mut Reader, entry: &Entry, key: &str) -> Option<Vec<Value
         r.problem(
             item.span().or(Some(span)),
             format!(
-                "`{path}` = {} must be a list of numbers, of names or of true and false, none \
-                 of them twice",
+                "`{path}` = {} must be a list of at least one number, name, true or false, none of \
+                 them twice",
                 item.to_string().trim()
             ),
             "not a list of values",

@@ -7,11 +7,13 @@ mod quantities;
 use std::ops::Range;
 use std::sync::Arc;
 
-use toml_edit::{Document, Item};
+use toml_edit::{Document, DocumentMut, Item};
 
 use super::error::{ConfigError, Lines, Problem};
+use super::overlay;
 use super::params::{FieldSpec, ParameterInfo, Params};
 use super::quantity::{Dimension, suffix};
+use super::relations::Advised;
 use super::suggest::closest;
 
 pub(crate) use entry::Entry;
@@ -90,6 +92,16 @@ impl Reader {
         }
     }
 
+    /// The same of a file with other values in it. `None` if it cannot have them.
+    pub(crate) fn with(file: &str, text: &str, values: &[Advised]) -> Option<Self> {
+        let mut document: DocumentMut = text.parse().ok()?;
+        for Advised { path, value, unit } in values {
+            let value = (*value).into();
+            overlay::set_stated(&mut document, path, value, Some(unit), "ADVISED").then_some(())?;
+        }
+        Self::parse("", file, &document.to_string(), true).ok()
+    }
+
     /// The result: what was read, or every problem found.
     pub(crate) fn finish<T>(
         self,
@@ -121,8 +133,14 @@ impl Reader {
     }
 
     /// Reports fields that do not fit together, each of which is within its range: with what
-    /// the file says of them, and the lines of all.
-    pub(crate) fn contradiction(&mut self, fields: &[&str], why: &str, help: &str) {
+    /// the file says of them, the lines of all, and values that were tried.
+    pub(crate) fn contradiction(
+        &mut self,
+        fields: &[&str],
+        why: &str,
+        help: &str,
+        advice: Vec<Vec<Advised>>,
+    ) {
         let mut shown = Vec::new();
         for path in fields {
             let listed = self.parameters.iter().find(|p| p.path == *path);
@@ -145,6 +163,9 @@ impl Reader {
             false => format!("{others} and {last} do not fit together: {why}"),
         };
         self.problem(first, message, "not with the others", Some(help.to_owned()));
+        if let Some(problem) = self.problems.last_mut() {
+            problem.advise(advice);
+        }
     }
 
     /// Path of the parameter that a name of the plant, a path with a unit behind it, begins with.

@@ -23,7 +23,8 @@ pub(super) fn told(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {
             brief(told.value(axis)),
             suffix(row.unit)
         ),
-        allowed: format!(
+        offers: Vec::new(),
+        words: format!(
             "`{}` is allowed from {}: {}",
             row.name,
             range(low, high, row.unit),

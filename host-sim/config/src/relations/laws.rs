@@ -3,7 +3,7 @@
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{ParamError, Pattern};
 
-use super::{Broken, Facts, ROUNDING, Relation};
+use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
 use crate::gait::GaitParams;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
@@ -13,24 +13,40 @@ use crate::told::STEPS_AT_REST;
 /// shorted. As a commissioned board is told.
 pub const SENSOR_TRACK: [f64; 2] = [0.01, 0.99];
 
-fn broken(figures: String, allowed: String) -> Option<Broken> {
-    Some(Broken { figures, allowed })
+/// What no value of one field says.
+fn broken(figures: String, words: String) -> Option<Broken> {
+    Some(Broken {
+        figures,
+        offers: Vec::new(),
+        words,
+    })
+}
+
+/// Values of one field each, any of which would do.
+fn offered(figures: String, offers: Vec<Offer>) -> Option<Broken> {
+    Some(Broken {
+        figures,
+        offers: offers.into_iter().map(|offer| vec![offer]).collect(),
+        words: String::new(),
+    })
 }
 
 /// The pressure at which the regulator is fully open is above the surroundings.
 pub(super) fn droop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [droop, set, ambient] = [0, 1, 2].map(|i| f.si(it.fields[i]));
-    let most_pa = set? - ambient?;
-    if droop? < most_pa || most_pa <= 0.0 {
+    let (droop_pa, set_pa, ambient_pa) = (droop?, set?, ambient?);
+    if droop_pa < set_pa - ambient_pa || set_pa <= ambient_pa {
         return None;
     }
-    broken(
+    let [droop, set, ambient] = [0, 1, 2].map(|i| it.fields[i]);
+    offered(
         String::new(),
-        format!(
-            "`supply.droop` is allowed below {}, which is `supply.set_pressure` − \
-             `gas.ambient_pressure`",
-            f.told("supply.droop", most_pa)
-        ),
+        vec![
+            Offer::new(f, droop, Bound::Below, set_pa - ambient_pa)
+                .which_is(&format!("`{set}` − `{ambient}`")),
+            Offer::new(f, set, Bound::Above, droop_pa + ambient_pa)
+                .which_is(&format!("`{droop}` + `{ambient}`")),
+        ],
     )
 }
 
@@ -42,47 +58,38 @@ pub(super) fn track(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if reach_m <= most_m * (1.0 + ROUNDING) {
         return None;
     }
-    let path = it.fields[0];
-    let shorter_m = (most_m - offset_m) / gain;
-    let or = match shorter_m > 0.0 {
-        true => format!(
-            ", or `{}` up to {}",
-            it.fields[1],
-            f.told(it.fields[1], shorter_m)
-        ),
-        false => String::new(),
-    };
-    broken(
+    let least_m = (reach_m / SENSOR_TRACK[1] * 1e4).ceil() * 1e-4;
+    offered(
         format!(
             "with the rod out it stands at {} of {}",
-            f.told(path, reach_m),
-            f.told(path, electrical_m)
+            f.told(it.fields[0], reach_m),
+            f.told(it.fields[0], electrical_m)
         ),
-        format!(
-            "`{path}` is allowed from {}{or}",
-            f.told(path, (reach_m / SENSOR_TRACK[1] * 1e4).ceil() * 1e-4)
-        ),
+        vec![
+            Offer::new(f, it.fields[0], Bound::From, least_m),
+            Offer::new(f, it.fields[1], Bound::UpTo, (most_m - offset_m) / gain),
+        ],
     )
 }
 
 /// The wiper stands on its track with the rod in.
 pub(super) fn begin(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
-    let least_m = SENSOR_TRACK[0] * f.si(it.fields[1])?;
-    if f.si(it.fields[0])? >= least_m * (1.0 - ROUNDING) {
+    let (offset_m, electrical_m) = (f.si(it.fields[0])?, f.si(it.fields[1])?);
+    let least_m = SENSOR_TRACK[0] * electrical_m;
+    if offset_m >= least_m * (1.0 - ROUNDING) {
         return None;
     }
-    broken(
+    offered(
         String::new(),
-        format!(
-            "`{}` is allowed from {}",
-            it.fields[0],
-            f.told(it.fields[0], least_m)
-        ),
+        vec![
+            Offer::new(f, it.fields[0], Bound::From, least_m),
+            Offer::new(f, it.fields[1], Bound::UpTo, offset_m / SENSOR_TRACK[0]),
+        ],
     )
 }
 
 /// A push ends within its step, as the master has it.
-pub(super) fn push(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
+pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let value = |spec: &FieldSpec| match spec.dimension {
         Dimension::Flag => Some(vec![0.0]),
         _ => Some(vec![f.si(&format!("gait.{}", spec.key))?]),
@@ -97,17 +104,53 @@ pub(super) fn push(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
         return None;
     };
     let seconds = |us: u32| pretty(f64::from(us) * 1e-6);
-    broken(
-        format!(
+    let [period, push] = [0, 1].map(|i| it.fields[i]);
+    let (period_s, push_s) = (f.si(period)?, f.si(push)?);
+    let needs_s = f64::from(needs_us) * 1e-6;
+    let offers = [
+        Offer::new(f, period, Bound::From, push_s + needs_s),
+        Offer::new(f, push, Bound::UpTo, period_s - needs_s),
+    ];
+    Some(Broken {
+        figures: format!(
             "with this stroke, speed and acceleration it takes {} s, and there are {} s",
             seconds(needs_us),
             seconds(has_us)
         ),
-        format!(
-            "`gait.period` is allowed from {} s after `gait.push`; or a faster push",
-            seconds(needs_us)
+        offers: offers.map(|offer| vec![offer]).to_vec(),
+        words: "a faster push is allowed, too".to_owned(),
+    })
+}
+
+/// Height above the expected ground from which the master lowers a foot slowly, m. The fast way down
+/// to it takes time of its own, which depends on the air.
+const SLOW_WAY_M: f64 = 0.015;
+
+/// The slow way of a foot down to the ground ends before the push begins.
+pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [speed, lower, push] = [0, 1, 2].map(|i| it.fields[i]);
+    let (speed_m_s, lower_s, push_s) = (f.si(speed)?, f.si(lower)?, f.si(push)?);
+    let has_s = push_s - lower_s;
+    // At 0 the reference jumps; a push before the lowering is told as such.
+    if speed_m_s <= 0.0 || has_s <= 0.0 || SLOW_WAY_M / speed_m_s < has_s {
+        return None;
+    }
+    let needs_s = SLOW_WAY_M / speed_m_s;
+    let offers = [
+        Offer::new(f, speed, Bound::Above, SLOW_WAY_M / has_s),
+        Offer::new(f, push, Bound::Above, lower_s + needs_s),
+        Offer::new(f, lower, Bound::Below, push_s - needs_s),
+    ];
+    Some(Broken {
+        figures: format!(
+            "the last {} mm take {} s, and there are {} s",
+            pretty(SLOW_WAY_M * 1e3),
+            brief(needs_s),
+            brief(has_s)
         ),
-    )
+        offers: offers.map(|offer| vec![offer]).to_vec(),
+        words: "a speed of 0 is allowed, too: the reference jumps".to_owned(),
+    })
 }
 
 /// Of the three principal inertias of a body none exceeds the sum of the others: each is a
@@ -185,13 +228,17 @@ fn wide_enough(f: &Facts<'_>, half_m: f64) -> Option<Broken> {
     if track_m >= least_m * (1.0 - ROUNDING) {
         return None;
     }
-    broken(
-        String::new(),
-        format!(
-            "`spatial.track` is allowed from {}: the width of the chassis and that of a wheel",
-            f.told("spatial.track", least_m)
+    let offers = [
+        Offer::new(f, "spatial.track", Bound::From, least_m)
+            .which_is("the width of the chassis and that of a wheel"),
+        Offer::new(
+            f,
+            "spatial.wheel_width",
+            Bound::UpTo,
+            track_m - 2.0 * half_m,
         ),
-    )
+    ];
+    offered(String::new(), offers.to_vec())
 }
 
 /// A chassis that is not above, before or behind the wheels is between them.
@@ -269,14 +316,13 @@ impl Calibrated {
     }
 
     /// A board that measures what is.
-    fn advice(&self) -> String {
-        format!(
-            "a calibrated board has `sensor_full_scale` = {} mm and `sensor_zero` = {}",
-            pretty(self.electrical_m / self.gain * 1e3),
-            (self.offset_m / self.electrical_m * CODES)
-                .round()
-                .clamp(0.0, CODES - 1.0)
-        )
+    fn calibrated(&self, f: &Facts<'_>, it: &Relation) -> Vec<Offer> {
+        let full_scale_mm = self.electrical_m / self.gain * 1e3;
+        let zero = (self.offset_m / self.electrical_m * CODES).round();
+        vec![
+            Offer::new(f, it.fields[4], Bound::At, full_scale_mm),
+            Offer::new(f, it.fields[5], Bound::At, zero.clamp(0.0, CODES - 1.0)),
+        ]
     }
 
     fn told(&self, [inside, out]: [f64; 2], unit: &str) -> String {
@@ -311,8 +357,11 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         return None;
     }
     let range = format!("{} to {} mm", pretty(least), pretty(most));
-    let allowed = format!("allowed are {range}; {}", sensor.advice());
-    broken(sensor.told(measured, "mm"), allowed)
+    Some(Broken {
+        figures: sensor.told(measured, "mm"),
+        offers: vec![sensor.calibrated(f, it)],
+        words: format!("strokes that a board takes are allowed from {range}"),
+    })
 }
 
 /// A joint that is drawn in, and one that stands out for the gait, measure as settled.
@@ -324,14 +373,16 @@ pub(super) fn measured(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if measured[0] <= tolerance_mm && measured[1] >= out_mm - tolerance_mm {
         return None;
     }
-    let allowed = format!(
-        "allowed are up to {} mm with the rod in and from {} mm with it out, `homing.tolerance` from \
-         the pose; {}",
-        pretty(tolerance_mm),
-        pretty(out_mm - tolerance_mm),
-        sensor.advice()
-    );
-    broken(sensor.told(measured, "mm"), allowed)
+    Some(Broken {
+        figures: sensor.told(measured, "mm"),
+        offers: vec![sensor.calibrated(f, it)],
+        words: format!(
+            "allowed are up to {} mm with the rod in and from {} mm with it out, `homing.tolerance` \
+             from the pose",
+            pretty(tolerance_mm),
+            pretty(out_mm - tolerance_mm)
+        ),
+    })
 }
 
 /// A joint rests in a band of some steps of its converter.
@@ -342,17 +393,13 @@ pub(super) fn converter(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if band_m >= least_m {
         return None;
     }
-    let most_bits = (STEPS_AT_REST * electrical_m / band_m).log2().ceil();
-    let bits = match most_bits <= 16.0 {
-        true => format!("`{}` is allowed from {most_bits} bit, or ", it.fields[0]),
-        false => String::new(),
-    };
-    broken(
-        String::new(),
-        format!(
-            "{bits}`{}` is allowed from {} mm: {STEPS_AT_REST} steps",
-            it.fields[2],
-            pretty((least_m * 1e6).ceil() * 1e-3)
-        ),
+    let bits = (STEPS_AT_REST * electrical_m / band_m).log2().ceil();
+    let least_band_mm = (least_m * 1e6).ceil() * 1e-3;
+    offered(
+        format!("{STEPS_AT_REST} steps are {} mm", brief(least_m * 1e3)),
+        vec![
+            Offer::new(f, it.fields[0], Bound::From, bits),
+            Offer::new(f, it.fields[2], Bound::From, least_band_mm),
+        ],
     )
 }

@@ -2,8 +2,10 @@
 //!
 //! [`RELATIONS`] is the table. Each entry names its fields and says what they must be; a check
 //! sees the listed values of the file, so that it works beside sections that are wrong or
-//! missing. Those of the whole plant come last, where nothing else is wrong.
+//! missing. Those of the whole plant come last, where nothing else is wrong. A value that a refusal
+//! proposes has been tried on the whole file ([`advice`]).
 
+mod advice;
 mod board;
 mod laws;
 mod moved;
@@ -16,6 +18,9 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::{PlantError, PlantParams};
 use wheeleg_protocol::param::JointParam;
 
+pub use advice::Advised;
+use advice::{Bound, Offer, Search};
+pub(crate) use advice::{Tried, Try};
 pub use laws::SENSOR_TRACK;
 pub(crate) use moved::Moved;
 use standing::AtRest;
@@ -63,12 +68,20 @@ enum Rule {
 }
 
 /// A relation that does not hold.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Broken {
     /// The figures of it; may be empty.
     figures: String,
-    /// What is allowed.
-    allowed: String,
+    /// Sets of values with which this relation would hold.
+    offers: Vec<Vec<Offer>>,
+    /// What is allowed beyond these; may be empty where there are offers.
+    words: String,
+}
+
+/// A relation of the table that a file breaks.
+pub(crate) struct Found {
+    relation: &'static Relation,
+    broken: Broken,
 }
 
 /// What a file says.
@@ -114,6 +127,11 @@ impl Facts<'_> {
         Some(list.map(|value| value * factor))
     }
 
+    /// Up to, from or at a value in SI, for one field.
+    fn offer(&self, path: &str, bound: Bound, si: f64) -> Vec<Offer> {
+        vec![Offer::new(self, path, bound, si)]
+    }
+
     /// A value in SI as a file would have it at a path.
     fn told(&self, path: &str, si: f64) -> String {
         let (factor, unit) = self.unit(path).unwrap_or((1.0, ""));
@@ -126,39 +144,64 @@ impl Relation {
     fn check(&self, facts: &Facts<'_>) -> Option<Broken> {
         let first = self.fields[0];
         let value = |i: usize| facts.si(self.fields[i]);
-        let allowed = |word: &str, limit: f64, of: &str| Broken {
-            figures: String::new(),
-            allowed: format!(
-                "`{first}` is allowed {word} {}{of}",
-                facts.told(first, limit)
-            ),
+        let quoted = |i: usize| format!("`{}`", self.fields[i]);
+        let offers = |sets: Vec<Offer>| Broken {
+            offers: sets.into_iter().map(|offer| vec![offer]).collect(),
+            ..Broken::default()
         };
-        let of = |i: usize| format!(", which is `{}`", self.fields[i]);
         match self.rule {
             Rule::AtMost(share) => {
-                let most = share * value(1)?;
-                let of = match share {
-                    1.0 => of(1),
-                    share => format!(", which is {share} × `{}`", self.fields[1]),
+                let (low, high) = (value(0)?, value(1)?);
+                let most = share * high;
+                let (of, other) = match share {
+                    1.0 => (quoted(1), quoted(0)),
+                    share => (
+                        format!("{share} × {}", quoted(1)),
+                        format!("{} / {share}", quoted(0)),
+                    ),
                 };
-                let holds = value(0)? <= most + ROUNDING * most.abs();
-                (!holds).then(|| allowed("up to", most, &of))
+                let holds = low <= most + ROUNDING * most.abs();
+                (!holds).then(|| {
+                    offers(vec![
+                        Offer::new(facts, first, Bound::UpTo, most).which_is(&of),
+                        Offer::new(facts, self.fields[1], Bound::From, low / share)
+                            .which_is(&other),
+                    ])
+                })
             }
             Rule::AtLeast => {
-                let least = value(1)?;
-                let holds = value(0)? >= least - ROUNDING * least.abs();
-                (!holds).then(|| allowed("from", least, &of(1)))
+                let (high, least) = (value(0)?, value(1)?);
+                let holds = high >= least - ROUNDING * least.abs();
+                (!holds).then(|| {
+                    offers(vec![
+                        Offer::new(facts, first, Bound::From, least).which_is(&quoted(1)),
+                        Offer::new(facts, self.fields[1], Bound::UpTo, high).which_is(&quoted(0)),
+                    ])
+                })
             }
-            Rule::Below => (value(0)? >= value(1)?).then(|| {
-                let end = value(1).unwrap_or_default();
-                allowed("below", end, &of(1))
-            }),
+            Rule::Below => {
+                let (low, high) = (value(0)?, value(1)?);
+                (low >= high).then(|| {
+                    offers(vec![
+                        Offer::new(facts, first, Bound::Below, high).which_is(&quoted(1)),
+                        Offer::new(facts, self.fields[1], Bound::Above, low).which_is(&quoted(0)),
+                    ])
+                })
+            }
             Rule::Above => {
                 let others = &self.fields[1..];
                 let terms: Option<Vec<f64>> = others.iter().map(|path| facts.si(path)).collect();
-                let sum: f64 = terms?.iter().sum();
-                let of = format!(", which is `{}`", others.join("` + `"));
-                (value(0)? <= sum).then(|| allowed("above", sum, &of))
+                let terms = terms?;
+                let sum: f64 = terms.iter().sum();
+                let whole = value(0)?;
+                (whole <= sum).then(|| {
+                    let of = format!("`{}`", others.join("` + `"));
+                    let mut sets = vec![Offer::new(facts, first, Bound::Above, sum).which_is(&of)];
+                    for (path, term) in others.iter().zip(&terms) {
+                        sets.push(Offer::new(facts, path, Bound::Below, whole - (sum - term)));
+                    }
+                    offers(sets)
+                })
             }
             Rule::Told(parameter) => board::told(facts.axis?, parameter),
             Rule::Law(law) => law(facts, self),
@@ -166,54 +209,86 @@ impl Relation {
         }
     }
 
-    fn report(&self, r: &mut Reader, broken: &Broken) {
+    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], cut_short: bool) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
         };
         let mut fields = self.fields.to_vec();
         fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
-        r.contradiction(&fields, &why, &broken.allowed);
+        let allowed = match (advice::text(accepted), broken.words.as_str()) {
+            (offers, "") if offers.is_empty() && cut_short => {
+                "what is allowed depends on other fields: mend what else is wrong first".to_owned()
+            }
+            (offers, "") if offers.is_empty() => {
+                "no value of one of them is allowed with the rest of the file".to_owned()
+            }
+            (offers, words) if offers.is_empty() => words.to_owned(),
+            (offers, "") => offers,
+            (offers, words) => format!("{offers}; {words}"),
+        };
+        r.contradiction(&fields, &why, &allowed, advice::values(accepted));
     }
 }
 
-/// Reports every relation that does not hold: of the listed values, of the cylinder with what it
-/// moves, and of the robot, if it is one.
-pub(crate) fn check(r: &mut Reader, read: &Read<'_>) {
-    let (moved, axis) = (read.moved.as_ref(), read.axis);
+/// Every relation that does not hold: of the listed values, of the cylinder with what it moves, and
+/// of the robot, if it is one.
+pub(crate) fn broken(r: &Reader, read: &Read<'_>) -> Vec<Found> {
     let facts = Facts {
         parameters: r.parameters(),
-        moved,
-        axis,
+        moved: read.moved.as_ref(),
+        axis: read.axis,
     };
-    let found: Vec<(&Relation, Broken)> = RELATIONS
+    let mut found: Vec<Found> = RELATIONS
         .iter()
-        .filter_map(|relation| Some((relation, relation.check(&facts)?)))
+        .filter_map(|relation| {
+            let broken = relation.check(&facts)?;
+            Some(Found { relation, broken })
+        })
         .collect();
-    for (relation, broken) in &found {
-        relation.report(r, broken);
-    }
     // What the others name, these would name less well: the first alone is told.
-    let Some(robot) = read.robot.filter(|_| r.is_clean()) else {
-        return;
-    };
-    let facts = Facts {
-        parameters: r.parameters(),
-        moved,
-        axis,
-    };
-    // A rest is looked for once, and only where a leg closes.
-    let at_rest = LazyCell::new(|| AtRest::new(&facts, robot));
-    let found = RELATIONS.iter().find_map(|relation| {
-        let broken = match relation.rule {
-            Rule::Whole(law) => law(robot),
-            Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
-            _ => None,
-        };
-        Some((relation, broken?))
-    });
-    if let Some((relation, broken)) = found {
-        relation.report(r, &broken);
+    if let Some(robot) = read.robot.filter(|_| r.is_clean() && found.is_empty()) {
+        // A rest is looked for once, and only where a leg closes.
+        let at_rest = LazyCell::new(|| AtRest::new(&facts, robot));
+        found.extend(RELATIONS.iter().find_map(|relation| {
+            let broken = match relation.rule {
+                Rule::Whole(law) => law(robot),
+                Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
+                _ => None,
+            };
+            Some(Found {
+                relation,
+                broken: broken?,
+            })
+        }));
+    }
+    found
+}
+
+/// Reports every relation that does not hold, with values that the file would be accepted with.
+pub(crate) fn check(r: &mut Reader, read: &Read<'_>, attempt: &Try<'_>) {
+    let found = broken(r, read);
+    let search = Search::new(&found, r.problem_count(), attempt);
+    for one in &found {
+        let accepted = search.accepted(one);
+        one.relation
+            .report(r, &one.broken, &accepted, search.is_cut_short());
+    }
+}
+
+/// What a file is refused for, to compare with the same file with other values in it.
+pub(crate) fn tried(
+    r: &mut Reader,
+    read: &Read<'_>,
+    built: impl FnOnce() -> Result<(), PlantError>,
+) -> Tried {
+    let found = broken(r, read);
+    if r.is_clean() && found.is_empty() {
+        check_plant(r, built());
+    }
+    Tried {
+        found,
+        others: r.problem_count(),
     }
 }
 
@@ -241,6 +316,7 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
                     pretty(min / factor),
                     pretty(max / factor)
                 ),
+                Vec::new(),
             );
         }
         other => r.problem(

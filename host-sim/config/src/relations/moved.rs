@@ -13,13 +13,17 @@ use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
 use wheeleg_plant::flow::GasParams;
 use wheeleg_plant::supply::SupplyParams;
 
-use super::{Broken, Facts, Relation};
-use crate::quantity::{brief, pretty};
+use super::{Bound, Broken, Facts, Offer, Relation};
+use crate::quantity::brief;
 
 /// Where the explicit step of a mass becomes unstable.
 const STEP_LIMIT: f64 = 1.0;
 /// The same of the gas in a chamber.
 const GAS_LIMIT: f64 = 2.0;
+/// The shortest step that a file may have, s.
+const SHORTEST_STEP_S: f64 = 1e-6;
+/// Its field.
+const STEP: &str = "numerics.step";
 /// A piston runs into its stop this many times deeper than its full force presses it.
 const IMPACT: f64 = 2.0;
 
@@ -50,47 +54,107 @@ impl Moved<'_> {
         self.piston_m2() * gauge_pa.max(0.0) + self.load_n
     }
 
-    /// c h / m + k h² / (4 m), with what the step or the mass would have to be.
-    fn stability(&self, damping_n_s_m: f64, stiffness_n_m: f64) -> Option<Broken> {
-        let (h, m) = (self.step_s, self.mass_kg);
-        let number = damping_n_s_m * h / m + stiffness_n_m * h * h / (4.0 * m);
-        if number < STEP_LIMIT {
-            return None;
-        }
-        // k/4 h² + c h − m = 0, and a tenth below it.
-        let (a, b) = (0.25 * stiffness_n_m, damping_n_s_m);
-        let longest_s = 2.0 * m / (b + (b * b + 4.0 * a * m).sqrt());
-        let step_us = (0.9 * longest_s * 1e6).floor().max(1.0);
-        let mass_kg = 1.1 * number * m;
-        Some(Broken {
-            figures: format!(
-                "damping × step / mass + stiffness × step² / (4 × mass) = {number:.2}, allowed \
-                 below {STEP_LIMIT}"
-            ),
-            allowed: format!(
-                "a step of at most {} us, or a mass of at least {} kg, is allowed",
-                pretty(step_us),
-                pretty((mass_kg * 1e4).ceil() * 1e-4)
-            ),
-        })
-    }
-
-    fn of_friction(&self) -> Option<Broken> {
+    /// Friction alone.
+    fn of_friction(&self) -> Oscillator {
         let f = &self.cylinder.friction;
-        let damping = f.bristle_damping_n_s_m + f.viscous_n_s_m;
-        self.stability(damping, f.bristle_stiffness_n_m)
+        Oscillator {
+            damping_n_s_m: f.bristle_damping_n_s_m + f.viscous_n_s_m,
+            stiffness_n_m: f.bristle_stiffness_n_m,
+            ..self.free()
+        }
     }
 
-    fn of_end_stop(&self) -> Option<Broken> {
-        let (f, stop) = (&self.cylinder.friction, &self.cylinder.end_stop);
+    /// In its end stop.
+    fn in_end_stop(&self) -> Oscillator {
+        let (friction, stop) = (self.of_friction(), &self.cylinder.end_stop);
         // Hunt–Crossley: k d (1 + λ d') damps with λ times the static force. The cushion acts on
         // the way in alone: in half of an oscillation.
-        let damping = f.bristle_damping_n_s_m
-            + f.viscous_n_s_m
-            + 0.5 * stop.cushion_damping_n_s_m
-            + stop.damping_s_m * self.force_n();
-        let stiffness = f.bristle_stiffness_n_m + stop.stiffness_n_m;
-        self.stability(damping, stiffness)
+        Oscillator {
+            damping_n_s_m: friction.damping_n_s_m
+                + 0.5 * stop.cushion_damping_n_s_m
+                + stop.damping_s_m * self.force_n(),
+            stiffness_n_m: friction.stiffness_n_m + stop.stiffness_n_m,
+            ..self.free()
+        }
+    }
+
+    fn free(&self) -> Oscillator {
+        Oscillator {
+            mass_kg: self.mass_kg,
+            step_s: self.step_s,
+            damping_n_s_m: 0.0,
+            stiffness_n_m: 0.0,
+        }
+    }
+}
+
+/// A mass that the plant moves in explicit steps.
+#[derive(Debug, Clone, Copy)]
+struct Oscillator {
+    mass_kg: f64,
+    step_s: f64,
+    damping_n_s_m: f64,
+    stiffness_n_m: f64,
+}
+
+impl Oscillator {
+    /// c h / m + k h² / (4 m)
+    fn number(&self) -> f64 {
+        let Self {
+            mass_kg: m,
+            step_s: h,
+            damping_n_s_m: c,
+            stiffness_n_m: k,
+        } = self;
+        c * h / m + k * h * h / (4.0 * m)
+    }
+
+    /// A tenth below the step at which k/4 h² + c h − m = 0, in whole microseconds.
+    fn longest_step_s(&self) -> f64 {
+        let (a, b, m) = (0.25 * self.stiffness_n_m, self.damping_n_s_m, self.mass_kg);
+        let longest_s = 2.0 * m / (b + (b * b + 4.0 * a * m).sqrt());
+        (0.9 * longest_s * 1e6).floor().max(1.0) * 1e-6
+    }
+
+    /// A tenth above the mass for which the step is just too long.
+    fn least_mass_kg(&self) -> f64 {
+        (1.1 * self.number() * self.mass_kg * 1e4).ceil() * 1e-4
+    }
+
+    /// What is wrong with one whose step is too long, and with which step or mass it and the other
+    /// would do.
+    fn broken(&self, other: &Self, f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+        if self.number() < STEP_LIMIT {
+            return None;
+        }
+        let mass = it.fields.last()?;
+        let step_s = self.longest_step_s().min(other.longest_step_s());
+        let mass_kg = self.least_mass_kg().max(other.least_mass_kg());
+        // Where neither range reaches: a tenth of the step, and the mass that this takes.
+        let short_s = (0.1 * self.step_s).max(SHORTEST_STEP_S);
+        let stepped = |it: &Self| {
+            Self {
+                step_s: short_s,
+                ..*it
+            }
+            .least_mass_kg()
+        };
+        Some(Broken {
+            figures: format!(
+                "damping × step / mass + stiffness × step² / (4 × mass) = {:.2}, allowed below \
+                 {STEP_LIMIT}",
+                self.number()
+            ),
+            offers: vec![
+                f.offer(STEP, Bound::UpTo, step_s),
+                f.offer(mass, Bound::From, mass_kg),
+                vec![
+                    Offer::new(f, STEP, Bound::UpTo, short_s),
+                    Offer::new(f, mass, Bound::From, stepped(self).max(stepped(other))),
+                ],
+            ],
+            words: String::new(),
+        })
     }
 }
 
@@ -102,15 +166,17 @@ fn moved<'a>(f: &'a Facts<'_>, it: &Relation) -> Option<&'a Moved<'a>> {
 
 /// A step follows friction.
 pub(super) fn friction(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
-    moved(f, it)?.of_friction()
+    let moved = moved(f, it)?;
+    moved.of_friction().broken(&moved.in_end_stop(), f, it)
 }
 
 /// A step follows the end stop, where it follows friction alone.
 pub(super) fn end_stop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let moved = moved(f, it)?;
-    match moved.of_friction() {
-        None => moved.of_end_stop(),
-        Some(_) => None,
+    let friction = moved.of_friction();
+    match friction.number() < STEP_LIMIT {
+        true => moved.in_end_stop().broken(&friction, f, it),
+        false => None,
     }
 }
 
@@ -127,14 +193,17 @@ pub(super) fn gas(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if number < GAS_LIMIT {
         return None;
     }
-    let step_us = (0.9 * GAS_LIMIT / number * moved.step_s * 1e6).floor();
+    let slower = 0.9 * GAS_LIMIT / number;
+    let step_s = (slower * moved.step_s * 1e6).floor().max(1.0) * 1e-6;
+    let line_m3 = moved.cylinder.line_volume_m3;
+    let dead_m3 = (f.si(it.fields[0])? + line_m3) / slower - line_m3;
     Some(Broken {
         figures: format!("step × rate = {number:.2}, allowed below {GAS_LIMIT}"),
-        allowed: format!(
-            "a step of at most {} us is allowed, or a {} times larger volume",
-            pretty(step_us.max(1.0)),
-            pretty((number / (0.9 * GAS_LIMIT) * 10.0).ceil() / 10.0)
-        ),
+        offers: vec![
+            f.offer(STEP, Bound::UpTo, step_s),
+            f.offer(it.fields[0], Bound::From, (dead_m3 * 1e7).ceil() * 1e-7),
+        ],
+        words: String::new(),
     })
 }
 
@@ -153,6 +222,8 @@ pub(super) fn volume(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if volume_m3 > least_m3 {
         return None;
     }
+    let dead_m3 = ((least_m3 - c.line_volume_m3) * 1.05e7).ceil() * 1e-7;
+    let stiffer_n_m = 1.05 * c.end_stop.stiffness_n_m * least_m3 / volume_m3;
     Some(Broken {
         figures: format!(
             "it runs {} mm into its stop, by {} cm3, and there are {} cm3 before it",
@@ -160,10 +231,15 @@ pub(super) fn volume(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
             brief(least_m3 * 1e6),
             brief(volume_m3 * 1e6)
         ),
-        allowed: format!(
-            "a dead volume of at least {} cm3 is allowed, or a stiffer end stop",
-            pretty(((least_m3 - c.line_volume_m3) * 1.05e7).ceil() * 0.1)
-        ),
+        offers: vec![
+            f.offer(it.fields[0], Bound::From, dead_m3),
+            f.offer(
+                "end_stop.stiffness",
+                Bound::From,
+                (stiffer_n_m * 1e-3).ceil() * 1e3,
+            ),
+        ],
+        words: String::new(),
     })
 }
 
@@ -180,11 +256,24 @@ pub(super) fn supply(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
     if supply.reservoir_m3 > least_m3 {
         return None;
     }
+    // A tenth more than what just holds, in round figures.
+    let more = 1.1 * least_m3 / supply.reservoir_m3;
+    let step_s = (moved.step_s / more * 1e6).floor().max(1.0) * 1e-6;
     Some(Broken {
         figures: String::new(),
-        allowed: format!(
-            "a reservoir of at least {} dm3, a larger droop or a shorter step is allowed",
-            brief(least_m3 * 1.1e3)
-        ),
+        offers: vec![
+            f.offer(
+                "supply.reservoir",
+                Bound::From,
+                (1.1 * least_m3 * 1e6).ceil() * 1e-6,
+            ),
+            f.offer(
+                "supply.droop",
+                Bound::From,
+                (more * supply.droop_pa * 1e-2).ceil() * 1e2,
+            ),
+            f.offer(STEP, Bound::UpTo, step_s),
+        ],
+        words: String::new(),
     })
 }

@@ -22,7 +22,8 @@ pub(super) fn closes(robot: &PlantParams) -> Option<Broken> {
     let mut strokes_m = [start_m, 0.0, robot.cylinders[0].stroke_m].into_iter();
     Some(Broken {
         figures: strokes_m.find_map(open)?,
-        allowed:
+        offers: Vec::new(),
+        words:
             "allowed is a yaw cylinder that with `body.stroke_zero`, and 0 to `cylinder.stroke` \
                   more, closes a triangle with `body.crank` and `body.p4`"
                 .to_owned(),
@@ -82,7 +83,8 @@ pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
             mm(-sole.z),
             mm(robot.body.wheel_radius_m)
         ),
-        allowed: format!(
+        offers: Vec::new(),
+        words: format!(
             "the centre of all masses (`body.chassis_com`, `link.*.com`) is allowed from 0 to {} mm \
              ahead of the axle; soles as low as the rims, and contacts that hold the weight",
             mm(sole.x)
@@ -113,7 +115,8 @@ pub(super) fn carried(at_rest: &AtRest) -> Option<Broken> {
                 brief(robot.body.total_mass_kg()),
                 brief(needed_n)
             ),
-            allowed: format!(
+            offers: Vec::new(),
+            words: format!(
                 "allowed with this bore and pressure: {} to {} N; less mass (`body.chassis_mass`, \
                  `link.*.mass`), a centre nearer to the axle, a larger `cylinder.bore` or \
                  `supply.set_pressure`",

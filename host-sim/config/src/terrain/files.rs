@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::open_file;
 
 /// Largest data file, bytes.
 const LARGEST: u64 = 512 << 20;
@@ -85,17 +86,14 @@ impl Files<'_> {
         };
         let path = folder.join(name);
         let reason = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
-        let about = std::fs::metadata(&path).map_err(|e| reason(&e))?;
-        if !about.is_file() {
-            return Err(reason(&"not a file"));
-        }
+        let file = open_file(&path).map_err(|e| reason(&e))?;
+        let about = file.metadata().map_err(|e| reason(&e))?;
         if about.len() > LARGEST {
             let size = about.len() >> 20;
             let most = LARGEST >> 20;
             return Err(reason(&format!("{size} MiB; allowed are {most} MiB")));
         }
         let mut bytes = Vec::new();
-        let file = File::open(&path).map_err(|e| reason(&e))?;
         let read = file.take(LARGEST).read_to_end(&mut bytes);
         read.map_err(|e| reason(&e))?;
         Ok(bytes)

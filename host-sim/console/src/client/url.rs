@@ -1,12 +1,14 @@
 //! The address of a server, and the connection to it.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{IpAddr, Ipv6Addr, TcpStream, ToSocketAddrs as _};
-use std::time::Duration;
+use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs as _};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use rustls::pki_types::ServerName;
 use rustls::{ClientConnection, StreamOwned};
 
+use super::timed::Timed;
 use crate::error::ConsoleError;
 use crate::tls::{self, Fingerprint};
 
@@ -22,6 +24,8 @@ pub struct Url {
     certificate: Option<Fingerprint>,
     /// It is to be reached with TLS.
     tls: bool,
+    /// When the answers that are waited for have to be there.
+    until: Option<Instant>,
 }
 
 impl Url {
@@ -55,6 +59,7 @@ impl Url {
             host: host.to_owned(),
             certificate: None,
             tls: tls.is_some(),
+            until: None,
         })
     }
 
@@ -65,6 +70,21 @@ impl Url {
             certificate: Some(certificate),
             ..self
         }
+    }
+
+    /// The same for what has to be answered within [`PATIENCE`] from now, over however many
+    /// connections.
+    #[must_use]
+    pub fn prompt(self) -> Self {
+        Self {
+            until: Some(Instant::now() + PATIENCE),
+            ..self
+        }
+    }
+
+    /// When a request that begins now has to be answered.
+    pub(super) fn end(&self) -> Instant {
+        self.until.unwrap_or_else(|| Instant::now() + PATIENCE)
     }
 
     /// Whether others on the way could read what is sent: neither TLS, nor this computer's own.
@@ -96,7 +116,7 @@ impl Url {
     }
 
     pub(super) fn stream(&self) -> Result<Stream, ConsoleError> {
-        let tcp = self.tcp()?;
+        let tcp = self.tcp(self.end())?;
         if !self.tls {
             return Ok(Stream::Plain(tcp));
         }
@@ -112,44 +132,69 @@ impl Url {
         // The handshake, while a read still waits: later ones are short looks.
         while stream.conn.is_handshaking() {
             let done = stream.conn.complete_io(&mut stream.sock);
-            done.map_err(|e| self.error(format!("no TLS to the server of that certificate: {e}")))?;
+            done.map_err(|e| match e.kind() {
+                ErrorKind::WouldBlock | ErrorKind::TimedOut => self.broken(e),
+                _ => self.error(format!("no TLS to the server of that certificate: {e}")),
+            })?;
         }
         Ok(Stream::Tls(Box::new(stream)))
     }
 
-    fn tcp(&self) -> Result<TcpStream, ConsoleError> {
-        let addresses = self.host.to_socket_addrs().map_err(|e| self.error(e))?;
+    /// Addresses of the host. Whoever knows its name may take long to say so: the system's look-up has
+    /// no deadline of its own, and goes on in a thread that nobody waits for.
+    fn addresses(&self, end: Instant) -> Result<Vec<SocketAddr>, ConsoleError> {
+        let (found, addresses) = mpsc::channel();
+        let host = self.host.clone();
+        std::thread::spawn(move || {
+            let all = host.to_socket_addrs().map(Iterator::collect);
+            // Nobody may listen any more.
+            let _ = found.send(all);
+        });
+        let left = end.saturating_duration_since(Instant::now());
+        match addresses.recv_timeout(left) {
+            Ok(all) => all.map_err(|e| self.error(e)),
+            Err(_) => Err(self.broken(ErrorKind::TimedOut.into())),
+        }
+    }
+
+    fn tcp(&self, end: Instant) -> Result<Timed, ConsoleError> {
+        let addresses = self.addresses(end)?;
         let mut stream = Err(self.error("no such host"));
         // `localhost` may have an address at which nobody listens before the right one.
         for address in addresses {
-            stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(|e| self.error(e));
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(self.broken(ErrorKind::TimedOut.into()));
+            }
+            stream = TcpStream::connect_timeout(&address, left).map_err(|e| self.broken(e));
             if stream.is_ok() {
                 break;
             }
         }
         let stream = stream?;
-        let set = stream
-            .set_nodelay(true)
-            .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
-            .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
-        set.map_err(|e| self.error(e))?;
-        Ok(stream)
+        stream.set_nodelay(true).map_err(|e| self.error(e))?;
+        Ok(Timed::new(stream, PATIENCE, end))
     }
 }
 
 /// A connection.
 pub(super) enum Stream {
-    Plain(TcpStream),
-    Tls(Box<StreamOwned<ClientConnection, TcpStream>>),
+    Plain(Timed),
+    Tls(Box<StreamOwned<ClientConnection, Timed>>),
 }
 
 impl Stream {
-    pub(super) fn set_read_timeout(&self, time: Duration) -> std::io::Result<()> {
-        let tcp = match self {
+    fn socket(&mut self) -> &mut Timed {
+        match self {
             Self::Plain(tcp) => tcp,
-            Self::Tls(tls) => &tls.sock,
-        };
-        tcp.set_read_timeout(Some(time))
+            Self::Tls(tls) => &mut tls.sock,
+        }
+    }
+
+    /// From now on a read is a short look, and all of them end then, or never.
+    pub(super) fn look(&mut self, time: Duration, until: Option<Instant>) {
+        let socket = self.socket();
+        (socket.look, socket.until) = (time, until);
     }
 }
 

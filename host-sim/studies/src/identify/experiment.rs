@@ -101,6 +101,7 @@ pub fn ranked(
             pressure_pa: pressures,
         };
         let lab = Lab {
+            file: problem.lab.file.clone(),
             samples: (0..TICKS).map(sample).collect(),
             load_n: None,
             on_us: on_us.clone(),

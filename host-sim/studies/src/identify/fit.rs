@@ -32,6 +32,8 @@ pub struct Noise {
 /// A measurement to be fitted: the axis as its file has it, and how many ticks count.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
+    /// File of the axis, as messages name it.
+    pub file: &'a str,
     /// The axis.
     pub axis: &'a AxisParams,
     /// What was measured.

@@ -41,6 +41,8 @@ pub struct Sample {
 /// A measurement, in ticks of 1 ms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lab {
+    /// Its file, as messages name it.
+    pub file: String,
     /// On-times of each tick \[µs\].
     pub on_us: Vec<[u16; 4]>,
     /// Force on the rod in each tick \[N\], positive extends; `None`: the axis file's.
@@ -197,7 +199,7 @@ fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError
         if map[..place].iter().any(|earlier| earlier.name == *name) {
             let help = "leave one of them out";
             return Err(StudyError::refused(
-                format!("`--map` tells twice where `{name}` is"),
+                format!("{file}: `--map` tells twice where `{name}` is"),
                 help,
             ));
         }
@@ -476,6 +478,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
             .collect()
     };
     Ok(Lab {
+        file: file.to_owned(),
         on_us: rows
             .iter()
             .flat_map(|(_, row)| std::iter::repeat_n(row.on_us, held))

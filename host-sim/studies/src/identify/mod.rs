@@ -219,13 +219,17 @@ pub fn best(
     let stopped = progress.stopped(done, starts.len() as u64, "starts");
     let fits = fits.into_iter().flatten().flatten();
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = best.ok_or_else(|| {
-        StudyError::refused(
-            "the plant of the axis file cannot play this measurement",
-            "check the file's stroke, mass, load and supply against the bench",
-        )
-    })?;
+    let best = best.ok_or_else(|| unplayed(problem, "cannot play it"))?;
     Ok((best, stopped))
+}
+
+/// A measurement with which the plant of an axis does not do.
+fn unplayed(problem: &Problem<'_>, what: &str) -> StudyError {
+    let Problem { file, lab, .. } = problem;
+    StudyError::refused(
+        format!("{}: the plant of {file} {what}", lab.file),
+        format!("check stroke, mass, load and supply in {file} against the bench"),
+    )
 }
 
 /// Variance of a residual that counts: of residuals that follow each other, fewer do.
@@ -290,12 +294,8 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
     };
     let go_on = || !progress.is_stopped();
     let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
-    let jacobian = second.jacobian(&fit.logs).ok_or_else(|| {
-        StudyError::refused(
-            "the plant leaves its range close to the best fit",
-            "check the file's stroke, mass, load and supply against the bench",
-        )
-    })?;
+    let leaves = || unplayed(problem, "leaves its range close to the best fit");
+    let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
     let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
     Ok(Fitted {
         fit,
@@ -316,6 +316,7 @@ impl Identified {
         let ticks = (lab.on_us.len() as f64 * (1.0 - options.hold_out)).round() as usize;
         let noise = noise(axis);
         let problem = Problem {
+            file: &config.source.file,
             axis,
             lab: &lab,
             ticks,
@@ -329,12 +330,8 @@ impl Identified {
             stopped,
         } = fitted(&problem, options.seed, progress)?;
         let play = |axis: &AxisParams| {
-            predict(axis, &lab, lab.on_us.len()).map_err(|e| {
-                StudyError::refused(
-                    format!("the plant cannot play the rest of the measurement: {e}"),
-                    "check the file's stroke, mass, load and supply against the bench",
-                )
-            })
+            predict(axis, &lab, lab.on_us.len())
+                .map_err(|e| unplayed(&problem, &format!("cannot play the rest of it: {e}")))
         };
         let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
         let parameters = FREE.iter().zip(&fit.logs).zip(&told);

@@ -56,6 +56,14 @@ impl Signal {
     }
 }
 
+/// A file that may grow no further (`ulimit -f`, the limit of a batch system) is told as a full disk is:
+/// the signal of it, which would end the program without a word, is heard by nobody.
+fn outlive_file_limit() -> std::io::Result<()> {
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+    Ok(())
+}
+
 /// Whether a study is to stop. Copies of it are one.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
@@ -74,6 +82,7 @@ impl Stop {
     /// # Errors
     /// What the operating system says if a handler cannot be set.
     pub fn on_signals() -> std::io::Result<Self> {
+        outlive_file_limit()?;
         let stop = Self {
             idle: Arc::new(AtomicBool::new(true)),
             ..Self::default()

@@ -146,7 +146,9 @@ impl Entity {
                 [mm(corner.x), mm(corner.y)]
             })
         });
-        tops.take(MOST_ROCKS).collect()
+        // A log may be anybody's.
+        let sound = |top: &[[f64; 2]; 4]| top.as_flattened().iter().all(|v| v.is_finite());
+        tops.filter(sound).take(MOST_ROCKS).collect()
     }
 }
 
@@ -260,5 +262,34 @@ mod tests {
         assert!((at(&over, 1.11) - 277.5).abs() < 0.2, "{}", at(&over, 1.11));
         let seen = ground.rocks(&strip);
         assert_eq!((seen.len(), seen[0][4]), (1, 90.0));
+    }
+
+    /// A log may be anybody's: what has no place is no part of the picture.
+    #[test]
+    fn blocks_and_rocks_without_a_place_are_left_out() {
+        let block = |x: f64| Triangles {
+            points: (0..8).map(|i| point(x, f64::from(i), 0.5)).collect(),
+            indices: Vec::new(),
+        };
+        let rock = |x: f64| Ellipsoid {
+            pose: Pose {
+                position: point(0.5, 0.1, 0.0),
+                orientation: Turn { z: 0.0, w: 1.0 },
+            },
+            size: point(x, 0.2, 0.2),
+        };
+        let ground = Entity {
+            id: GROUND.to_owned(),
+            triangles: vec![block(1.0), block(f64::MAX), block(2.0)],
+            spheres: vec![rock(0.3), rock(f64::MAX)],
+        };
+        let blocks = ground.blocks();
+        assert_eq!(blocks.len(), 2, "{blocks:?}");
+        assert_eq!(
+            (blocks[0][0], blocks[1][3]),
+            ([1000.0, 4000.0], [2000.0, 7000.0])
+        );
+        let strip = Strip::around([0.0, 1.0].into_iter());
+        assert_eq!(ground.rocks(&strip).len(), 1);
     }
 }

@@ -14,10 +14,10 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
-use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
 use wheeleg_console::unpack::unpack;
-use wheeleg_console::{Key, SPEED};
+use wheeleg_console::{Key, SPEED, STEP_MAX};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
@@ -47,7 +47,7 @@ enum CtlCommand {
         /// Channels, as `wheeleg channels` has them; events always come.
         #[arg(value_name = "CHANNEL")]
         channels: Vec<String>,
-        /// Samples per second of a channel.
+        /// Samples per second of a channel, 1 to 50.
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
         hz: u32,
     },
@@ -83,14 +83,20 @@ enum CtlCommand {
     Resume,
     /// Simulate some bus cycles of a paused robot.
     Step {
-        /// Number of cycles, 10 ms each.
-        #[arg(default_value_t = 1, value_parser = whole(1_u32, 1_000))]
+        #[arg(
+            default_value_t = 1,
+            value_parser = whole(1, STEP_MAX),
+            help = format!("Number of cycles, 10 ms each, 1 to {STEP_MAX}")
+        )]
         cycles: u32,
     },
     /// Set the pace.
     Speed {
-        /// Simulated time per wall-clock time, 0.1 to 10.
-        #[arg(allow_negative_numbers = true, value_parser = parse_pace)]
+        #[arg(
+            allow_negative_numbers = true,
+            value_parser = parse_pace,
+            help = format!("Simulated time per wall-clock time, {} to {}", SPEED.0, SPEED.1)
+        )]
         speed: f64,
     },
     /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
@@ -208,15 +214,16 @@ fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
 }
 
 fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
-    if reach.url().is_exposed() {
-        return stop_by_session(reach, key);
+    let url = reach.url().prompt();
+    if url.is_exposed() {
+        return stop_by_session(reach, &url, key);
     }
-    let (code, answer) = http(&reach.url(), "POST", "stop", key).map_err(refused)?;
+    let (code, answer) = http(&url, "POST", "stop", key).map_err(refused)?;
     match code {
         200 if reach.json => print(&format!("{answer}\n")),
         200 => print("stopped: the stop is in SYNC, and latched\n"),
         504 => Ok(not_confirmed()),
-        403 => stop_by_session(reach, key),
+        403 => stop_by_session(reach, &url, key),
         _ => {
             not_answered(&answer);
             Ok(not_confirmed())
@@ -278,10 +285,10 @@ fn control(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value
 }
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.
-fn stop_by_session(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
-    let n = client.send(json!({ "op": "stop" })).map_err(refused)?;
-    match client.prompt_outcome(n) {
+fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(url, "view", "ctl", key).map_err(refused)?;
+    let stopped = client.prompt(json!({ "op": "stop" })).map_err(refused)?;
+    match stopped {
         Outcome::Done => reach.print_outcome(&Outcome::Done),
         Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
         refused @ Outcome::Refused { .. } => {

@@ -277,6 +277,89 @@ mod tests {
     #[test]
     fn command_line_is_consistent() {
         use clap::CommandFactory as _;
-        Cli::command().debug_assert();
+        let command = Cli::command();
+        assert!(command.get_subcommands().count() > 10);
+        command.debug_assert();
+    }
+
+    /// The first range `A to B` of a text.
+    fn range(text: &str) -> Option<[f64; 2]> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let number = |word: &str| {
+            let word = word.trim_end_matches(|c: char| ".,;:)".contains(c));
+            word.replace('−', "-").parse::<f64>().ok()
+        };
+        words.windows(3).find_map(|three| {
+            let ends = [number(three[0])?, number(three[2])?];
+            (three[1] == "to").then_some(ends)
+        })
+    }
+
+    /// Whether the command line takes a value; what else is missing in it does not matter.
+    fn takes(path: &[String], arg: &clap::Arg, value: f64) -> bool {
+        use clap::CommandFactory as _;
+        use clap::error::ErrorKind::{InvalidValue, ValueValidation};
+        let mut line = path.to_vec();
+        match arg.get_long() {
+            Some(long) => line.push(format!("--{long}={value}")),
+            None => line.extend(["--".to_owned(), value.to_string()]),
+        }
+        let parsed = Cli::command().try_get_matches_from(line);
+        let kind = parsed.err().map(|e| e.kind());
+        !matches!(kind, Some(InvalidValue | ValueValidation))
+    }
+
+    /// What a help text says of a range is what the command line takes: its ends, and nothing beyond.
+    #[test]
+    fn ranges_in_help_texts_are_those_that_are_taken() {
+        use clap::CommandFactory as _;
+        fn walk(command: &clap::Command, path: &[String], found: &mut Vec<String>) {
+            let path = [path, &[command.get_name().to_owned()]].concat();
+            for arg in command
+                .get_arguments()
+                .filter(|arg| arg.get_action().takes_values())
+            {
+                let help = arg.get_long_help().or(arg.get_help());
+                let help = help.map(ToString::to_string).unwrap_or_default();
+                let Some([low, high]) = range(&help) else {
+                    continue;
+                };
+                let name = format!("{} {}", path.join(" "), arg.get_id());
+                // The next value: of whole numbers 1 away, of others a hundredth.
+                let whole = !takes(&path, arg, low + 0.5 * (high - low).min(1.0));
+                let step = if whole { 1.0 } else { 0.01 };
+                for inside in [low, high] {
+                    assert!(takes(&path, arg, inside), "{name} refuses {inside}: {help}");
+                }
+                for beyond in [low - step, high + step] {
+                    assert!(!takes(&path, arg, beyond), "{name} takes {beyond}: {help}");
+                }
+                found.push(name);
+            }
+            for below in command.get_subcommands() {
+                walk(below, &path, found);
+            }
+        }
+        let mut root = Cli::command();
+        root.build();
+        let mut found = Vec::new();
+        walk(&root, &[], &mut found);
+        println!("{found:#?}");
+        for wanted in [
+            "wheeleg ctl param get board",
+            "wheeleg ctl step cycles",
+            "wheeleg ctl speed speed",
+            "wheeleg ctl watch hz",
+            "wheeleg serve speed",
+            "wheeleg field seeds",
+            "wheeleg delay mass",
+            "wheeleg delay load",
+            "wheeleg identify hold_out",
+        ] {
+            assert!(
+                found.iter().any(|name| name == wanted),
+                "{wanted}: {found:?}"
+            );
+        }
     }
 }

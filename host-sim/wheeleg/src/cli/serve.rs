@@ -50,8 +50,14 @@ pub(super) struct ServeArgs {
     /// Serve beyond this computer without TLS: then one may look and stop, and nobody may drive.
     #[arg(long, conflicts_with = "tls_cert")]
     plain_http: bool,
-    /// Simulated time per wall-clock time, 0.1 to 10, or `max`.
-    #[arg(long, value_name = "SPEED", default_value = "1", allow_negative_numbers = true, value_parser = parse_speed)]
+    #[arg(
+        long,
+        value_name = "SPEED",
+        default_value = "1",
+        allow_negative_numbers = true,
+        value_parser = parse_speed,
+        help = format!("Simulated time per wall-clock time, {} to {}, or `max`", SPEED.0, SPEED.1)
+    )]
     speed: Speed,
     /// Start paused.
     #[arg(long)]

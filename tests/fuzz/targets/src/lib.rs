@@ -41,6 +41,8 @@ pub mod remote;
 #[cfg(feature = "sim")]
 pub mod scenario;
 pub mod store;
+#[cfg(feature = "sim")]
+pub mod tables;
 pub mod wheel;
 #[cfg(feature = "sim")]
 pub mod written;
@@ -108,6 +110,11 @@ pub const TARGETS: &[Target] = &[
     Target {
         name: "written",
         run: written::run,
+    },
+    #[cfg(feature = "sim")]
+    Target {
+        name: "tables",
+        run: tables::run,
     },
     #[cfg(feature = "sim")]
     Target {

@@ -39,4 +39,5 @@ engine! {
     scenario: 2_000, 4_000;
     files: 2_000, 4_000;
     written: 500, 2_000;
+    tables: 2_000, 300;
 }

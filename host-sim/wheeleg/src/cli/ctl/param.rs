@@ -6,26 +6,32 @@ use clap::Subcommand;
 use serde_json::{Value, json};
 use wheeleg_console::client::{Outcome, http};
 use wheeleg_console::keys::CONTROL_FILE;
+use wheeleg_protocol::Node;
 use wheeleg_studies::StudyError;
 
 use super::super::serve::refused;
 use super::super::{print, whole};
 use super::reach::{Reach, not_answered};
 
+/// Number of boards, whose addresses begin at 1.
+const BOARDS: u8 = Node::ALL.len() as u8;
+
+fn board() -> String {
+    format!("Board, 1 to {BOARDS}")
+}
+
 #[derive(Debug, Subcommand)]
 pub(super) enum ParamCommand {
     /// Read a parameter of a board.
     Get {
-        /// Board, 1 to 8.
-        #[arg(value_parser = whole(1_u8, 8))]
+        #[arg(value_parser = whole(1, BOARDS), help = board())]
         board: u8,
         /// Parameter by its name, such as error_scale.
         parameter: String,
     },
     /// Write a parameter of a board, and read it back. Unless it is saved, it lasts until power-off.
     Set {
-        /// Board, 1 to 8.
-        #[arg(value_parser = whole(1_u8, 8))]
+        #[arg(value_parser = whole(1, BOARDS), help = board())]
         board: u8,
         /// Parameter by its name, such as error_scale.
         parameter: String,
@@ -35,8 +41,7 @@ pub(super) enum ParamCommand {
     },
     /// Save all parameters of a board in its memory; the robot must be disarmed.
     Save {
-        /// Board, 1 to 8.
-        #[arg(value_parser = whole(1_u8, 8))]
+        #[arg(value_parser = whole(1, BOARDS), help = board())]
         board: u8,
     },
 }

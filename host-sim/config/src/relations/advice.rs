@@ -1,0 +1,254 @@
+//! What would mend a broken relation: values that are tried on the file before they are told.
+//!
+//! A relation offers values with which it would hold itself. Another relation may refuse them, or a
+//! field's own range. So each offer is put into the file, which is checked again; what is refused is
+//! not told. Where no offer does alone, those are added that the relations broken by it ask for.
+
+use std::cell::Cell;
+use std::collections::BTreeSet;
+
+use super::{Facts, Found};
+use crate::quantity::{pretty, suffix};
+
+/// Files that are tried at most for one relation: each is read as a whole.
+const TRIES: usize = 24;
+/// The same for all relations of a file.
+const ALL_TRIES: usize = 120;
+/// Offers that are put together at most.
+const TOGETHER: usize = 4;
+/// From a limit that is not allowed itself, the value that is tried is this share of it away.
+const BESIDE: f64 = 1e-3;
+
+/// Another value for a field, with which the file would be accepted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Advised {
+    /// Path of the field.
+    pub path: String,
+    /// The value, in `unit`.
+    pub value: f64,
+    /// The unit in which the file has the field.
+    pub unit: String,
+}
+
+/// On which side of its limit a value is allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bound {
+    UpTo,
+    From,
+    Below,
+    Above,
+    /// This value and no other.
+    At,
+}
+
+/// A limit for one field, beyond which its relation holds.
+#[derive(Debug, Clone)]
+pub(super) struct Offer {
+    advised: Advised,
+    bound: Bound,
+    limit: f64,
+    /// What the limit is; may be empty.
+    of: String,
+}
+
+impl Offer {
+    /// A limit in SI.
+    pub(super) fn new(f: &Facts<'_>, path: &str, bound: Bound, si: f64) -> Self {
+        let (factor, unit) = f.unit(path).unwrap_or((1.0, ""));
+        let limit = written(si / factor, bound);
+        let value = match bound {
+            Bound::Below => limit - BESIDE * limit.abs(),
+            Bound::Above => limit + BESIDE * limit.abs(),
+            Bound::UpTo | Bound::From | Bound::At => limit,
+        };
+        Self {
+            advised: Advised {
+                path: path.to_owned(),
+                value,
+                unit: unit.to_owned(),
+            },
+            bound,
+            limit,
+            of: String::new(),
+        }
+    }
+
+    pub(super) fn which_is(mut self, of: &str) -> Self {
+        self.of = format!(", which is {of}");
+        self
+    }
+
+    fn text(&self) -> String {
+        let word = match self.bound {
+            Bound::UpTo => "up to ",
+            Bound::From => "from ",
+            Bound::Below => "below ",
+            Bound::Above => "above ",
+            Bound::At => "at ",
+        };
+        let unit = suffix(&self.advised.unit);
+        format!("{word}{}{unit}{}", pretty(self.limit), self.of)
+    }
+}
+
+/// A limit as it is printed, on its own side of what was worked out.
+fn written(limit: f64, bound: Bound) -> f64 {
+    let printed = |value: f64| pretty(value).parse().unwrap_or(value);
+    let (near, digit) = (printed(limit), 1e-7 * limit.abs());
+    let slack = super::ROUNDING * limit.abs();
+    match bound {
+        Bound::UpTo if near > limit + slack => printed(limit - digit),
+        Bound::From if near < limit - slack => printed(limit + digit),
+        _ => near,
+    }
+}
+
+/// What a file with other values would be refused for.
+pub(crate) struct Tried {
+    /// Relations.
+    pub found: Vec<Found>,
+    /// Everything else.
+    pub others: usize,
+}
+
+/// Reads the file again with other values in it.
+pub(crate) type Try<'a> = dyn Fn(&[Advised]) -> Option<Tried> + 'a;
+
+/// What a file with other values is.
+enum Answer {
+    Accepted,
+    /// A relation is broken that held before, or the one that was to be mended.
+    Broken(Found),
+    /// A range is left, the plant refuses it, or nobody asked.
+    Refused,
+}
+
+/// Looks for values that are accepted, in place of those of one broken relation.
+pub(super) struct Search<'a> {
+    before: BTreeSet<&'static str>,
+    others: usize,
+    attempt: &'a Try<'a>,
+    /// Tries that are left for a relation, and for all.
+    left: Cell<usize>,
+    all_left: Cell<usize>,
+}
+
+impl<'a> Search<'a> {
+    /// Of a file in which these are broken, and so much else is wrong.
+    pub(super) fn new(found: &[Found], others: usize, attempt: &'a Try<'a>) -> Self {
+        Self {
+            before: found.iter().map(|found| found.relation.name).collect(),
+            others,
+            attempt,
+            left: Cell::new(0),
+            all_left: Cell::new(ALL_TRIES),
+        }
+    }
+
+    /// Whether so much is wrong that not everything was tried.
+    pub(super) fn is_cut_short(&self) -> bool {
+        self.left.get() == 0
+    }
+
+    /// Sets of offers that are each accepted: of one field if there are any, otherwise of several.
+    pub(super) fn accepted(&self, broken: &Found) -> Vec<Vec<Offer>> {
+        self.left.set(TRIES.min(self.all_left.get()));
+        let offers = &broken.broken.offers;
+        let (single, several): (Vec<_>, Vec<_>) = offers.iter().partition(|set| set.len() == 1);
+        for sets in [single, several] {
+            let mut sets: Vec<Vec<Offer>> = sets.into_iter().cloned().collect();
+            sets.retain(|set| matches!(self.answer(broken, set), Answer::Accepted));
+            if !sets.is_empty() {
+                return sets;
+            }
+        }
+        (2..=TOGETHER)
+            .find_map(|most| self.together(broken, &[], offers, most))
+            .into_iter()
+            .collect()
+    }
+
+    fn answer(&self, broken: &Found, set: &[Offer]) -> Answer {
+        let Some(left) = self.left.get().checked_sub(1) else {
+            return Answer::Refused;
+        };
+        self.left.set(left);
+        self.all_left.set(self.all_left.get().saturating_sub(1));
+        let values: Vec<Advised> = set.iter().map(|offer| offer.advised.clone()).collect();
+        let Some(tried) = (self.attempt)(&values).filter(|tried| tried.others <= self.others)
+        else {
+            return Answer::Refused;
+        };
+        let own = broken.relation.name;
+        let new = |found: &Found| {
+            let name = found.relation.name;
+            name == own || !self.before.contains(name)
+        };
+        let mut found = tried.found.into_iter();
+        found.find(new).map_or(Answer::Accepted, Answer::Broken)
+    }
+
+    /// Some of these added to others, and what the relations ask for that are broken by it.
+    fn together(
+        &self,
+        broken: &Found,
+        begun: &[Offer],
+        sets: &[Vec<Offer>],
+        most: usize,
+    ) -> Option<Vec<Offer>> {
+        for set in sets {
+            let mut whole = begun.to_vec();
+            for offer in set {
+                whole.retain(|other| other.advised.path != offer.advised.path);
+                whole.push(offer.clone());
+            }
+            if whole.len() > most {
+                continue;
+            }
+            match self.answer(broken, &whole) {
+                Answer::Accepted => return Some(whole),
+                Answer::Broken(next) if whole.len() < most => {
+                    let found = self.together(broken, &whole, &next.broken.offers, most);
+                    if found.is_some() {
+                        return found;
+                    }
+                }
+                Answer::Broken(_) | Answer::Refused => {}
+            }
+        }
+        None
+    }
+}
+
+/// The values of some sets, one of which is to be taken.
+pub(super) fn values(sets: &[Vec<Offer>]) -> Vec<Vec<Advised>> {
+    let own = |set: &Vec<Offer>| set.iter().map(|offer| offer.advised.clone()).collect();
+    sets.iter().map(own).collect()
+}
+
+/// The same in words.
+pub(super) fn text(sets: &[Vec<Offer>]) -> String {
+    let mut all = String::new();
+    for set in sets {
+        let several = set.len() > 1;
+        let verb = match (several, all.is_empty()) {
+            (false, true) => " is allowed",
+            _ => "",
+        };
+        let mut each = set
+            .iter()
+            .map(|offer| format!("`{}`{verb} {}", offer.advised.path, offer.text()));
+        let mut one = each.next().unwrap_or_default();
+        for other in each {
+            one += &format!(" with {other}");
+        }
+        all += match (several, all.is_empty()) {
+            (true, true) => "allowed together are ",
+            (false, true) => "",
+            (true, false) => ", or together ",
+            (false, false) => ", or ",
+        };
+        all += &one;
+    }
+    all
+}

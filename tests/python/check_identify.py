@@ -1,0 +1,167 @@
+"""`wheeleg identify` against SciPy's least_squares: the same cost within 1 %.
+
+The residuals are written anew here, over the Python package's plant, so that neither the optimiser nor
+what it is given is shared with the program.
+
+usage: check_identify.py WHEELEG FOLDER
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+import wheeleg
+
+AXIS = "bench-vq110u"
+TICKS = 3400
+# Share of the measurement that the program fits, of its default.
+FITTED = 0.7
+PRESSURE_PA = 2e3
+# Two-sided 95 % of a normal distribution, in standard deviations.
+Z95 = 1.959964
+# Factor within which the file is trusted 19 times of 20, by parameter (decision 52).
+TRUST = {
+    "fill_conductance": 3.0,
+    "vent_conductance": 3.0,
+    "critical_ratio": 1.6,
+    "opening_delay": 3.0,
+    "closing_delay": 3.0,
+    "dead_volume_a": 5.0,
+    "dead_volume_b": 5.0,
+    "friction": 3.0,
+    "viscous_friction": 5.0,
+    "mass": 3.0,
+    "supply_pressure": 1.3,
+    "exponent": 1.15,
+}
+
+
+def valves():
+    """A rest, strokes of two lengths, pulses, and chambers by themselves: on-times in µs."""
+    out, back = [1000, 0, 0, 1000], [0, 1000, 1000, 0]
+    on_us = np.zeros((TICKS, 4), dtype=np.uint16)
+    for begin, length, what in (
+        (200, 300, out),
+        (600, 300, back),
+        (1000, 80, out),
+        (1250, 60, back),
+        (1500, 150, [1000, 0, 1000, 0]),
+        (1800, 120, [0, 0, 0, 1000]),
+        (2050, 100, [0, 1000, 0, 0]),
+        (2300, 200, out),
+        (2700, 300, back),
+        (3100, 90, out),
+    ):
+        on_us[begin : begin + length] = what
+    return on_us
+
+
+def played(axis, on_us):
+    """Stroke and both pressures before each tick, as a bench samples them: TICKS x 3."""
+    cylinder = wheeleg.Cylinder(axis, seed=0)
+    names = ("stroke_m", "pressure_a_pa", "pressure_b_pa")
+    first = cylinder.outputs()
+    rows = cylinder.run(on_us)
+    columns = [np.concatenate(([first[name]], rows[name][:-1])) for name in names]
+    return np.stack(columns, axis=1)
+
+
+def changed(axis, paths, logs, start=None):
+    """The axis with factors on its parameters."""
+    parameters = axis.parameters()
+    values = {}
+    for at, log in zip(paths, logs):
+        for path in at:
+            parameter = parameters[path]
+            values[path] = f"{float(parameter['value'] * np.exp(log))!r} {parameter['unit']}"
+    if start is not None:
+        values["start.stroke"] = f"{float(start[0] * 1e3)!r} mm"
+        values["start.pressure_a"] = f"{float(start[1])!r} Pa"
+        values["start.pressure_b"] = f"{float(start[2])!r} Pa"
+    return axis.with_values(values)
+
+
+def main():
+    program, folder = sys.argv[1], Path(sys.argv[2])
+    folder.mkdir(parents=True, exist_ok=True)
+    axis, on_us, random = wheeleg.Axis(AXIS), valves(), np.random.default_rng(5)
+    # The sensor's noise: uniform within a bound in each of the conversions that are averaged, and the
+    # converter's steps.
+    sensor = {name: axis.parameters()[f"sensor.{name}"]["value"] for name in (
+        "potentiometer.electrical_stroke", "adc.bits", "adc.oversampling", "adc.noise")}
+    lsb_m = sensor["potentiometer.electrical_stroke"] * 1e-3 / 2 ** sensor["adc.bits"]
+    noise_m = lsb_m * np.sqrt(sensor["adc.noise"] ** 2 / 3 / sensor["adc.oversampling"] + 1 / 12)
+    scale = np.array([noise_m, PRESSURE_PA, PRESSURE_PA])
+
+    names = list(TRUST)
+    paths = {  # as `wheeleg identify` has them: it says so in its summary, compared below
+        "fill_conductance": ["fill_valve.conductance"],
+        "vent_conductance": ["vent_valve.conductance"],
+        "critical_ratio": ["fill_valve.critical_ratio", "vent_valve.critical_ratio"],
+        "opening_delay": ["fill_valve.t_on", "vent_valve.t_on"],
+        "closing_delay": ["fill_valve.t_off", "vent_valve.t_off"],
+        "dead_volume_a": ["cylinder.dead_volume_a"],
+        "dead_volume_b": ["cylinder.dead_volume_b"],
+        "friction": ["friction.coulomb", "friction.static"],
+        "viscous_friction": ["friction.viscous"],
+        "mass": ["moving.mass"],
+        "supply_pressure": ["supply.set_pressure", "supply.initial_pressure"],
+        "exponent": ["cylinder.exponent"],
+    }
+    at = [paths[name] for name in names]
+    trust = np.log([TRUST[name] for name in names]) / Z95
+    truth = 0.4 * trust * random.uniform(-1, 1, len(names))
+    measured = played(changed(axis, at, truth), on_us) + random.normal(0, scale, (TICKS, 3))
+
+    lab = folder / "lab.csv"
+    columns = "time_s,position_mm,fill_a_us,vent_a_us,fill_b_us,vent_b_us,pressure_a_bar,pressure_b_bar"
+    with lab.open("w") as file:
+        file.write(columns + "\n")
+        for tick, (row, on) in enumerate(zip(measured.tolist(), on_us.tolist())):
+            position_m, *pressures_pa = row
+            cells = [f"{tick * 1e-3:.3f}", position_m * 1e3, *on, *(p * 1e-5 for p in pressures_pa)]
+            file.write(",".join(map(str, cells)) + "\n")
+    run = subprocess.run(
+        [program, "identify", str(lab), "--axis", AXIS, "--out", str(folder / "run")],
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode in (0, 1), run.stderr
+    summary = json.loads((folder / "run" / "summary.json").read_text())
+    found = {parameter["name"]: parameter for parameter in summary["parameters"]}
+    assert {name: found[name]["paths"] for name in names} == paths, found
+    ours = np.log([found[name]["factor"] for name in names])
+
+    still = int(np.argmax(on_us.any(axis=1)))
+    start = measured[: still + 1].mean(axis=0)
+    fitted = round(TICKS * FITTED)
+
+    def residuals(logs):
+        model = played(changed(axis, at, logs, start), on_us)[:fitted]
+        data = ((model - measured[:fitted]) / scale).ravel()
+        return np.concatenate((data, logs / trust))
+
+    def cost(logs):
+        return 0.5 * np.sum(residuals(logs) ** 2)
+
+    starts = [np.zeros(len(names)), *(trust * random.uniform(-1, 1, (2, len(names))))]
+    fits = [
+        least_squares(residuals, begin, diff_step=2e-3, xtol=1e-6, ftol=1e-6, max_nfev=40)
+        for begin in starts
+    ]
+    best = min(fits, key=lambda fit: fit.cost)
+    ratio = cost(ours) / best.cost
+    worst = np.max(np.abs(ours - best.x) / trust)
+    print(
+        f"identify: cost {cost(ours):.1f}, SciPy's least {best.cost:.1f} (ratio {ratio:.4f}); "
+        f"factors at most {worst:.3f} of the file's trust apart; the truth costs {cost(truth):.1f}"
+    )
+    # Beyond 1 % either way one of the two has stopped elsewhere.
+    assert abs(ratio - 1.0) <= 0.01, ratio
+
+
+main()
