@@ -102,7 +102,7 @@ def main(program, log, folder, axe):
     broken = folder / "broken.mcap"
     broken.write_bytes(text[: len(text) * 2 // 3])
     cut = folder / "cut.html"
-    expect("breaks off" in made(program, cut, broken).stderr, "a log that breaks off is not told")
+    expect("is truncated" in made(program, cut, broken).stderr, "a truncated log is not reported")
     both = folder / "both.html"
     done = made(program, both, log, broken)
     expect("equal up to" in done.stdout, f"a log and its first part differ: {done.stdout}")

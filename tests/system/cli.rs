@@ -368,9 +368,9 @@ fn interfaces_are_listed_and_compared_and_bad_hashes_are_refused() {
         .success()
         .stdout(contains("are the same"));
     for (bad, said) in [
-        ("xyz", "`xyz` is no hash"),
+        ("xyz", "`xyz` is not a hash"),
         ("1234", "16 hexadecimal digits"),
-        ("+234567890abcdef", "is no hash"),
+        ("+234567890abcdef", "is not a hash"),
         ("0123456789abcdef", "0123456789abcdef is not an interface"),
     ] {
         wheeleg()

@@ -169,3 +169,47 @@ fn a_disk_that_fills_under_any_command_is_told() {
     assert!(3 * filled >= tried_disks, "{filled} of {tried_disks}");
     assert!(verdicts >= 3, "{verdicts} verdicts on a full disk");
 }
+
+/// A limit on the size of a file ends no command by its signal: each says that a file is too large, with
+/// the exit code of a file that cannot be written.
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+fn a_limit_on_the_size_of_files_ends_no_command_without_a_message() {
+    const KIB: usize = 8;
+    let inputs = Inputs::new();
+    let (mut tried_commands, mut refused) = (0, 0);
+    for (number, tried) in inputs.commands(true).into_iter().enumerate() {
+        let Some(option) = tried.out else { continue };
+        let seconds = if tried.arguments[0] == "serve" {
+            4
+        } else {
+            300
+        };
+        let script = format!(
+            "ulimit -f {KIB}; exec timeout --preserve-status -s TERM {seconds} \"$0\" \"$@\""
+        );
+        let output = Command::new("bash")
+            .current_dir(inputs.path(""))
+            .env("XDG_STATE_HOME", inputs.path("state"))
+            .args(["-c", &script])
+            .arg(program::path())
+            .args(&tried.arguments)
+            .arg(option)
+            .arg(inputs.path(&format!("limited-{number}")))
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        let code = output.status.code().expect("a code");
+        let told = format!("{:?}: {code}, {said}", tried.arguments);
+        tried_commands += 1;
+        let large = said.contains("File too large");
+        assert!(!large || code == tried.unwritable || code == 143, "{told}");
+        assert!(large || matches!(code, 0 | 1 | 143), "{told}");
+        refused += u32::from(large);
+    }
+    println!("{refused} of {tried_commands} commands met the limit");
+    assert!(
+        2 * refused >= tried_commands,
+        "{refused} of {tried_commands}"
+    );
+}

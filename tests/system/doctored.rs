@@ -128,7 +128,7 @@ fn a_case_that_was_given_up_is_not_told_to_differ() {
     assert_eq!(code, Some(0), "{text}");
     for line in [
         "status  limit",
-        "row     the same to the bit",
+        "row     bit-identical",
         "log     not compared",
     ] {
         assert!(text.contains(line), "{text}");
@@ -139,7 +139,7 @@ fn a_case_that_was_given_up_is_not_told_to_differ() {
     whole.campaign("600 s");
     let (code, text) = whole.said(&["campaign", "replay", "six.parquet", "0", "--out", "again"]);
     assert_eq!(code, Some(0), "{text}");
-    assert!(text.contains("log     the same to the bit"), "{text}");
+    assert!(text.contains("log     bit-identical"), "{text}");
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
         "the plant left its range at ",
         " s after power-up, in wheel ",
         "(/wheel/",
-        "last sound values, at ",
+        "last valid values, at ",
         " rad/s, ",
     ] {
         assert!(said.contains(part), "{part}: {said}");

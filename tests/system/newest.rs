@@ -205,7 +205,7 @@ const OTHERS: [Case; 49] = [
     ),
     (
         &["identify", "words.csv", "--axis", "bench-vq110u"],
-        &["line 3", "`time_s`", "xxx…\" is no number"],
+        &["line 3", "`time_s`", "xxx…\" is not a number"],
     ),
     (
         &["run", "stand", "--png", "--out", "none"],

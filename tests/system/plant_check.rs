@@ -85,7 +85,10 @@ fn random_sane_axes_raise_no_false_alarm() {
             // if it is a rare one.
             Err(error) => {
                 let problem = error.problems()[0].summary();
-                let known = ["numerics.step", "a joint board cannot be told of this axis"];
+                let known = [
+                    "numerics.step",
+                    "a joint board cannot be configured for this axis",
+                ];
                 assert!(
                     known.iter().any(|why| problem.contains(why)),
                     "{seed}: {problem}"

@@ -202,7 +202,7 @@ fn exit_codes_page() {
             row(&mut body, &[code, when.trim_start()]);
         }
     }
-    let intro = "What the program tells the shell, as in `wheeleg --help`. Commands with codes of their \
+    let intro = "Exit codes of the program, as in `wheeleg --help`. Commands with codes of their \
                  own have a section below.";
     page("exit-codes.md", "Exit codes", intro, &body);
 }

@@ -83,7 +83,7 @@ fn commissioned_boards_run_and_swapped_ones_are_named_with_both_ids() {
         assert!(said.contains(words), "`{words}` in {said}");
     }
     let (good, said) = run(&section.replace("joint5 = \"05", "joint5 = \"0"));
-    assert!(!good && said.contains("is no unique id"), "{said}");
+    assert!(!good && said.contains("is not a unique id"), "{said}");
     let (good, said) = wheeleg(&["commission", "--fault", "other-interface:joint4@0s"]);
     assert!(
         !good && said.contains("joint 4") && said.contains("same version"),

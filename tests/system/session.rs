@@ -90,7 +90,7 @@ fn a_fault_that_cannot_be_injected_is_refused() {
 
     let open = fault("pot-open:joint3@0s");
     let not_active = inject(&open, false).expect_err("it has not begun");
-    assert!(not_active.contains("not under way"), "{not_active}");
+    assert!(not_active.contains("it is not active"), "{not_active}");
     inject(&open, true).expect("it can begin");
     let rival = inject(&fault("pot-short:joint3@0s"), true).expect_err("one wiper");
     assert!(rival.contains("potentiometer of joint3"), "{rival}");

@@ -42,6 +42,9 @@ pub(crate) fn steps(report: &mut Report) {
             .env("MPLBACKEND", "agg"))?;
         Ok(())
     });
+    report.step("identify: the least cost, by SciPy too", || {
+        identification(&python, &wheeleg)
+    });
     report.step("fmu: units in FMPy, equal to the package", || {
         // The program links this crate, and cargo builds all its kinds for that. To build it alone would
         // build what it needs a second time, with other features.
@@ -64,6 +67,25 @@ pub(crate) fn steps(report: &mut Report) {
         }
         Ok(())
     });
+}
+
+/// `wheeleg identify` comes to the cost that SciPy's least squares finds over the package's plant.
+fn identification(python: &Path, wheeleg: &Path) -> StepResult<()> {
+    let folder = target_dir().join("xtask").join("identify");
+    if folder.exists() {
+        fs::remove_dir_all(&folder)?;
+    }
+    let found = figures(
+        command(python)
+            .arg("tests/python/check_identify.py")
+            .arg(wheeleg)
+            .arg(&folder),
+        |line| line.starts_with("identify: "),
+    )?;
+    for figure in found {
+        println!("    {figure}");
+    }
+    Ok(())
 }
 
 /// The interpreter of an environment that has the wheel, and beside it the suite's packages.

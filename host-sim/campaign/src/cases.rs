@@ -101,7 +101,7 @@ impl<'a> Cases<'a> {
         }
         Err(CampaignError::refused(
             format!("no case of the first sample can be: {why}"),
-            "change the plan: what is wrong is wrong in all of its cases",
+            "correct the plan: the error affects all of its cases",
         ))
     }
 

@@ -33,7 +33,7 @@ impl FromStr for CaseId {
         match number {
             Some(Ok(number)) => Ok(Self(number)),
             _ => Err(format!(
-                "`{text}` is no case: that has 32 hexadecimal digits"
+                "`{text}` is not a case: that has 32 hexadecimal digits"
             )),
         }
     }

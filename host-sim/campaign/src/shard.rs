@@ -43,7 +43,7 @@ impl Shard {
             };
             let number = text.parse().map_err(|_| {
                 CampaignError::refused(
-                    format!("the variable {name} = {text:?} is no whole number"),
+                    format!("the variable {name} = {text:?} is not a whole number"),
                     "unset it, or give --shard I/N",
                 )
             })?;
@@ -57,7 +57,7 @@ impl Shard {
         if let (Some(task), Some(n)) = (task, tasks) {
             let i = task.checked_sub(first).filter(|i| *i < n).ok_or_else(|| {
                 CampaignError::refused(
-                    format!("task {task} of a Slurm array of {n} from {first} is no shard"),
+                    format!("task {task} of a Slurm array of {n} from {first} is not a shard"),
                     "submit `--array=0-N` without gaps, or give --shard I/N",
                 )
             })?;

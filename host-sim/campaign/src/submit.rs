@@ -201,7 +201,7 @@ fn output_of(program: &str, arguments: &[String]) -> Result<String, CampaignErro
         .map_err(|e| {
             CampaignError::refused(
                 format!("cannot start `{program}`: {e}"),
-                "submit where Slurm is, or print with --dry-run what would be submitted",
+                "submit on a computer with Slurm, or use --dry-run to print the job",
             )
         })?;
     if output.status.success() {
@@ -213,7 +213,7 @@ fn output_of(program: &str, arguments: &[String]) -> Result<String, CampaignErro
             output.status,
             String::from_utf8_lossy(&output.stderr).trim()
         ),
-        "mend what it says, with --slurm-arg for partition, account or time",
+        "fix what Slurm reports, with --slurm-arg for partition, account or time",
     ))
 }
 

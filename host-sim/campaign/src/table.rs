@@ -332,7 +332,7 @@ impl TableReader {
         };
         let columns = reader.fact(crate::columns::FACT).unwrap_or_default();
         reader.columns = serde_json::from_str(columns).map_err(|_| {
-            let other = "it is no table of a campaign: its columns are not described as there";
+            let other = "it is not a table of a campaign: its columns are not described as there";
             ParquetError::General(other.to_owned())
         })?;
         let schema = reader.file.metadata().file_metadata().schema_descr();

@@ -36,7 +36,7 @@ pub(super) fn read(r: &mut Reader) -> [Option<UniqueId>; 8] {
         if id.is_none() {
             r.problem(
                 Some(span),
-                format!("`commissioned.{name}` = \"{text}\" is no unique id"),
+                format!("`commissioned.{name}` = \"{text}\" is not a unique id"),
                 "not 24 hexadecimal digits",
                 Some("`wheeleg commission` prints the ids of the boards that are there".to_owned()),
             );

@@ -248,7 +248,7 @@ fn behaviours(r: &mut Reader) -> Behaviours {
     let off = r.texts(&entry, "off", |text| {
         Behaviour::of_name(text).ok_or_else(|| {
             let names = Behaviour::ALL.map(Behaviour::name).join(", ");
-            format!("`{text}` is no behaviour; allowed: {names}")
+            format!("`{text}` is not a behaviour; allowed: {names}")
         })
     });
     off.into_iter().fold(Behaviours::ALL, Behaviours::without)

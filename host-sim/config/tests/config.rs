@@ -731,7 +731,7 @@ fn odd_seeds_and_doubled_names_are_told_with_what_would_do() {
     }
     assert_all(
         &told("1\nseed = 2"),
-        &["my.toml:7:", "duplicate key", "stands once"],
+        &["my.toml:7:", "duplicate key", "only once"],
     );
     assert_all(&told("0,5"), &["my.toml:6:", "decimal point"]);
 }

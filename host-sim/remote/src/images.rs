@@ -122,7 +122,7 @@ pub fn ensure_same_sources(nodes: &Nodes) -> Result<(), RemoteError> {
         None => Ok(()),
         Some(image) => Err(RemoteError::new(
             format!(
-                "{}: that its run equals one in this program cannot be asked",
+                "{}: its run cannot be compared bit for bit with one in this program",
                 image.of_other_sources()
             ),
             format!(

@@ -72,7 +72,7 @@ impl HilOptions {
                 patience: PATIENCE,
             }),
             _ => Err(RemoteError::new(
-                format!("`{text}` is no serial port"),
+                format!("`{text}` is not a serial port"),
                 "write PORT or PORT@RATE with a rate from 1200 to 12000000, for example \
                  /dev/ttyACM0@115200; --node has hil: before it",
             )),

@@ -183,7 +183,7 @@ impl<S: Stream> Transport<S> {
     fn damaged(&self, error: FrameError) -> RemoteError {
         RemoteError::new(
             format!(
-                "{} sends what is no message of the board link: {error}",
+                "{} sends something that is not a message of the board link: {error}",
                 self.name()
             ),
             "build image and program from the same sources; on a serial port, check baud rate and cable",
@@ -205,7 +205,7 @@ pub(super) fn unexpected(name: &str, reply: &Reply) -> RemoteError {
             "what was logged up to here is complete",
         ),
         Reply::Hello(_) | Reply::Done | Reply::Ran(_) | Reply::Nonvolatile(_) => (
-            "answers out of turn, as to another request".to_owned(),
+            "answered out of order, as if to another request".to_owned(),
             "build image and program from the same sources: cargo xtask pil --build",
         ),
     };

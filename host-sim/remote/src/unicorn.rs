@@ -207,7 +207,7 @@ impl Line for Unicorn {
                 }
                 Err(e) => {
                     return Err(RemoteError::new(
-                        format!("the emulated boards send what is no message: {e}"),
+                        format!("the emulated boards send something that is not a message: {e}"),
                         BUILD,
                     ));
                 }

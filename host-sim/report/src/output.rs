@@ -165,7 +165,7 @@ fn lock(path: &Path) -> Result<File, ReportError> {
         .read_to_end(&mut text)
         .map_err(failed)?;
     if !text.is_empty() && !text.starts_with(HOLDER.as_bytes()) {
-        return Err(foreign("it is no lock of this program"));
+        return Err(foreign("it is not a lock of this program"));
     }
     // Written in any case: the time of the file is the start of the run.
     file.set_len(0).map_err(failed)?;

@@ -344,6 +344,6 @@ pub fn commission(
     }
     Err(SimError::simulation(
         format!("the boards cannot be commissioned: {}", said.join("; ")),
-        "mend what the master names, and try again",
+        "fix what the master reports, and try again",
     ))
 }

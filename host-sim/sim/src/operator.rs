@@ -302,7 +302,7 @@ pub(super) fn refused(command: &Command, why: &Reject) -> SimError {
             command.code().name(),
             reject(why)
         ),
-        "the events of the log tell what the robot was doing",
+        "the events in the log show what the robot was doing",
     )
 }
 

@@ -27,7 +27,9 @@ pub(crate) fn refused(file: &str, params: &PlantParams, error: &dyn std::fmt::Di
              nose uphill this robot stands on up to {deg}°, and wheels and feet must find no rock, \
              edge or hole below them"
         ),
-        None => format!("correct the robot {file}: it stands in its start pose on no ground"),
+        None => format!(
+            "correct the robot {file}: in its start pose it cannot stand even on level ground"
+        ),
     };
     SimError::simulation(error.to_string(), help)
 }

@@ -114,7 +114,7 @@ pub(crate) fn failed(now_ns: u64, error: &PlantError, last: &Outputs) -> SimErro
     };
     SimError::Unphysical {
         what: format!(
-            "the plant left its range at {:.4} s after power-up, in {}: {error}; last sound values, \
+            "the plant left its range at {:.4} s after power-up, in {}: {error}; last valid values, \
              at {:.4} s: {}",
             now_ns as f64 * 1e-9,
             part.name(),

@@ -62,7 +62,7 @@ pub enum StudyError {
     #[diagnostic(
         code(wheeleg::output),
         help(
-            "what was done is done, and what a study writes into its folder is there; send standard output somewhere else"
+            "the command has finished, and the files of a study are in its folder; redirect standard output elsewhere"
         )
     )]
     Stdout(std::io::Error),

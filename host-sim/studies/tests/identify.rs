@@ -319,7 +319,7 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
         ),
         (
             with(7, "0.005,40,0.5,0,0,1000,1,1"),
-            "column `fill_a_us`: 0.5 is no whole number",
+            "column `fill_a_us`: 0.5 is not a whole number",
         ),
         (
             with(7, "0.005,40,0,0,0,1000,101325,1"),
@@ -327,7 +327,7 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
         ),
         (
             with(7, "0.005,many,0,0,0,1000,1,1"),
-            "\"many\" is no number",
+            "\"many\" is not a number",
         ),
         (
             with(7, "0.105,40,0,0,0,1000,1,1"),

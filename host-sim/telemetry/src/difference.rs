@@ -58,7 +58,7 @@ fn message(here: Option<Logged>, there: Option<Logged>) -> String {
                     "{}, {name}: {value} on the host, {other} with the boards",
                     at(&here)
                 ),
-                None => format!("{}, which is no message of this program", at(&here)),
+                None => format!("{}, which is not a message of this program", at(&here)),
             }
         }
         (here, there) => {

@@ -40,12 +40,14 @@ pub enum LogError {
     #[error("cannot write the log: {}", message(.0))]
     #[diagnostic(
         code(wheeleg::log),
-        help("the disk may be full; `wheeleg log recover` makes a whole log of what was written")
+        help(
+            "the disk may be full; `wheeleg log recover` restores a complete log from what was written"
+        )
     )]
     Log(#[from] mcap::McapError),
 
     /// Tables that could not be written to their end.
-    #[error("cannot write {count} of the tables to their end, the first `{}`: {reason}", path.display())]
+    #[error("cannot finish {count} of the tables, the first is `{}`: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::output),
         help("choose another folder with --out DIR, or make room in this one")
@@ -73,7 +75,7 @@ pub enum LogError {
     },
 
     /// A file that is no MCAP log.
-    #[error("`{}` is not an MCAP log: it does not begin as one", path.display())]
+    #[error("`{}` is not an MCAP log: it does not start like one", path.display())]
     #[diagnostic(
         code(wheeleg::log),
         help("the log of a run is the file log.mcap in its folder")

@@ -200,8 +200,8 @@ fn however_it_is_run_the_table_is_the_same() {
                 .arg("--out")
                 .arg(&out),
         );
-        assert!(told.contains("row     the same to the bit"), "{told}");
-        assert!(told.contains("log     the same to the bit"), "{told}");
+        assert!(told.contains("row     bit-identical"), "{told}");
+        assert!(told.contains("log     bit-identical"), "{told}");
         assert!(out.join("log.mcap").exists() && out.join("report.html").exists());
         fs::remove_dir_all(&out).expect("there");
     }

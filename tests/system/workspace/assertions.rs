@@ -121,19 +121,22 @@ fn look(stream: TokenStream, names: &mut BTreeSet<String>, fails: &mut bool) {
             TokenTree::Group(group) => look(group.stream(), names, fails),
             TokenTree::Ident(word) => {
                 let word = word.to_string();
-                let is_macro =
-                    matches!(tokens.peek(), Some(TokenTree::Punct(p)) if p.as_char() == '!');
-                let can_fail = [
-                    "assert",
-                    "prop_assert",
-                    "debug_assert",
-                    "panic",
-                    "unreachable",
-                ];
-                if is_macro && can_fail.iter().any(|begin| word.starts_with(begin)) {
-                    *fails = true;
+                match tokens.peek() {
+                    Some(TokenTree::Punct(punct)) if punct.as_char() == '!' => {
+                        let can_fail = ["assert", "prop_assert", "panic"];
+                        *fails |= can_fail.iter().any(|begin| word.starts_with(begin));
+                    }
+                    // A call, with the types of a generic function between or without.
+                    Some(TokenTree::Punct(punct)) if punct.as_char() == ':' => {
+                        names.insert(word);
+                    }
+                    Some(TokenTree::Group(group))
+                        if group.delimiter() == Delimiter::Parenthesis =>
+                    {
+                        names.insert(word);
+                    }
+                    _ => (),
                 }
-                names.insert(word);
             }
             _ => (),
         }
@@ -185,7 +188,7 @@ fn a_test_that_proves_nothing_is_found() {
         macro! { #[test] fn inside(x in any) { prop_assert!(x); } }
         #[test] fn idle() { let _ = run(); }
         #[test] #[ignore] fn off() { assert!(true); }
-        mod inner { #[test] fn idle_too() { run().unwrap(); } }
+        mod inner { #[test] fn idle_too() { let holds = run(); holds.unwrap(); } }
         "#
         .to_owned(),
     )];

@@ -60,7 +60,7 @@ fn read(library: &Path) -> Result<Vec<u8>, FmuError> {
     };
     let has = |name: &str| code.windows(name.len()).any(|at| at == name.as_bytes());
     if !code.starts_with(head) {
-        return Err(no("it is no program code for this computer".to_owned()));
+        return Err(no("it is not program code for this computer".to_owned()));
     }
     if !(has("fmi2Instantiate") && has("fmi3InstantiateCoSimulation")) {
         return Err(no("it lacks the functions of FMI".to_owned()));

@@ -31,7 +31,9 @@ pub enum FmuError {
     #[error("cannot read {}: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::fmu::resources),
-        help("unpack the whole unit, and let the importer tell its folder of resources")
+        help(
+            "unpack the whole unit, and let the importer pass the location of its resources folder"
+        )
     )]
     Resources {
         /// File.
@@ -122,7 +124,7 @@ pub enum FmuError {
         when: &'static str,
     },
     /// A step that is no whole number of ticks.
-    #[error("a step of {step_s} s is no multiple of 1 ms")]
+    #[error("a step of {step_s} s is not a multiple of 1 ms")]
     #[diagnostic(
         code(wheeleg::fmu::step),
         help("the boards work in ticks of 1 ms: choose a step of 1 ms, 2 ms, … up to an hour")
@@ -132,7 +134,7 @@ pub enum FmuError {
         step_s: f64,
     },
     /// A step from another time than the unit's own.
-    #[error("a step begins at {given_s} s, and the unit stands at {own_s} s")]
+    #[error("a step begins at {given_s} s, but the unit is at {own_s} s")]
     #[diagnostic(
         code(wheeleg::fmu::time),
         help("to go back in time, put a state back that was taken then")

@@ -13,7 +13,7 @@ use crate::value::Value;
 pub enum Role {
     /// Time, which an importer knows itself.
     Time,
-    /// Seed of the converter's noise; set before the start.
+    /// Seed of the ADC noise; set before the start.
     Seed,
     /// Number of the axis file: index in its listing, component; set before the start.
     Parameter {
@@ -85,7 +85,7 @@ const CONTROLLED_INPUTS: [InputRow; 3] = [
         "m",
         Dimension::Length,
         REFERENCES_M,
-        "Stroke that is asked for; the board takes it every 10 ms",
+        "Stroke set-point; the board takes it every 10 ms",
         |axis| axis.axis.initial_stroke_m,
     ),
     (
@@ -275,7 +275,7 @@ pub(crate) fn list(kind: Kind, axis: &AxisConfig) -> Vec<Variable> {
             name: "seed".into(),
             unit: String::new(),
             dimension: Dimension::Number,
-            description: "Seed of the converter's noise".into(),
+            description: "Seed of the ADC noise".into(),
             role: Role::Seed,
             start: Value::Integer(1),
             range: Some([0.0, f64::from(i32::MAX)]),

@@ -155,9 +155,9 @@ impl Cylinder {
     /// Puts a state back that was taken of a cylinder of the same axis.
     fn restore(&mut self, state: &[u8]) -> PyResult<()> {
         let (state, code): (AxisState, u16) = serde_json::from_slice(state)
-            .map_err(|e| error::value(format!("this is no state of a cylinder: {e}")))?;
+            .map_err(|e| error::value(format!("this is not a state of a cylinder: {e}")))?;
         if state.core.cylinders.len() != 1 {
-            return Err(error::value("this is no state of one cylinder"));
+            return Err(error::value("this is not a state of one cylinder"));
         }
         (self.state, self.code) = (state, code);
         Ok(())

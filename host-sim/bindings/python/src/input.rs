@@ -59,7 +59,9 @@ pub(crate) fn whole(what: &dyn Display, value: f64, max: u16) -> PyResult<u16> {
     if value.fract() == 0.0 {
         Ok(value as u16)
     } else {
-        Err(error::value(format!("{what} = {value} is no whole number")))
+        Err(error::value(format!(
+            "{what} = {value} is not a whole number"
+        )))
     }
 }
 

@@ -66,7 +66,7 @@ def test_load_and_mass_act():
     ("act", "told"),
     [
         (lambda c: c.tick([0, 0, 0, 1001]), r"on_us\[3\] = 1001 is outside 0 to 1000"),
-        (lambda c: c.tick([0, 0.5, 0, 0]), r"on_us\[1\] = 0\.5 is no whole number"),
+        (lambda c: c.tick([0, 0.5, 0, 0]), r"on_us\[1\] = 0\.5 is not a whole number"),
         (lambda c: c.tick([0, 0, 0]), "3 values, not 4"),
         (lambda c: c.run([[0, 0, 0, 0], [0, -1, 0, 0]]), r"on_us\[1\]\[1\] = -1 is outside"),
         (lambda c: c.run([[0, 0, 0, 0]], [1.0, 2.0]), "load_n has 2 values, not 1"),

@@ -137,7 +137,7 @@ kinds! {
     CommandFlood = "command-flood", Robot, value("1/cycle", 1.0, 1000.0, 100.0, "commands per bus cycle"),
         "A user gives more commands than the FIFO between the layers holds.";
     NodeSilent = "node-silent", Board, None,
-        "A board hears and works, but its transmitter is dead.";
+        "A board receives and works, but its transmitter is dead.";
     NodeOff = "node-off", Board, None,
         "A board loses its power, for good unless an end is given: its outputs drop, it hears and says nothing.";
     NodeReset = "node-reset", Board, None,
@@ -145,13 +145,13 @@ kinds! {
     BrownOut = "brown-out", Board, value("ms", 1.0, 1000.0, 30.0, "time without power"),
         "A board loses its power for a while and starts anew.";
     NodeHang = "node-hang", Board, None,
-        "A board's program stops; its hardware goes on with the last outputs until the watchdog bites.";
+        "A board's program stops; its hardware keeps the last outputs until the watchdog resets it.";
     ProcessorFault = "processor-fault", Board, None,
-        "A board's program jumps to where nothing is: its fault handler turns the outputs off and resets it.";
+        "A board's program jumps to an unmapped address: its fault handler turns the outputs off and resets it.";
     Babble = "babble", Board, None,
-        "A board sends rubbish; its driver-enable time limit lets it through in its own slot only, and cuts it off there.";
+        "A board babbles; its driver-enable time limit confines it to its own slot and cuts it off there.";
     BabbleUnguarded = "babble-unguarded", Board, None,
-        "A board sends rubbish without end, and its driver-enable time limit is broken too.";
+        "A board babbles without end, and its driver-enable time limit is broken too.";
     BusFull = "bus-full", Robot, None,
         "A stream of records fills all of the line that SYNC, slots and requests leave free.";
     DuplicateAddress = "duplicate-address", Board, None,
@@ -263,8 +263,7 @@ impl FaultKind {
     }
 }
 
-const CONSOLE: &str =
-    "in a run nobody is at a console; the row of the fault matrix has an operator";
+const CONSOLE: &str = "a run has no operator at a console; use the row of the fault matrix instead";
 const UPDATE: &str = "there is no firmware update over the bus yet";
 
 /// Faults that cannot be injected yet, and why. They are refused by name.

@@ -321,7 +321,7 @@ fn times(text: &str) -> Result<(f64, Option<f64>), String> {
         number
             .and_then(|(n, unit)| Some(n.parse::<f64>().ok()? * unit))
             .filter(|s| s.is_finite() && *s >= 0.0)
-            .ok_or_else(|| format!("`{t}` is no time from 0 on in s or ms"))
+            .ok_or_else(|| format!("`{t}` is not a time from 0 on in s or ms"))
     };
     let Some((from, until)) = text.split_once("..") else {
         return Ok((seconds(text)?, None));
@@ -461,7 +461,7 @@ mod tests {
             ("pot-open:joint9", "joint9"),
             (
                 "ui-replay@1s",
-                "not implemented: in a run nobody is at a console",
+                "not implemented: a run has no operator at a console",
             ),
             (
                 "brown-out/update:joint3@1s",

@@ -75,7 +75,7 @@ impl Reader {
                         format!("TOML has no number so large; write \"{number}\" in quotes")
                     }
                     _ if e.message().contains("duplicate key") => {
-                        "a name stands once in its section, and a [section] once in the file"
+                        "a name may occur only once in its section, and a [section] only once in the file"
                             .to_owned()
                     }
                     _ if has_decimal_comma(text, span.start) => {

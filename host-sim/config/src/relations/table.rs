@@ -46,13 +46,13 @@ const fn told(name: &'static str, fields: Fields, parameter: JointParam) -> Rela
     relation(
         name,
         fields,
-        "a joint board cannot be told of this axis",
+        "a joint board cannot be configured for this axis",
         Rule::Told(parameter),
     )
 }
 
 const HYSTERESIS: &str = "a contact opens at a lower pressure than it closes";
-const NO_CONTACT: &str = "a contact that never closes: the supply would be taken for lost";
+const NO_CONTACT: &str = "a contact that never closes: the supply would be considered lost";
 const REGULATOR: &str = "a regulator lowers the pressure of its source, and raises none";
 const PRESSURE: &str = "a chamber has more pressure than its supply";
 const START: &str = "the piston starts beyond its stop";

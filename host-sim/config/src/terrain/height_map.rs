@@ -222,7 +222,7 @@ fn picture(bytes: &[u8]) -> Result<Values, String> {
     // The decoder names what it has found as programs name it.
     let no_picture = |e: png::DecodingError| match e {
         png::DecodingError::LimitsExceeded => "the picture is too large".to_owned(),
-        _ => "it is no whole PNG picture".to_owned(),
+        _ => "it is not a complete PNG picture".to_owned(),
     };
     let mut reader = decoder.read_info().map_err(no_picture)?;
     let info = reader.info();
@@ -328,7 +328,7 @@ mod tests {
         broken[12..16].copy_from_slice(&[0; 4]);
         for bytes in [&b"not a picture"[..], &broken, &broken[..20], &[]] {
             let said = picture(bytes).map(drop).unwrap_err();
-            assert_eq!(said, "it is no whole PNG picture");
+            assert_eq!(said, "it is not a complete PNG picture");
         }
     }
 }

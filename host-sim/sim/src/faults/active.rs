@@ -39,7 +39,7 @@ impl ActiveFaults {
     pub(crate) fn end(&mut self, fault: &FaultSpec) -> Result<(), SimError> {
         let Some(at) = self.0.iter().position(|(active, _)| active == fault) else {
             return Err(SimError::simulation(
-                format!("the fault `{fault}` cannot end: it is not under way"),
+                format!("the fault `{fault}` cannot be ended: it is not active"),
                 "end a fault that has begun",
             ));
         };

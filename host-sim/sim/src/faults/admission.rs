@@ -84,7 +84,7 @@ fn cannot_begin(fault: &FaultSpec) -> SimError {
     SimError::simulation(
         format!("the fault `{fault}` cannot begin or end while the robot runs"),
         format!(
-            "a board is built so: write `{}{}@0s`",
+            "this fault is a property of the board: write `{}{}@0s`",
             fault.kind.name(),
             fault.target
         ),
@@ -110,7 +110,10 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
             "it has no watchdog that would start it again",
             "`sil` or `pil`",
         ),
-        (_, F::ProcessorFault) => ("nothing makes its processor fault there", "`sil` or `pil`"),
+        (_, F::ProcessorFault) => (
+            "a processor fault cannot be provoked there",
+            "`sil` or `pil`",
+        ),
         (NodeKind::Qemu, _) => return Ok(()),
         // One that falls silent for good can keep its cable.
         (_, F::NodeOff) if fault.until_s.is_none() => return Ok(()),
@@ -148,10 +151,10 @@ pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimEr
     match scenario.faults.iter().find(on_line) {
         Some(fault) if !nodes.all_native() => Err(SimError::simulation(
             format!(
-                "with the fault `{fault}`, boards remote of this program may differ from its \
-                 own: these get a frame as a whole, those byte by byte"
+                "with the fault `{fault}`, boards outside of this program may differ from \
+                 its own: the native boards receive whole frames, the remote ones single bytes"
             ),
-            "run without --compare-sil, which tells where boards differ at their pins",
+            "omit --compare-sil; the run then reports where boards differ at their pins",
         )),
         _ => Ok(()),
     }

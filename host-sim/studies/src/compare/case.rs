@@ -30,7 +30,7 @@ pub struct CaseId {
     pub motion: Move,
     /// What differs from the sheet.
     pub variation: Variation,
-    /// Seed of the converter's noise.
+    /// Seed of the ADC noise.
     pub seed: u64,
 }
 
@@ -39,20 +39,20 @@ pub struct CaseId {
 pub enum BadCaseId {
     /// Not five parts.
     #[error(
-        "`{0}` is no case: write AXIS/CONTROLLER/MOVE/VARIATION/SEED, as in bench-vq110u/predictive/step-100/load=0.8/1"
+        "`{0}` is not a case: write AXIS/CONTROLLER/MOVE/VARIATION/SEED, as in bench-vq110u/predictive/step-100/load=0.8/1"
     )]
     Parts(String),
     /// Unknown controller.
-    #[error("`{0}` is no controller: {names}", names = names(&Kind::ALL.map(Kind::name)))]
+    #[error("`{0}` is not a controller: {names}", names = names(&Kind::ALL.map(Kind::name)))]
     Controller(String),
     /// Unknown move.
-    #[error("`{0}` is no move: {names}", names = names(&Move::ALL.map(Move::name)))]
+    #[error("`{0}` is not a move: {names}", names = names(&Move::ALL.map(Move::name)))]
     Move(String),
     /// Unknown variation.
     #[error(transparent)]
     Variation(#[from] UnknownVariation),
     /// No number.
-    #[error("`{0}` is no seed: a whole number from 0 to {max}", max = u64::MAX)]
+    #[error("`{0}` is not a seed: a whole number from 0 to {max}", max = u64::MAX)]
     Seed(String),
 }
 
@@ -103,7 +103,7 @@ pub struct Case {
     /// Seed.
     pub seed: u64,
     plant: AxisParams,
-    /// Seed of the converter's noise, and milliseconds from power-up to the first move.
+    /// Seed of the ADC noise, and milliseconds from power-up to the first move.
     noise_seed: u64,
     wait_ms: u64,
     margin: f64,

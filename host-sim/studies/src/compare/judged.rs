@@ -138,9 +138,9 @@ fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
     let named = |what: String| StudyError::refused(format!("`{}` {what}", path.display()), help);
     let text = text_of(path).map_err(|e| named(format!("cannot be read: {e}")))?;
     let told: ToldCases = serde_json::from_str(&text)
-        .map_err(|e| named(format!("is no summary of a comparison: {e}")))?;
+        .map_err(|e| named(format!("is not a summary of a comparison: {e}")))?;
     if !told.schema.starts_with("wheeleg.compare/") {
-        return Err(named(format!("is a `{}`, no comparison", told.schema)));
+        return Err(named(format!("is a `{}`, not a comparison", told.schema)));
     }
     let (root, combinations) = (options.root, options.combinations);
     let drawn = |row: &Told| match row.variation.parse() {

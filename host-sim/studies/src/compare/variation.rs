@@ -35,7 +35,7 @@ pub enum Variation {
 
 /// A word that is no variation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is no variation: {KNOWN}")]
+#[error("`{word}` is not a variation: {KNOWN}")]
 pub struct UnknownVariation {
     word: String,
 }

@@ -199,7 +199,7 @@ fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError
         if map[..place].iter().any(|earlier| earlier.name == *name) {
             let help = "leave one of them out";
             return Err(StudyError::refused(
-                format!("{file}: `--map` tells twice where `{name}` is"),
+                format!("{file}: `--map` is given twice for `{name}`"),
                 help,
             ));
         }
@@ -295,7 +295,7 @@ fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
     }
     let line = error.position().map_or(1, csv::Position::line);
     StudyError::refused(
-        format!("{file}, line {line}: it is no row of a CSV table"),
+        format!("{file}, line {line}: it is not a row of a CSV table"),
         HELP,
     )
 }
@@ -326,7 +326,7 @@ fn row(
         value.ok_or_else(|| {
             let what = match text {
                 "" => "there is no value".to_owned(),
-                text => format!("\"{}\" is no number", shown(text)),
+                text => format!("\"{}\" is not a number", shown(text)),
             };
             let help = format!("a number with a decimal point, from {min} to {max}");
             at.wrong(name, &what, &help)
@@ -359,7 +359,7 @@ fn row(
         };
         let value = ranged(column, [0.0, most], help)?;
         if value.fract() != 0.0 {
-            let what = format!("{} is no whole number", pretty(value));
+            let what = format!("{} is not a whole number", pretty(value));
             return Err(at.wrong(name, &what, help));
         }
         *on = if columns.on_times {
@@ -416,7 +416,7 @@ fn units(
         if metres {
             "they look like metres: multiply them by 1000"
         } else {
-            "a piston that stands tells nothing: move it over a good part of its stroke"
+            "a piston at rest gives no information: move it over a good part of its stroke"
         },
     ))
 }

@@ -149,7 +149,7 @@ pub struct Options<'a> {
     pub axis: &'a str,
     /// Columns that have another name or unit in the measurement.
     pub map: &'a [Mapped],
-    /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
+    /// Fraction of the measurement, at its end, that is held out from the fit, 0.1 to 0.9.
     pub hold_out: f64,
     /// Seed of the starts.
     pub seed: u64,
@@ -400,7 +400,10 @@ impl Identified {
                         source: if parameter.told {
                             format!("IDENTIFIED from {lab}: {interval} (95 %)")
                         } else {
-                            format!("ASSUMED: {lab} does not tell it; before: {}", info.source)
+                            format!(
+                                "ASSUMED: {lab} does not determine it; before: {}",
+                                info.source
+                            )
                         },
                     }
                 })

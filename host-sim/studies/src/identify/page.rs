@@ -103,9 +103,9 @@ pub(super) fn render(
 ) -> Result<String, StudyError> {
     let told = identified.parameters.iter().filter(|p| p.told).count();
     let explained = if identified.is_explained() {
-        "the rest of the measurement is met within three times the sensor's noise"
+        "the held-out data are matched within three times the sensor's noise"
     } else {
-        "the rest of the measurement is not met: the model lacks something that the bench has, such as a leak"
+        "the held-out data are not matched: the model lacks something that the bench has, such as a leak"
     };
     let next = |experiment: &'_ Experiment| experiment.ignorance.exp() * 100.0;
     let values = Page {
@@ -113,7 +113,7 @@ pub(super) fn render(
         version: env!("CARGO_PKG_VERSION"),
         name: &identified.config.name,
         verdict: format!(
-            "{told} of {} parameters are told; {explained}.",
+            "{told} of {} parameters are determined; {explained}.",
             identified.parameters.len()
         ),
         before_mm: identified.before.held_out_mm,

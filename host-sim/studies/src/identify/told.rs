@@ -85,10 +85,10 @@ pub fn untold(information: &DMatrix<f64>) -> Vec<String> {
                 .collect();
             match &words[..] {
                 [_] => format!(
-                    "{}: it has hardly an effect on what was measured",
+                    "{}: it has hardly any effect on the measurement",
                     FREE[parts[0]].words
                 ),
-                _ => format!("{} together look the same", words.join(", ")),
+                _ => format!("{} together give the same data", words.join(", ")),
             }
         })
         .collect()

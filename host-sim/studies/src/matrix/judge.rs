@@ -137,7 +137,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
     }
     for unjust in row.silent_about {
         f.check(message(ran, *unjust).is_none(), || {
-            format!("a message blames what is sound: {unjust}")
+            format!("a message blames a healthy part: {unjust}")
         });
     }
     let taken = messages(ran).any(|event| {
@@ -241,7 +241,11 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &
         );
     }
     f.within("all valves commanded shut", m.commanded_ms, expected.all_ms);
-    f.within("all boards tell a safe mode", m.sensed_ms, expected.all_ms);
+    f.within(
+        "all boards report a safe mode",
+        m.sensed_ms,
+        expected.all_ms,
+    );
     physically_shut(f, after_all, m, expected.all_ms);
     f.within(
         "both wheels stand",
@@ -326,7 +330,7 @@ fn degrades(f: &mut Failures, after_all: &AfterAll, m: &Measured) {
             let all_ms = detected + REACTION_MS;
             f.check(m.stopped, || "detected, but not all axes stop".to_owned());
             f.within("all valves commanded shut", m.commanded_ms, all_ms);
-            f.within("all boards tell a safe mode", m.sensed_ms, all_ms);
+            f.within("all boards report a safe mode", m.sensed_ms, all_ms);
             physically_shut(f, after_all, m, all_ms);
             f.within(
                 "both wheels stand",
@@ -396,7 +400,7 @@ mod tests {
         for what in [
             "valves of the axis commanded shut: never",
             "all valves commanded shut: never",
-            "all boards tell a safe mode: never",
+            "all boards report a safe mode: never",
             "valves physically shut: never",
             "both wheels stand: never",
             "not latched",

@@ -27,8 +27,8 @@ pub(super) fn reaction(row: &Row) -> String {
                 Since::Motion(_) => format!("{whose}; times count from 2 mm of expected motion"),
             }
         }
-        Expect::GoesOn { .. } => "the motion goes on".to_owned(),
-        Expect::Degrades => "goes on, or all axes stop; nothing wrong is acted on".to_owned(),
+        Expect::GoesOn { .. } => "the motion continues".to_owned(),
+        Expect::Degrades => "continues, or all axes stop; no wrong data are acted on".to_owned(),
         Expect::StartsAnew { board } => {
             format!("board {board} starts anew, disarmed, with the old parameters or the new ones")
         }

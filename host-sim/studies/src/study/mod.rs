@@ -25,7 +25,7 @@ use wheeleg_report::{page, subfolder};
 pub use progress::STACK;
 pub use progress::{Ended, Progress};
 pub use schema::Summary;
-pub use stop::{Signal, Stop};
+pub use stop::{Signal, Stop, outlive_file_limit};
 
 use crate::StudyError;
 

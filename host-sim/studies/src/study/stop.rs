@@ -56,9 +56,12 @@ impl Signal {
     }
 }
 
-/// A file that may grow no further (`ulimit -f`, the limit of a batch system) is told as a full disk is:
-/// the signal of it, which would end the program without a word, is heard by nobody.
-fn outlive_file_limit() -> std::io::Result<()> {
+/// From here on a file that has reached the limit on its size (`ulimit -f`, a batch system) is an error
+/// of the write, as a full disk is. Its signal would end the program without a message.
+///
+/// # Errors
+/// What the operating system says if a handler cannot be set.
+pub fn outlive_file_limit() -> std::io::Result<()> {
     #[cfg(unix)]
     flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     Ok(())
@@ -82,7 +85,6 @@ impl Stop {
     /// # Errors
     /// What the operating system says if a handler cannot be set.
     pub fn on_signals() -> std::io::Result<Self> {
-        outlive_file_limit()?;
         let stop = Self {
             idle: Arc::new(AtomicBool::new(true)),
             ..Self::default()

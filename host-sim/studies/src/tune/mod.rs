@@ -106,7 +106,7 @@ pub struct Parameter {
 pub struct Tuned {
     /// The axis.
     pub config: AxisConfig,
-    /// Seed of the converter's noise.
+    /// Seed of the ADC noise.
     pub seed: u64,
     /// Force left over the load, at most 1000.
     pub margin: f64,
@@ -131,7 +131,7 @@ pub struct Tuned {
 pub struct Summary<'a> {
     /// Name of the axis.
     axis: &'a str,
-    /// Seed of the converter's noise, a whole number as text: a number of JSON is exact up to 2^53
+    /// Seed of the ADC noise, a whole number as text: a number of JSON is exact up to 2^53
     /// alone.
     seed: String,
     /// Force left over the load, at most 1000 for no load.

@@ -136,7 +136,7 @@ fn span(options: &Options) -> Result<Span, StudyError> {
     let Options { from_s, to_s, .. } = *options;
     if !(from_s >= 0.0 && to_s > from_s) {
         return Err(StudyError::refused(
-            format!("from {from_s} s to {to_s} s is no part of a log"),
+            format!("from {from_s} s to {to_s} s is not part of a log"),
             "give --from from 0 on, and --to after it",
         ));
     }

@@ -140,7 +140,7 @@ pub(super) fn groups() -> Vec<Group> {
     vec![
         Group {
             id: "strokes",
-            title: "Strokes: what the master asked, and what the boards sensed",
+            title: "Strokes: commanded by the master and measured by the boards",
             caption: "A drag across a plot zooms all of them; a double click shows everything again.",
             plots: strokes.collect(),
         },
@@ -190,7 +190,7 @@ fn named(name: &str) -> Result<Plot, StudyError> {
     let refused = |what: String| StudyError::refused(what, help);
     let (topic, field) = name
         .split_once('.')
-        .ok_or_else(|| refused(format!("`{name}` is no signal")))?;
+        .ok_or_else(|| refused(format!("`{name}` is not a signal")))?;
     let place = channels().iter().position(|c| c.topic == topic);
     let place = place.ok_or_else(|| refused(format!("there is no channel `{topic}`")))?;
     let channel = &channels()[place];

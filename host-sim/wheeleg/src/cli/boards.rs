@@ -41,7 +41,7 @@ pub(super) fn command(args: &BoardsArgs) -> Result<ExitCode, StudyError> {
     let path = pty.path();
     print(&format!(
         "eight boards of `{}` at {path}\n\
-         lead them: wheeleg serve {} --robot {} --port {path}\n\
+         drive them: wheeleg serve {} --robot {} --port {path}\n\
          Ctrl-C ends it.\n",
         robot.name, args.scenario, robot.name
     ))?;

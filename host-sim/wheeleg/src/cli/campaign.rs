@@ -29,17 +29,17 @@ pub(super) struct CampaignArgs {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run a campaign, or a shard of it. Killed or stopped: run it again.
+    /// Run a campaign, or a shard of it. If it was killed or stopped, run it again to continue.
     Run(RunArgs),
-    /// Give the shards of a campaign to Slurm, or print a job for Kubernetes.
+    /// Submit the shards of a campaign to Slurm, or print a job for Kubernetes.
     Submit(SubmitArgs),
-    /// Show the progress of a campaign, from its folder alone.
+    /// Show the progress of a campaign; needs only its folder.
     Status(StatusArgs),
     /// Make one table of the parts in one or more folders.
     Merge(MergeArgs),
     /// Make a page of a table: rates with intervals, distributions, correlations, worst cases.
     Report(ReportArgs),
-    /// Run one case again: its row, and log, figures and report.
+    /// Repeat one case, with its row, log, figures and report.
     Replay(ReplayArgs),
     /// Run one case into a file: what `run` does with one that may end the process.
     #[command(hide = true)]
@@ -53,8 +53,8 @@ struct RunArgs {
     /// Folder for the parts [default: runs/<plan>].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Only every N-th block, beginning with the I-th, from 0. Without it, that of a Slurm
-    /// array or of an indexed Kubernetes job.
+    /// Run only every N-th block, starting with the I-th (from 0) [default: the shard of the Slurm
+    /// array or of the indexed Kubernetes job, if there is one].
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Completions of an indexed Kubernetes job.
@@ -93,10 +93,10 @@ struct SubmitArgs {
     /// Tasks.
     #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
     shards: u64,
-    /// As a Slurm array, and a job that merges after it.
+    /// Submit a Slurm array, and a job that merges its results.
     #[arg(long, required_unless_present = "kubernetes")]
     slurm: bool,
-    /// As an indexed job of Kubernetes, printed for `kubectl apply -f -`.
+    /// Print an indexed job of Kubernetes, for `kubectl apply -f -`.
     #[arg(long, conflicts_with = "slurm")]
     kubernetes: bool,
     /// Print what would be submitted.
@@ -108,7 +108,7 @@ struct SubmitArgs {
     /// Image with this program.
     #[arg(long, value_name = "IMAGE", default_value = "wheeleg")]
     image: String,
-    /// Claim of a volume that all pods can write, the folder of the campaign.
+    /// Claim of a volume that all pods can write to; it holds the campaign's folder.
     #[arg(long, value_name = "CLAIM", default_value = "wheeleg-campaign")]
     claim: String,
 }
@@ -136,7 +136,7 @@ struct MergeArgs {
     /// The table.
     #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
     out: PathBuf,
-    /// Also where cases are missing: a table of those that have a row, as of a pilot.
+    /// Merge even if cases are missing: a table of the finished cases, for example of a pilot.
     #[arg(long)]
     partial: bool,
 }
@@ -145,10 +145,10 @@ struct MergeArgs {
 struct ReportArgs {
     /// Table of `wheeleg campaign merge`.
     table: PathBuf,
-    /// Another table, of another program, that it is compared with case by case.
+    /// Second table, from another version of the program, for a case-by-case comparison.
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
-    /// The page [default: beside the table].
+    /// The page [default: next to the table].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the findings as JSON on stdout.
@@ -160,7 +160,7 @@ struct ReportArgs {
 struct ReplayArgs {
     /// Folder of a campaign, or its merged table.
     from: PathBuf,
-    /// The case: its identity, 32 hexadecimal digits, or its place in the plan.
+    /// The case: its id of 32 hexadecimal digits, or its index in the plan.
     case: String,
     /// Folder for log, figures and report [default: runs/<plan>-<case>].
     #[arg(long, value_name = "DIR")]
@@ -257,7 +257,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     print(&text)?;
     if let Some(signal) = ran.stopped {
         tell(&format!(
-            "{} with {} of {} cases done; run the same command again to go on",
+            "{} with {} of {} cases done; run the same command again to continue",
             signal.label(),
             ran.found + ran.computed,
             ran.of
@@ -326,7 +326,7 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let merge = if args.partial { merge_partial } else { merge };
     let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
-        tell("stopped; no table is written, and the parts stay as they are");
+        tell("stopped; no table was written, and the parts are unchanged");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
     Ok(print(&print::merged(&merged, &args.out))?)
@@ -359,7 +359,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
     let replayed = replay(&args.from, &args.case, out, args.drawing.png, &stop)?;
     let stopped = || stop.signal().map_or(FAILED, stopped_code);
     let Some(replayed) = replayed else {
-        tell("stopped; the case was not run to its end, and nothing is written");
+        tell("stopped before the end of the case; nothing was written");
         return Ok(ExitCode::from(stopped()));
     };
     print(&print::replayed(&replayed))?;
@@ -369,7 +369,9 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
             return Ok(ExitCode::from(CANNOT_WRITE));
         }
         if let Some(why) = run.stopped {
-            tell(&format!("{why}; the files hold what was done until then"));
+            tell(&format!(
+                "{why}; the files hold the results up to that point"
+            ));
             return Ok(ExitCode::from(stopped()));
         }
     }
@@ -377,8 +379,8 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
         return Ok(ExitCode::SUCCESS);
     }
     Err(StudyError::refused(
-        "the case is not what it was",
-        "another program gives other rows; the same one must not: please report this",
+        "the result of the case has changed",
+        "another version of the program may give other rows; if it is the same version, please report this",
     )
     .into())
 }

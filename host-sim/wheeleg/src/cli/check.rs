@@ -24,7 +24,7 @@ pub(super) struct CheckArgs {
 enum What {
     /// Compare kinematics and dynamics with a file of reference vectors.
     ///
-    /// Prints the worst absolute error of every quantity beside its tolerance.
+    /// Prints the largest absolute error of every quantity next to its tolerance.
     /// Dimensions and masses are the file's. Exit codes: 0 all within
     /// tolerance, 1 a quantity is beyond it, 2 the file cannot be compared.
     Vectors(VectorsArgs),

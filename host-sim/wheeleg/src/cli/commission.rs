@@ -41,7 +41,7 @@ fn built_in(text: &str) -> Result<FaultSpec, String> {
     let known = KINDS.iter().filter(|info| info.kind.is_built_in());
     let known: Vec<&str> = known.map(|info| info.name).collect();
     Err(format!(
-        "`{}` begins later than this command asks; allowed: {}",
+        "`{}` begins later than this command can reach; allowed: {}",
         fault.kind.name(),
         known.join(", ")
     ))
@@ -55,7 +55,7 @@ pub(super) fn command(args: &CommissionArgs) -> Result<ExitCode, StudyError> {
     let nodes = Nodes::new(&args.nodes, &args.node)?;
     let ids = sil::commission(&scenario, &robot, scenario.seed, &nodes)?;
     let mut out = String::from(
-        "# Boards of this robot: another one at one of these addresses bars arming.\n[commissioned]\n",
+        "# Boards of this robot: a different board at one of these addresses prevents arming.\n[commissioned]\n",
     );
     for (name, id) in NODE_NAMES.iter().zip(ids) {
         let _ = writeln!(out, "{name} = \"{}\"", hex(id));

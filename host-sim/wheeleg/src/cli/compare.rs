@@ -43,8 +43,8 @@ pub(super) struct CompareArgs {
     /// [default: from a hash of the sources of firmware/control, so that no law is tuned to it].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     root: Option<u64>,
-    /// `summary.json` of another version, played with the same --root: in how many random
-    /// combinations this one is better or worse.
+    /// `summary.json` of another version, run with the same --root; counts the random
+    /// combinations in which this version is better or worse.
     #[arg(long, value_name = "FILE", requires = "root")]
     against: Option<PathBuf>,
     /// One seed, fewer factors and combinations, a coarser bound.
@@ -57,7 +57,7 @@ pub(super) struct CompareArgs {
     /// its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/compare")]
     out: PathBuf,
-    /// Play one case alone, by its id in the tables:
+    /// Run only one case, by its id in the tables:
     /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
     #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "root", "against", "quick"])]
     case: Option<CaseId>,

@@ -42,19 +42,19 @@ pub(super) struct CtlArgs {
 enum CtlCommand {
     /// Print the state of the robot.
     Status,
-    /// Print samples and events as they come.
+    /// Print samples and events as they arrive.
     Watch {
-        /// Channels, as `wheeleg channels` has them; events always come.
+        /// Channels, as listed by `wheeleg channels`; events are always included.
         #[arg(value_name = "CHANNEL")]
         channels: Vec<String>,
         /// Samples per second of a channel, 1 to 50.
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
         hz: u32,
     },
-    /// Show the robot on the whole terminal: Esc stops it, q leaves.
+    /// Show the robot on the whole terminal: Esc stops it, q quits.
     #[cfg(unix)]
     Top,
-    /// Take the control, give one command, wait for its end, and release the control.
+    /// Take control, send one command, wait until it has finished, and release control.
     Take {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
         #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
@@ -62,14 +62,14 @@ enum CtlCommand {
     },
     /// Stop the robot.
     Stop,
-    /// Take the control away from who holds it, at the robot's own computer: an armed robot then holds.
+    /// End the control of whoever has it, on the robot's own computer: an armed robot then holds.
     Revoke,
     /// Read, write or save parameters of a board.
     #[command(subcommand)]
     Param(ParamCommand),
     /// Begin a fault, such as pot-open:joint3.
     Inject {
-        /// Fault and target, as `wheeleg faults list` has them.
+        /// Fault and target, as listed by `wheeleg faults list`.
         fault: String,
     },
     /// End a fault.
@@ -90,7 +90,7 @@ enum CtlCommand {
         )]
         cycles: u32,
     },
-    /// Set the pace.
+    /// Set the simulation speed.
     Speed {
         #[arg(
             allow_negative_numbers = true,
@@ -380,7 +380,7 @@ fn sample(channel: u16, mut body: &[u8]) -> Option<(u64, Map<String, Value>)> {
 fn argument(text: &str) -> Result<(String, Value), StudyError> {
     let (name, value) = text.split_once('=').ok_or_else(|| {
         StudyError::refused(
-            format!("`{text}` is no argument"),
+            format!("`{text}` is not an argument"),
             "write arguments as NAME=VALUE; `wheeleg commands` lists them",
         )
     })?;

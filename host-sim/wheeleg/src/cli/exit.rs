@@ -25,7 +25,7 @@ type Table = [(u8, &'static str)];
 
 /// Of every command without a table of its own.
 pub(super) const PROGRAM: &Table = &[
-    (0, "done (with --strict: and all required targets met)"),
+    (0, "success (with --strict: all required targets met)"),
     (
         TARGETS_MISSED,
         "a required target is not met (--strict only), or a checked quantity beyond tolerance",
@@ -33,15 +33,15 @@ pub(super) const PROGRAM: &Table = &[
     (FAILED, "error"),
     (
         Signal::HangUp.exit_code(),
-        "stopped by a hang-up; the files hold what was done until then",
+        "stopped by a hang-up (SIGHUP); the files hold the results up to that point",
     ),
     (
         Signal::Interrupt.exit_code(),
-        "stopped with Ctrl-C; the same",
+        "stopped with Ctrl-C; files as above",
     ),
     (
         Signal::Terminate.exit_code(),
-        "stopped with SIGTERM; the same",
+        "stopped with SIGTERM; files as above",
     ),
 ];
 
@@ -67,15 +67,15 @@ pub(super) const CTL: &Table = &[
     (0, "done"),
     (REFUSED, "refused"),
     (FAILED, "error"),
-    (LOST, "the connection ended, or nobody confirms"),
+    (LOST, "the connection ended, or a stop was not confirmed"),
 ];
 
 /// Of `wheeleg replay`.
 pub(super) const REPLAY: &Table = &[
-    (0, "the robot did the same to the bit"),
+    (0, "the replay is bit-identical"),
     (
         TARGETS_MISSED,
-        "it did not, or there is nothing to compare with",
+        "the replay differs, or the recording has no hash to compare with",
     ),
     (FAILED, "error"),
 ];

@@ -103,7 +103,7 @@ struct OutArgs {
 struct LogArgs {
     /// Folder of a run or of a recording, or its log.
     run: PathBuf,
-    /// Folder to make, which must not exist [default: beside the log, `parquet` or `ros2`].
+    /// Folder to make, which must not exist [default: `parquet` or `ros2` next to the log].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -211,7 +211,7 @@ fn exported(
             if !whole {
                 let log = log_of(&args.run);
                 tell(&format!(
-                    "{} breaks off: what was written until then is exported",
+                    "{} is truncated: the part up to there is exported",
                     log.display()
                 ));
             }

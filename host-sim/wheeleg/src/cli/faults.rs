@@ -92,7 +92,7 @@ fn rows() -> String {
 fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
     if !args.all && args.row.is_empty() {
         return Err(StudyError::refused(
-            "`wheeleg faults run` is not told which rows: give --row ID, or --all",
+            "`wheeleg faults run` needs at least one row: use --row ID or --all",
             "`wheeleg faults rows` lists the rows; --row may be given several times",
         ));
     }
@@ -161,7 +161,7 @@ fn listing(json: bool) -> String {
         return format!("{lists:#}\n");
     }
     let mut out = String::from(
-        "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]);\nthose that are over by themselves take no second TIME:\n",
+        "Faults (wheeleg run SCENARIO --fault NAME[:TARGET][=VALUE]@TIME[..TIME]);\nfaults that end by themselves take no second TIME:\n",
     );
     for row in KINDS {
         let _ = writeln!(out, "\n  {}", row.name);

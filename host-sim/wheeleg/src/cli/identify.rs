@@ -27,7 +27,7 @@ pub(super) struct IdentifyArgs {
     /// then not read.
     #[arg(long, value_name = "NAME=COLUMN")]
     map: Vec<Mapped>,
-    /// Share of the measurement, from its end, that the fit does not see, 0.1 to 0.9.
+    /// Fraction of the measurement, at its end, that is held out from the fit, 0.1 to 0.9.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
     hold_out: f64,
     /// Folder for report, figures and axis file [default: runs/identify-<axis>].
@@ -76,7 +76,7 @@ pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
 fn text(identified: &Identified, report: &Path) -> String {
     let mut text = format!("{:<34}{:>9}{:>9}{:>9}\n", "", "factor", "from", "to");
     for p in &identified.parameters {
-        let note = if p.told { "" } else { "  not told" };
+        let note = if p.told { "" } else { "  not determined" };
         let _ = writeln!(
             text,
             "{:<34}{:>9.4}{:>9.4}{:>9.4}{note}",
@@ -84,11 +84,11 @@ fn text(identified: &Identified, report: &Path) -> String {
         );
     }
     for untold in &identified.untold {
-        let _ = writeln!(text, "cannot tell    {untold}");
+        let _ = writeln!(text, "undetermined   {untold}");
     }
     let _ = writeln!(
         text,
-        "not seen       {:.3} mm off, by the file {:.3} mm; noise of the sensor {:.3} mm",
+        "held out       error {:.3} mm, with the file's values {:.3} mm; sensor noise {:.3} mm",
         identified.after.held_out_mm, identified.before.held_out_mm, identified.noise_mm
     );
     if !identified.is_explained() {

@@ -75,7 +75,7 @@ fn parse(given: &str) -> Result<u64, StudyError> {
     let whole = digits.len() == 16 && digits.bytes().all(|b| b.is_ascii_hexdigit());
     hash.filter(|_| whole).ok_or_else(|| {
         refused(format!(
-            "`{}` is no hash: 16 hexadecimal digits",
+            "`{}` is not a hash: expected are 16 hexadecimal digits",
             word(given)
         ))
     })

@@ -20,11 +20,11 @@ pub(super) struct LogArgs {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Make a whole log of one that has no end: its run was killed, or its disk was full.
+    /// Restore a complete log from a truncated one (the run was killed, or the disk was full).
     Recover {
         /// The log, or the folder of its run; it stays as it is.
         log: PathBuf,
-        /// The new file, which must not exist [default: beside the log, NAME-recovered.mcap].
+        /// The new file, which must not exist [default: NAME-recovered.mcap next to the log].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },

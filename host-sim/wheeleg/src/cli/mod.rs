@@ -40,7 +40,7 @@ use clap::{Args, Parser, Subcommand};
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::StudyError;
-use wheeleg_studies::study::{Finished, Settings, Stop};
+use wheeleg_studies::study::{Finished, Settings, Stop, outlive_file_limit};
 
 use exit::{FAILED, TARGETS_MISSED};
 use harmless::harmless;
@@ -77,7 +77,7 @@ enum Command {
     /// Run the boards of a simulated robot behind a serial port without hardware.
     #[cfg(unix)]
     Boards(boards::BoardsArgs),
-    /// See and drive the robot that `wheeleg serve` runs.
+    /// Watch and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
     /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
     Replay(replay::ReplayArgs),
@@ -93,13 +93,13 @@ enum Command {
     Channels(channels::ChannelsArgs),
     /// Print the commands that a scenario can give: arguments, units, ranges.
     Commands(commands::CommandsArgs),
-    /// Write the robot, or a log, for other programs.
+    /// Export the robot, or a log, for other programs.
     Export(export::ExportArgs),
     /// Print the unique ids of a robot's boards, as a section for its file.
     Commission(commission::CommissionArgs),
-    /// Draw Figs. 5 to 9 of the paper, its misprints, and the precision of the master.
+    /// Draw Figs. 5 to 9 of the paper, show its misprints, and check the master's single precision.
     Figures(figures::FiguresArgs),
-    /// Run the walks over terrain on several seeds, beside what the paper claims.
+    /// Run the walks over terrain on several seeds, and compare them with the paper's claims.
     Field(field::FieldArgs),
     /// Measure and explain the start delay of a pneumatic joint; writes a report.
     Delay(delay::DelayArgs),
@@ -107,13 +107,13 @@ enum Command {
     Compare(compare::CompareArgs),
     /// Find gains and delays of one axis; writes a report and parameters for a board.
     Tune(tune::TuneArgs),
-    /// Fit an axis to measurements of a cylinder: intervals, and what they cannot tell.
+    /// Identify an axis from measurements of a cylinder, with confidence intervals.
     Identify(identify::IdentifyArgs),
     /// Check the pneumatic plant of an axis, or export it for another integrator.
     Plant(plant::PlantArgs),
-    /// Check the model against numbers that others computed.
+    /// Check the model against independently computed numbers.
     Check(check::CheckArgs),
-    /// Open a log as a page: the robot plays it; two logs are compared.
+    /// Turn a log into a page with an animated robot, or compare two logs.
     View(view::ViewArgs),
     /// Recover the log of a run that was killed.
     Log(log::LogArgs),
@@ -126,6 +126,11 @@ enum Command {
 pub(crate) fn main() -> ExitCode {
     let cli = usage::parse::<Cli>(std::env::args_os());
     let cli = cli.unwrap_or_else(|wrong| usage::refuse(&wrong));
+    if let Err(error) = outlive_file_limit() {
+        tell(&format!(
+            "a file that reaches the limit on its size will end the program without a message: {error}"
+        ));
+    }
     let result = match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options),
         Some(Command::Run(args)) => run::command(&args),
@@ -184,7 +189,7 @@ fn tell(line: &str) {
 /// What every study that draws can be asked for.
 #[derive(Debug, Args)]
 struct Drawing {
-    /// Write the figures as PNG, too, beside the SVG ones.
+    /// Write the figures as PNG as well as SVG.
     #[arg(long)]
     png: bool,
 }
@@ -205,7 +210,7 @@ fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
 fn stop_on_signals() -> Result<Stop, StudyError> {
     Stop::on_signals().map_err(|e| {
         StudyError::refused(
-            format!("cannot be told to stop by a signal: {e}"),
+            format!("cannot install a signal handler: {e}"),
             "please report this",
         )
     })
@@ -229,7 +234,7 @@ fn end<T>(
         // The files are what counts; a terminal that hung up takes no text.
         tell(&match whole {
             true => format!(
-                "{stopped}; summary and report hold what was done until then: {}",
+                "{stopped}; summary and report hold the results up to that point: {}",
                 finished.report.display()
             ),
             false => stopped.to_string(),
@@ -265,7 +270,7 @@ fn tell_unwritten(unwritten: Vec<StudyError>) -> bool {
         tell(&format!("{:?}", miette::Report::new(error)));
     }
     if !whole {
-        tell("the values above hold; of the files, those named here are missing or cut short");
+        tell("the values above are valid; the files named here are missing or truncated");
     }
     whole
 }

@@ -41,7 +41,7 @@ fn outside(log: &Path, recording: &Path) -> Result<(), StudyError> {
     if place.starts_with(&recording) {
         return Err(StudyError::refused(
             format!(
-                "the log {} would stand in the recording itself",
+                "the log {} would be inside the recording itself",
                 log.display()
             ),
             "name a place outside of the recording with --log",
@@ -85,7 +85,7 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     };
     let whole = tell_unwritten(unwritten.into_iter().collect());
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
-        tell("stopped; what was repeated until then is compared");
+        tell("stopped; the part replayed so far was compared");
         return Ok(ExitCode::from(signal.exit_code()));
     }
     if !whole {
@@ -117,11 +117,9 @@ fn as_text(replayed: &Replayed) -> String {
     let summary = &replayed.summary;
     let s = |ms: u64| ms as f64 * 1e-3;
     let verdict = match replayed.parted {
-        None if replayed.compared == 0 => {
-            "there is no hash in the recording to compare with".to_owned()
-        }
+        None if replayed.compared == 0 => "the recording has no hash to compare with".to_owned(),
         None => format!(
-            "the robot did the same to the bit: {} hashes compared",
+            "the replay is bit-identical: {} hashes compared",
             replayed.compared
         ),
         Some((from, to)) => {
@@ -131,7 +129,7 @@ fn as_text(replayed: &Replayed) -> String {
                 "another program recorded it"
             };
             format!(
-                "the robot did something else from between {:.3} s and {:.3} s on; {why}: {}",
+                "the replay differs, from between {:.3} s and {:.3} s on; {why}: {}",
                 s(from),
                 s(to),
                 plain(&summary.program)

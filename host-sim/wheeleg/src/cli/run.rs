@@ -59,7 +59,7 @@ pub(super) struct RunOptions {
     #[arg(long = "node", value_name = "NODE=KIND")]
     node: Vec<NodeChoice>,
     /// Run the scenario once more with all nodes in this program; exit with code
-    /// 2 unless both logs are the same to the bit. Images of other firmware sources
+    /// 2 unless both logs are bit-identical. Images built from other firmware sources
     /// than this program's are refused, as are faults of the line.
     #[arg(long)]
     compare_sil: bool,
@@ -115,7 +115,7 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     let report = finished.report.display().to_string();
     let code = end(finished, args.json, run_text, passed)?;
     if differ && !stopped {
-        tell("boards differ from the native application beside them");
+        tell("boards differ from their native twins");
     }
     if let Some(failure) = failure {
         tell(&format!("what was recorded until then: {report}"));
@@ -151,19 +151,19 @@ fn compare_sil(
     }
     let (here_hash, there_hash) = (&native.result.summary.hash, &run.summary.hash);
     if here_hash == there_hash {
-        tell("the log is that of the native run, to the bit");
+        tell("the log is bit-identical to that of the native run");
         return Ok(None);
     }
     let here = folder.join(output::NATIVE).join("log.mcap");
     let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
     let first = match first {
         Some(first) => format!("first difference: {first}"),
-        None => "but what could be written to them does not".to_owned(),
+        None => "no difference in the parts that could be written".to_owned(),
     };
     let pil = run.summary.pil.as_ref();
     let pins = match pil.and_then(|p| p.first_difference.as_ref()) {
         Some(pins) => format!("; first at a board's pins: {pins}"),
-        None => "; no board differed from the application beside it".to_owned(),
+        None => "; no board differed from its native twin".to_owned(),
     };
     Err(StudyError::refused(
         format!(

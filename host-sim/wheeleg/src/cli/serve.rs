@@ -22,23 +22,23 @@ const SCENARIO: &str = "stand";
 /// Arguments of `wheeleg serve`.
 #[derive(Debug, Args)]
 pub(super) struct ServeArgs {
-    /// Built-in scenario or path of a TOML file: its ground, pose and seed. Its events and its
-    /// motion are the operator's to give.
+    /// Built-in scenario or path of a TOML file, for ground, pose and seed. Its events and its
+    /// motion are ignored: the operator gives the commands.
     #[arg(default_value = SCENARIO)]
     scenario: String,
     /// Robot (built in, or path of a TOML file), instead of the scenario's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
-    /// Where to listen. Beyond this computer it is with TLS, of a certificate that is made at the
-    /// start unless one is given.
+    /// Address to listen on. Other computers are served over TLS, with a certificate made at
+    /// start-up unless one is given.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = ADDRESS, value_parser = parse_address)]
     listen: SocketAddr,
-    /// Lead the boards at this serial port instead of simulated ones: /dev/ttyUSB0, or with another
-    /// rate than 1000000 bit/s /dev/ttyUSB0@115200.
+    /// Drive the boards on this serial port instead of simulated ones: /dev/ttyUSB0, or
+    /// /dev/ttyUSB0@115200 for a rate other than 1000000 bit/s.
     #[arg(long, value_name = "PORT[@RATE]", conflicts_with_all = ["speed", "paused"])]
     port: Option<String>,
-    /// Name under which clients know this computer; needed to listen at every address. Can be given
-    /// several times.
+    /// Name by which clients address this computer; required to listen on every address. May be
+    /// given several times.
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
     /// Certificate for TLS, PEM.
@@ -47,7 +47,7 @@ pub(super) struct ServeArgs {
     /// Its private key, PEM; only its owner may read it.
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// Serve beyond this computer without TLS: then one may look and stop, and nobody may drive.
+    /// Serve other computers without TLS: clients may watch and stop, but not drive.
     #[arg(long, conflicts_with = "tls_cert")]
     plain_http: bool,
     #[arg(
@@ -66,18 +66,18 @@ pub(super) struct ServeArgs {
     /// can repeat it. The page and `wheeleg ctl rec start` begin a recording at any time.
     #[arg(long)]
     record: bool,
-    /// Folder in which each recording gets a folder of its own.
+    /// Folder for recordings; each gets its own subfolder.
     #[arg(long, value_name = "DIR", default_value = FOLDER)]
     recordings: PathBuf,
     /// Make new keys; the old ones no longer work.
     #[arg(long)]
     new_key: bool,
-    /// Page that may look by the protocol of Foxglove and Lichtblick, such as
-    /// https://app.example.org; programs on this computer always may. Can be given several times.
+    /// Web page that may connect as a Foxglove or Lichtblick viewer, such as
+    /// https://app.example.org; programs on this computer always may. May be given several times.
     #[arg(long, value_name = "URL")]
     allow_origin: Vec<String>,
-    /// Let a viewer by that protocol write parameters: with the control key, while the robot is
-    /// disarmed and nobody is in control.
+    /// Allow such viewers to write parameters with the control key, while the robot is disarmed and
+    /// nobody is in control.
     #[arg(long)]
     foxglove_write: bool,
     /// Folder of the page, instead of the one in this program, for work on the page.
@@ -156,7 +156,7 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     let mut text = String::new();
     if server.is_look_only() {
         text.push_str(
-            "NOT PROTECTED: who is on the way can read and change all. Look and stop alone.\n",
+            "NOT PROTECTED: anyone on the network can read and alter the traffic. Clients may only watch and stop.\n",
         );
     }
     // The key is for who sits here; no pipe and no log gets it.
@@ -181,14 +181,14 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         let socket = url.replacen("http", "ws", 1);
         let _ = writeln!(
             text,
-            "viewers  {socket}/foxglove?token=KEY, that of the file to look"
+            "viewers  {socket}/foxglove?token=KEY, with the key from the file to look"
         );
     }
     let _ = writeln!(
         text,
         "priority {}",
         match server.robot_goes_first() {
-            true => "SCHED_FIFO 10: the robot's thread goes before other programs",
+            true => "SCHED_FIFO 10: the robot's thread has priority over other programs",
             false =>
                 "ordinary: a busy computer may make the robot late (`ulimit -r 10` permits more)",
         }
@@ -211,7 +211,7 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
     };
     let failure = server.end();
     tell(if args.port.is_some() {
-        "nobody leads the boards any more: they hold"
+        "the master has stopped; the boards hold"
     } else {
         "the robot is switched off"
     });

@@ -23,7 +23,7 @@ pub(super) struct TuneArgs {
     /// of an earlier run in it move to its folder `previous`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seed of the converter's noise.
+    /// Seed of the ADC noise.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
     /// Section of the robot file that the parameters are for.
@@ -127,7 +127,7 @@ fn text(tuned: &Tuned, report: &Path) -> String {
         let _ = writeln!(text, "worse          {}", worse.message());
     }
     let parameters = if tuned.stopped.is_some() {
-        "not written: not all tests were played".to_owned()
+        "not written: not all tests were run".to_owned()
     } else if tuned.worse.is_empty() && !parameters.exists() {
         "not written".to_owned()
     } else if tuned.worse.is_empty() {

@@ -41,7 +41,7 @@ pub(super) struct ViewArgs {
     /// Robot whose dimensions the drawing uses (built in, or path of a TOML file), instead of the log's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
-    /// The page [default: beside the first log, log.html].
+    /// The page [default: log.html next to the first log].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -70,7 +70,7 @@ pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
         (Some(viewed), _) => {
             for log in &viewed.broken_off {
                 tell(&format!(
-                    "{} breaks off: what was written until then is shown",
+                    "{} is truncated: the part up to there is shown",
                     plain(&log.display().to_string())
                 ));
             }

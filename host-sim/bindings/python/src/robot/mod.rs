@@ -84,7 +84,7 @@ fn whole_ms(what: &str, seconds: f64) -> PyResult<u64> {
         Ok(ms as u64)
     } else {
         Err(error::value(format!(
-            "{what} = {seconds} s is no multiple of 0.001 s"
+            "{what} = {seconds} s is not a multiple of 0.001 s"
         )))
     }
 }
@@ -278,7 +278,7 @@ impl Robot {
     /// simulated again from power-up, which takes its time, and its log's hash is compared.
     fn restore(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
         let saved: Saved = serde_json::from_slice(state)
-            .map_err(|e| error::value(format!("this is no state of a robot: {e}")))?;
+            .map_err(|e| error::value(format!("this is not a state of a robot: {e}")))?;
         let (scenario, robot, seed) = (self.scenario.clone(), self.robot.clone(), self.seed);
         let fresh = py
             .detach(|| Worker::start(&scenario, &robot, seed))

@@ -54,7 +54,7 @@ pub enum VectorsError {
         reason: serde_json::Error,
     },
     /// The file does not follow the schema.
-    #[error("`{file}` is no file of reference vectors:\n{}", list(problems))]
+    #[error("`{file}` is not a file of reference vectors:\n{}", list(problems))]
     #[diagnostic(
         code(wheeleg::vectors::schema),
         help(

@@ -88,7 +88,7 @@ fn foot_fall(s: &Source<'_>) -> Figure {
     Figure {
         id: "foot-fall".into(),
         title: "Foot-fall".into(),
-        caption: "When each foot stands: blue as the walk plans it, ink as the ground carries it (more than 1 N). \
+        caption: "When each foot stands: above in blue as planned by the walk, below as loaded by the ground (more than 1 N). \
                   Ticks: ground that a foot met 20 mm and more before its plan (early) or after it (late)."
             .into(),
         panels: vec![s.panel("left and right foot", height, Content::Raster(rows))],

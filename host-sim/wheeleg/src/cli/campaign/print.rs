@@ -208,7 +208,7 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
         out,
         "row     {}",
         match replayed.same_row() {
-            Some(true) => "the same to the bit".to_owned(),
+            Some(true) => "bit-identical".to_owned(),
             Some(false) => format!("DIFFERS from that of `{}`", replayed.program),
             None => "none before".to_owned(),
         }
@@ -218,7 +218,7 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
     }
     if let Some(run) = &replayed.run {
         let log = match replayed.same_log() {
-            Some(true) => "the same to the bit",
+            Some(true) => "bit-identical",
             Some(false) => "DIFFERS",
             None => "not compared",
         };
@@ -247,7 +247,7 @@ pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<
     if let Some(pairs) = pairs {
         let _ = writeln!(
             out,
-            "logs    {} of {} the same to the bit",
+            "logs    {} of {} bit-identical",
             pairs.same_log, pairs.paired.pairs
         );
     }

@@ -87,7 +87,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
     }
     let (value, unit) = told(&all, board, parameter).ok_or_else(|| {
         StudyError::refused(
-            format!("the server does not know what board {board} has told of `{parameter}`"),
+            format!("the server has not received `{parameter}` from board {board}"),
             "use the `wheeleg` of the same version as the server",
         )
     })?;
