@@ -144,6 +144,7 @@ def crowd(address, key, pid, seconds):
     told("memory that came with it", status(pid, "VmRSS") - memory, "MB", 16)
     pace = viewers[0].state()["pace"]
     told("samples that the hub did not get", pace["dropped"], "", 0)
+    told("samples that those who read missed, of 50 a second", sum(viewer.missed() for viewer in viewers), "", 0)
     for viewer in viewers:
         viewer.close()
 

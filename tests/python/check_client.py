@@ -3,15 +3,21 @@
     python3 check_client.py WHEELEG
 
 Every channel is read; a robot is armed, moved and recorded; what is wrong is refused by name; a viewer may
-look and stop; a program whose connection is cut loses the control.
+look and stop; a program whose connection is cut loses the control. On a terminal `ctl top` shows the robot and stops it, and
+leaves the terminal as it was; `ctl revoke` takes the control away.
 """
 
 import contextlib
+import fcntl
 import json
 import os
+import pty
+import select
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
 from pathlib import Path
@@ -76,6 +82,114 @@ def set_dead_proxies():
     os.environ.update({name: "http://127.0.0.1:9" for name in proxies}, no_proxy="")
 
 
+# Not in Python's `termios`.
+CIBAUD = 0o2003600000
+
+
+class Terminal:
+    """A program on a terminal of its own, of 100 columns and 30 rows, and all that it has written there."""
+
+    def __init__(self, command, **environment):
+        self.near, self.far = pty.openpty()
+        fcntl.ioctl(self.far, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+        self.before = self._modes()
+        self.text = ""
+        environment = {**os.environ, "TERM": "xterm", **environment}
+        self.process = subprocess.Popen(command, env=environment, stdin=self.far, stdout=self.far, stderr=self.far)
+
+    def _modes(self):
+        """How the terminal is, without its input's own speed: that is the output's, named or not."""
+        modes = termios.tcgetattr(self.far)
+        modes[2] &= ~CIBAUD
+        return modes
+
+    def _read(self):
+        there = bool(select.select([self.near], [], [], 0.1)[0])
+        if there:
+            self.text += os.read(self.near, 65536).decode(errors="replace")
+        return there
+
+    def shows(self, wanted, seconds=10):
+        """Waits until this is written from here on."""
+        begin, end = len(self.text), time.monotonic() + seconds
+        while wanted not in self.text[begin:]:
+            assert time.monotonic() < end, f"{wanted!r} is not shown: {self.text[-2000:]!r}"
+            self._read()
+
+    def press(self, keys):
+        os.write(self.near, keys)
+
+    def end(self):
+        """Waits for the end; the exit code. The terminal is as it was."""
+        end = time.monotonic() + 10
+        while self.process.poll() is None:
+            assert time.monotonic() < end, f"it does not end: {self.text[-500:]!r}"
+            self._read()
+        while self._read():
+            pass
+        assert self._modes() == self.before, "the terminal is not as it was"
+        assert self.text.count("\x1b[?1049l") == self.text.count("\x1b[?1049h"), f"its screen stays: {self.text[-500:]!r}"
+        os.close(self.near)
+        os.close(self.far)
+        return self.process.returncode
+
+
+def top(command, environment, robot):
+    """The page for terminals: shows, stops by Esc and by nothing else, leaves."""
+    terminal = Terminal(command, **environment)
+    terminal.shows("left vertical")
+    terminal.shows("ARMED")
+    # Arrow keys begin with the same byte.
+    terminal.press(b"\x1b[A\x1b[B")
+    terminal.shows("ARMED")
+    assert not robot.state()["emergency_stop"], "an arrow key stops"
+    terminal.press(b"\x1b")
+    terminal.shows("STOPPED")
+    robot.until(lambda state: state["emergency_stop"])
+    terminal.press(b"q")
+    assert terminal.end() == 0
+    assert "NOT CONFIRMED" not in terminal.text
+    lines = terminal.text.split("\x1b[H")[-1].split("\r\n")
+    assert len(lines) <= 30, f"{len(lines)} lines"
+    # A signal leaves the terminal as it was, too.
+    terminal = Terminal(command, **environment)
+    terminal.shows("left vertical")
+    terminal.process.terminate()
+    assert terminal.end() == 143
+    # What cannot be drawn on is not.
+    terminal = Terminal(command, **{**environment, "TERM": "dumb"})
+    terminal.shows("ctl watch")
+    assert terminal.end() == 2
+    piped = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+    assert piped.returncode == 2 and "\x1b[?" not in piped.stdout + piped.stderr, piped
+
+
+def revoke(command, environment, robot):
+    """Who is in control is so no more."""
+    asks = lambda: subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+    with robot.control():
+        robot.command("Arm")
+        done = asks()
+        assert done.returncode == 0 and "no longer in control" in done.stderr, done
+        robot.until(lambda state: state["hold"] == "operator_lost", 5)
+    done = asks()
+    assert done.returncode == 0 and "nobody is in control" in done.stderr, done
+
+
+def at_the_robot(program):
+    """What somebody does at the robot's own computer, on a terminal."""
+    with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, _, _):
+        environment = {"XDG_STATE_HOME": home}
+        command = [program, "ctl", "--url", address]
+        with Robot(address, keys["control"]) as robot:
+            robot.until(lambda state: state["ready"])
+            revoke([*command, "revoke"], environment, robot)
+            with robot.control():
+                robot.command("ClearFault")
+                robot.command("Arm")
+            top([*command, "top"], environment, robot)
+
+
 def main(program):
     set_dead_proxies()
     with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
@@ -107,6 +221,12 @@ def main(program):
                 robot.until(lambda state: state["emergency_stop"])
                 robot.command("RecordStop")
             robot.until(lambda state: state["control"] is None)
+            samples = robot.get("samples?channel=/joint/2&seconds=5")
+            strokes = [row[samples["fields"].index("sensed_mm")] for row in samples["rows"]]
+            assert len(strokes) > 50 and all(-1 < stroke < 181 for stroke in strokes), strokes[:5]
+            given = [row[-1] for row in robot.get("samples?channel=/session")["rows"]]
+            assert "JointReference joint=2 stroke=60.0" in given and "stop" in given, given
+            assert robot.latest("/server")["clients"] >= 1, robot.latest("/server")
             assert any(event["code"] == "hold" for event in robot.events()), "no event of the stop"
             # A connection that is cut: nobody beats any more.
             cut = Robot(address, keys["control"], name="cut")
@@ -116,6 +236,7 @@ def main(program):
             robot.until(lambda state: state["control"] is None, 5)
         done = subprocess.run([program, "replay", str(recordings / "0001")], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
+    at_the_robot(program)
     print("every channel read; armed, moved, stopped, recorded and repeated from Python")
 
 

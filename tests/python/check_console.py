@@ -4,13 +4,14 @@
 
 Without a key and with a wrong one nothing is shown. With the right one: ready, walk, stop the gait,
 provoke a fault, read its remedy, stop with Esc from within a field. A slider asks for a stroke; a parameter is written, and not saved while armed. Who has the view key may look and
-stop. Signals are plotted, frozen and zoomed; what is done is recorded, and repeats to the bit. Somebody drives by
+stop. Signals are plotted, frozen, zoomed and saved; events are sieved and saved; what is done is recorded, and repeats to the bit. Somebody drives by
 hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space, and on a slope on its
 ground. A page that did not run says so. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
 import contextlib
+import csv
 import io
 import math
 import os
@@ -182,6 +183,12 @@ def plots(page, folder):
         page.get_by_role("button", name="Save as CSV").click()
     table = Path(download.value.path()).read_text().splitlines()
     expect(len(table) > 30 and any("/body.pitch_deg" in row for row in table), f"the table has {len(table)} rows")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save as PNG").click()
+    saved = Image.open(download.value.path()).convert("RGB")
+    drawn = len(set(saved.getdata()))
+    wide = page.locator(".scope-plot canvas").first.evaluate("canvas => [canvas.width, canvas.height]")
+    expect(saved.width >= wide[0] and saved.height >= 3 * wide[1] and drawn >= 50, f"the picture of three plots is {saved.size}, {drawn} colours")
     page.screenshot(path=folder / "plots.png", full_page=True)
     page.get_by_role("button", name="Go on").click()
     page.locator(".scope-plot .close").last.click()
@@ -263,6 +270,46 @@ def drives_by_gamepad(page):
     expect(abs(place(page) - before) < 1.0, "a stick without its shoulder button drives")
     drives(page, "the gamepad", lambda: page.evaluate(pad, True), lambda: page.evaluate(pad, False), "Hold")
     page.evaluate("() => { window.testPad = null; }")
+
+
+def events(page):
+    """After a stop: alike events of all boards are one line. Sieved by kind, board and text; saved as they were recorded."""
+    panel = page.locator(".eventlist")
+    lines = lambda: [line.inner_text() for line in panel.locator("li:visible").all()]
+    whole = lines()
+    folded = [line for line in whole if "joints 1–6, wheels 7–8" in line]
+    expect(folded, f"alike events of eight boards are not one line: {whole[:12]}")
+    panel.get_by_label("Kind of events").select_option("fault")
+    faults = lines()
+    expect(0 < len(faults) < len(whole) and panel.locator("li:visible:not(.bad)").count() == 0, f"the sieve by kind: {len(faults)} of {len(whole)}")
+    panel.get_by_label("Board of events").select_option("3")
+    of_board = lines()
+    expect(0 < len(of_board) <= len(faults) and any("joint 3" in line or "joints" in line for line in of_board), f"the sieve by board: {of_board[:5]}")
+    panel.get_by_label("Events whose text has").fill("POTENTIOMETER")
+    found = lines()
+    expect(found and all("potentiometer" in line for line in found), f"the sieve by text: {found[:5]}")
+    expect(f"{len(found)} of {len(panel.locator('li').all())} lines" in panel.inner_text(), f"how many are shown: {panel.inner_text()[:200]!r}")
+    panel.get_by_label("Events whose text has").fill("")
+    panel.get_by_label("Board of events").select_option("")
+    with page.expect_download() as download:
+        panel.get_by_role("button", name="Save events as CSV").click()
+    table = list(csv.DictReader(Path(download.value.path()).read_text().splitlines()))
+    boards = {row["board"] for row in table}
+    expect({row["kind"] for row in table} == {"fault"} and len(table) >= 8 and boards >= set("12345678"), f"the table: {len(table)} rows of boards {sorted(boards)}")
+    expect(all(int(a["t_ns"]) <= int(b["t_ns"]) for a, b in zip(table, table[1:])), "the table is not in order")
+    expect(any(row["board"] == "3" and row["code"] == "fault_latched" and "joint 3" in row["text"] for row in table), f"an event is not as it was recorded: {table[:2]}")
+    panel.get_by_label("Kind of events").select_option("")
+    expect(len(lines()) >= len(whole), "the sieve stays")
+
+
+def sees_what_was(browser, console, lines):
+    """Who comes later sees the events of before."""
+    page = opened(browser, console, f"#v={console.keys['view']}")
+    page.wait_for_selector(".events li")
+    page.wait_for_timeout(500)
+    count = page.locator(".events li").count()
+    expect(count >= min(lines, 50), f"who comes later sees {count} lines, who was there {lines}")
+    page.context.close()
 
 
 def board_table(page):
@@ -486,6 +533,8 @@ def journey(browser, console, folder):
     expect(waits(page, "State", ["STOPPED"]), f"after Esc: {cell(page, 'State')}")
     page.wait_for_timeout(300)
     expect("Boards 1, 2, 3" in page.inner_text(".faults"), "equal faults of all boards are not one line")
+    events(page)
+    sees_what_was(browser, console, page.locator(".events li").count())
     return page
 
 

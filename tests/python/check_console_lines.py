@@ -2,7 +2,7 @@
 
     python3 check_console_lines.py WHEELEG SCREENSHOTS AXE
 
-A second browser is refused and may stop. A line that goes dead in mid-walk, a page that freezes and one that is hidden
+A second browser is refused, is handed the control over and gives it back, and may stop. A line that goes dead in mid-walk, a page that freezes and one that is hidden
 lose the robot, which holds and says whose it was; when they are back they move nothing. What comes late over a slow
 line is marked as old. A server that is gone is told, and one that is there again moves nothing. Real boards are
 shown without what they do not tell.
@@ -93,10 +93,32 @@ def second_browser(browser, console, first, robot):
     expect("refused" in second.inner_text(".answer"), f"a second takes the control: {second.inner_text('.answer')!r}")
     expect("asks for the control" in first.inner_text(".answer"), f"the first is not told: {first.inner_text('.answer')!r}")
     expect(robot.state()["armed"], "the first is disturbed")
+    hands_over(first, second, robot)
     second.locator(".stop").dispatch_event("click")
     expect(waits(first, "State", ["STOPPED"]), "a second cannot stop the first")
     second.context.close()
     recovers(first)
+
+
+def hands_over(first, second, robot):
+    """Who is in control gives it to who has asked, and gets it back; neither is disturbed."""
+    for giver, taker in ((first, second), (second, first)):
+        for _ in range(check_console.ATTEMPTS):
+            giver.bring_to_front()
+            if cell(giver, "Control") != "you":
+                recovers(giver)
+            taker.locator(".buttons button", has_text="Take control").dispatch_event("click")
+            give = giver.get_by_role("button", name="Hand the control over")
+            with contextlib.suppress(Exception):
+                give.wait_for(timeout=3000)
+                give.click(timeout=1000)
+                taker.wait_for_function("() => document.querySelector('.answer').textContent.includes('to you')", timeout=2000)
+            taker.bring_to_front()
+            taker.locator(".buttons button", has_text="Take control").dispatch_event("click")
+            if waits(taker, "Control", ["you"], 3):
+                break
+        expect(cell(taker, "Control") == "you", f"handed over: {taker.inner_text('.answer')!r}")
+    expect(robot.state()["control"]["holder"] == "browser", "nobody is in control after a hand-over")
 
 
 def dead_line(page, robot, relay):

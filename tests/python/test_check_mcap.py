@@ -75,7 +75,7 @@ class CheckMcap(unittest.TestCase):
     def test_messages(self):
         self.refused("no message", messages=())
         self.refused("no message", messages=(), metadata={"written": "always", "rate_hz": "on change"})
-        for written in ("on change", "in walks"):
+        for written in ("on change", "in walks", "live"):
             self.assertEqual(self.defects(messages=(), metadata={"written": written}), [])
         self.refused("not JSON", raw=b"{")
         self.refused("not an object", raw=b"[1]")

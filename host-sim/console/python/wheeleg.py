@@ -79,6 +79,7 @@ class Robot:
         # Guards everything below: a thread reads, another beats.
         self._changed = threading.Condition()
         self._latest, self._events, self._answers = {}, [], {}
+        self._missed = 0
         self._state, self._seen_us, self._n, self._lost = None, 0, 0, None
         # This computer's own address needs no proxy, which would be told the key.
         self._socket = connect(f"ws://{self.host}/ws", subprotocols=[SUBPROTOCOL], proxy=None)
@@ -105,7 +106,8 @@ class Robot:
     # ---- looking ----
 
     def get(self, path):
-        """A document of the HTTP API: `state`, `commands`, `channels`, `parameters`, `events`, `faults`, `recordings`."""
+        """A document of the HTTP API: `state`, `commands`, `channels`, `samples?channel=/joint/3&seconds=10`, `parameters`,
+        `events`, `faults`, `recordings`."""
         request = urllib.request.Request(f"http://{self.host}/api/v1/{path}")
         request.add_header("Authorization", f"Bearer {self._digits}")
         direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -123,6 +125,11 @@ class Robot:
     def latest(self, channel):
         """The newest sample of a channel, by field, with `t_ns`; waits for the first."""
         return self._wait(lambda: self._latest.get(channel), 5)
+
+    def missed(self):
+        """Samples of what was asked for that did not come, because this program or its line was too slow."""
+        with self._changed:
+            return self._missed
 
     def events(self):
         """All events since the connection."""
@@ -246,7 +253,9 @@ class Robot:
             self._events.append(message)
 
     def _samples(self, frame):
-        channel = self._channels[struct.unpack_from("<H", frame, 1)[0]]
+        number, missed = struct.unpack_from("<HI", frame, 1)
+        channel = self._channels[number]
+        self._missed += missed
         at = 7
         while at < len(frame):
             values = {"t_ns": struct.unpack_from("<Q", frame, at)[0]}

@@ -1,6 +1,6 @@
 //! Routes of the server: page, socket and HTTP API.
 
-use std::net::SocketAddr;
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,10 +23,12 @@ use serde_json::json;
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Place};
 use crate::hex;
+use crate::hub::LONGEST_S;
 use crate::page::Page;
 use crate::record::folder;
 use crate::request::FRAME_MAX;
 use crate::session::{self, Context};
+use crate::table::{prefers_csv, table};
 
 /// Subprotocol of the socket.
 pub const SUBPROTOCOL: &str = "wheeleg.console.v1";
@@ -60,7 +62,12 @@ struct Host(String);
 
 /// Where a connection comes from.
 #[derive(Clone, Copy)]
-pub(crate) struct Peer(pub(crate) SocketAddr);
+pub(crate) struct Peer {
+    /// The client's address.
+    pub(crate) ip: IpAddr,
+    /// It is on the robot's own computer.
+    pub(crate) is_local: bool,
+}
 
 /// The document of the HTTP API, OpenAPI 3.1.
 const OPENAPI: &str = include_str!("../openapi.json");
@@ -97,6 +104,7 @@ fn api() -> Routes {
         .with("get", "/channels", get(channels))
         .with("get", "/commands", get(commands))
         .with("get", "/parameters", get(parameters))
+        .with("get", "/samples", get(samples))
         .with("get", "/events", get(events))
         .with("get", "/faults", get(faults))
         .with("get", "/recordings", get(recordings))
@@ -198,7 +206,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
 /// Lets nobody ask without a key.
 async fn key(
     State(server): State<Arc<Server>>,
-    Extension(Peer(peer)): Extension<Peer>,
+    Extension(peer): Extension<Peer>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -218,7 +226,7 @@ async fn key(
         return next.run(request).await;
     }
     let remedy = "send `Authorization: Bearer KEY` with the digits of control.key or view.key";
-    if server.context.wrong_keys.count(peer.ip(), Instant::now()) {
+    if server.context.wrong_keys.count(peer.ip, Instant::now()) {
         return problem(StatusCode::TOO_MANY_REQUESTS, "too many wrong keys", remedy);
     }
     problem(
@@ -253,7 +261,7 @@ fn has_key(context: &Context, headers: &HeaderMap) -> bool {
 async fn socket(
     State(server): State<Arc<Server>>,
     Extension(Host(host)): Extension<Host>,
-    Extension(Peer(peer)): Extension<Peer>,
+    Extension(peer): Extension<Peer>,
     Extension(place): Extension<Arc<Place>>,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response {
@@ -283,7 +291,7 @@ async fn socket(
     }
     let context = Arc::clone(&server.context);
     upgrade.on_upgrade(move |socket| async move {
-        session::serve(socket, context, host, peer.ip()).await;
+        session::serve(socket, context, host, peer).await;
         drop(place);
     })
 }
@@ -297,7 +305,7 @@ struct Token {
 /// A viewer can send no header: its key stands in the address, which this server writes nowhere.
 async fn viewer(
     State(server): State<Arc<Server>>,
-    Extension(Peer(peer)): Extension<Peer>,
+    Extension(peer): Extension<Peer>,
     Extension(place): Extension<Arc<Place>>,
     query: Result<Query<Token>, axum::extract::rejection::QueryRejection>,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
@@ -317,7 +325,7 @@ async fn viewer(
     });
     if !(controls | views) {
         let remedy = "open ws://ADDRESS/foxglove?token=KEY with the digits of view.key";
-        if context.wrong_keys.count(peer.ip(), Instant::now()) {
+        if context.wrong_keys.count(peer.ip, Instant::now()) {
             return problem(StatusCode::TOO_MANY_REQUESTS, "too many wrong keys", remedy);
         }
         let detail = "the key is missing or wrong";
@@ -383,6 +391,46 @@ async fn commands(State(server): State<Arc<Server>>) -> Response {
 
 async fn parameters(State(server): State<Arc<Server>>) -> Response {
     json_text(server.context.hub.parameters())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seconds {
+    channel: String,
+    seconds: Option<u8>,
+}
+
+async fn samples(
+    State(server): State<Arc<Server>>,
+    headers: HeaderMap,
+    query: Result<Query<Seconds>, axum::extract::rejection::QueryRejection>,
+) -> Response {
+    let wrong = |detail: &str, remedy: &str| problem(StatusCode::BAD_REQUEST, detail, remedy);
+    let Ok(Query(Seconds { channel, seconds })) = query else {
+        let detail =
+            format!("allowed are `channel`, which is needed, and `seconds`, 1 to {LONGEST_S}");
+        return wrong(
+            &detail,
+            "ask for /api/v1/samples?channel=/joint/3&seconds=10",
+        );
+    };
+    let seconds = seconds.unwrap_or(LONGEST_S);
+    if !(1..=LONGEST_S).contains(&seconds) {
+        let detail = format!("`seconds`: allowed are 1 to {LONGEST_S}");
+        return wrong(&detail, "leave it out");
+    }
+    let index = wheeleg_telemetry::channels()
+        .iter()
+        .position(|def| def.topic == channel);
+    let Some(index) = index else {
+        return wrong(
+            "`channel`: there is no such channel",
+            "/api/v1/channels lists them",
+        );
+    };
+    let index = index as u16;
+    let samples = server.context.hub.samples(index, seconds);
+    table(index, samples, prefers_csv(&headers))
 }
 
 #[derive(Deserialize)]

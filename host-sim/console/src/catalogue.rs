@@ -41,9 +41,13 @@ pub enum HostCode {
     RecordStart = 0x0307,
     /// The recording ends.
     RecordStop = 0x0308,
+    /// The control goes to another client.
+    HandOver = 0x0309,
+    /// The control is taken away.
+    Revoke = 0x030A,
 }
 
-/// A command that acts on the simulation, not on the robot.
+/// A command that acts on the simulation or on who is in control, and does not move the robot.
 #[derive(Debug, Clone, Copy)]
 pub struct HostInfo {
     /// Number.
@@ -132,6 +136,24 @@ pub const HOST_TABLE: &[HostInfo] = &[
         name: "RecordStop",
         arguments: &[],
         effect: "Ends the recording.",
+    },
+    HostInfo {
+        code: HostCode::HandOver,
+        name: "HandOver",
+        arguments: &[HostArgument {
+            name: "to",
+            kind: "text",
+            unit: "1",
+            limits: None,
+            doc: "Session of the client, as it was told when that client asked for the control.",
+        }],
+        effect: "Releases the control, and keeps it for one other client: for 2 s it alone may take it. Refused as ReleaseControl is.",
+    },
+    HostInfo {
+        code: HostCode::Revoke,
+        name: "Revoke",
+        arguments: &[],
+        effect: "Takes the control away from who holds it, as if they had been lost: an armed robot holds. At the robot's own computer alone.",
     },
 ];
 
@@ -310,7 +332,7 @@ mod tests {
             let arguments = shown["arguments"].as_array().expect("a list");
             assert_eq!(arguments.len(), row.arguments.len());
         }
-        assert_eq!(list[list.len() - 1]["code"], 0x0308);
+        assert_eq!(list[list.len() - 1]["code"], 0x030A);
         assert_eq!(catalogue.layout.len(), 16);
         assert_ne!(catalogue.layout, catalogue.commands);
     }

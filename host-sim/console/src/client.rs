@@ -37,8 +37,9 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
         return Err(url.error("over plain HTTP a key could be read on its way: `ctl watch` and `ctl stop` alone need none"));
     }
     let mut stream = url.stream()?;
+    // In this version an answer of unknown length comes in one piece.
     let request = format!(
-        "{method} /api/v1/{path} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n",
+        "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\n\r\n",
         url.host,
         key.to_hex()
     );

@@ -93,6 +93,13 @@ pub(crate) fn is_origin(text: &str) -> bool {
     name.is_some_and(|name| !name.is_empty() && name.chars().all(plain))
 }
 
+/// Whether a client is on this computer: it comes from an address that is this computer's own,
+/// which from elsewhere nobody has.
+pub(crate) fn is_local(client: IpAddr, own: IpAddr) -> bool {
+    let [client, own] = [client, own].map(|ip| ip.to_canonical());
+    client.is_loopback() || client == own
+}
+
 /// Connections at a time.
 const CONNECTIONS: usize = 128;
 /// Those of one address: from others there are always places.
@@ -166,6 +173,23 @@ impl WrongKeys {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn who_comes_from_another_address_is_not_on_this_computer() {
+        let local = |client: &str, own: &str| {
+            let [client, own] = [client, own].map(|text| text.parse().expect("an address"));
+            is_local(client, own)
+        };
+        assert!(local("127.0.0.1", "127.0.0.1"));
+        assert!(local("127.0.0.2", "127.0.0.1"));
+        assert!(local("::1", "::1"));
+        assert!(local("::ffff:127.0.0.1", "::ffff:127.0.0.1"));
+        assert!(local("192.0.2.7", "192.0.2.7"));
+        assert!(local("192.0.2.7", "::ffff:192.0.2.7"));
+        assert!(!local("192.0.2.8", "192.0.2.7"));
+        assert!(!local("::ffff:192.0.2.8", "::ffff:192.0.2.7"));
+        assert!(!local("2001:db8::8", "2001:db8::7"));
+    }
 
     #[test]
     fn a_foreign_host_or_origin_is_none_of_ours() {

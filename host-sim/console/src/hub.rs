@@ -2,6 +2,7 @@
 //! sample once, knows who is in control, and answers requests. It never makes the robot wait.
 
 mod control;
+mod history;
 mod samples;
 mod state;
 mod viewers;
@@ -10,12 +11,14 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
 use serde_json::{Value, json};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
+use self::history::History;
 use crate::catalogue::Catalogue;
 use crate::close::Close;
 use crate::desk::{ClientId, Desk};
@@ -74,6 +77,8 @@ struct Client {
     session: String,
     outbox: Arc<Outbox>,
     subscriptions: BTreeMap<u16, Subscription>,
+    /// It is on the robot's own computer.
+    is_local: bool,
     /// When the holder of the control was told last that this client asks for it.
     asked: Option<Instant>,
 }
@@ -90,6 +95,9 @@ struct Pending {
 enum Asked {
     Take,
     Release,
+    /// A release for another client.
+    HandOver(ClientId),
+    Revoke,
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),
@@ -136,8 +144,11 @@ struct Inner {
     desk: Desk,
     /// Name of the client that was in control last.
     last_holder: String,
+    /// Name of the client that has taken the control away from it.
+    revoked_by: Option<String>,
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
+    history: History,
     /// The newest events, each as it was told.
     events: VecDeque<Utf8Bytes>,
     faults: Vec<(FaultSpec, u64)>,
@@ -154,6 +165,7 @@ struct Channels {
     samples: rtrb::Consumer<Moving>,
 }
 
+pub(crate) use history::LONGEST_S;
 pub(crate) use viewers::Looking;
 
 /// The hub.
@@ -199,7 +211,9 @@ impl Hub {
                 viewers,
                 desk: Desk::default(),
                 last_holder: String::new(),
+                revoked_by: None,
                 pending: BTreeMap::new(),
+                history: History::new(),
                 arrived: channels().iter().map(|_| Arrived::default()).collect(),
                 events: VecDeque::with_capacity(EVENTS),
                 faults: Vec::new(),
@@ -240,8 +254,8 @@ impl Hub {
     pub(crate) fn enter(
         &self,
         role: Role,
-        name: &str,
-        session: &str,
+        (name, session): (&str, &str),
+        is_local: bool,
         outbox: &Arc<Outbox>,
     ) -> Option<(Asking, u64)> {
         let mut inner = self.inner();
@@ -262,6 +276,7 @@ impl Hub {
                 session: session.to_owned(),
                 outbox: Arc::clone(outbox),
                 subscriptions: BTreeMap::new(),
+                is_local,
                 asked: None,
             },
         );
@@ -272,7 +287,9 @@ impl Hub {
 
     /// A client is gone. Control that it holds ends with its beats, at the master.
     pub(crate) fn leave(&self, asking: &Asking) {
-        self.inner().clients.remove(&asking.id);
+        let mut inner = self.inner();
+        inner.clients.remove(&asking.id);
+        inner.desk.leave(asking.id);
     }
 
     /// What a client asks; `limited`: it asks too often.
@@ -366,6 +383,14 @@ impl Hub {
         format!(r#"{{"events":[{}]}}"#, events.join(","))
     }
 
+    /// Samples of a channel in the last seconds of master time, the oldest first, each as a frame has it.
+    pub(crate) fn samples(&self, channel: u16, seconds: u8) -> Vec<Bytes> {
+        let inner = self.inner();
+        let now_ns = inner.now_us() * 1_000;
+        let from_ns = now_ns.saturating_sub(u64::from(seconds) * 1_000_000_000);
+        inner.history.since(channel, from_ns)
+    }
+
     /// The boards' parameters.
     pub(crate) fn parameters(&self) -> String {
         self.inner().viewers.parameters.document().to_owned()
@@ -416,6 +441,7 @@ impl Hub {
         if now >= inner.state_due {
             inner.state_due = now + STATE_PERIOD;
             inner.tell_unknown(now);
+            self.signals.connected(inner.taken_places());
             let state = self.state_of(&inner);
             inner.tell_state(state);
         }

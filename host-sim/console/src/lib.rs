@@ -43,7 +43,9 @@ pub mod replay;
 pub mod request;
 mod server;
 mod session;
+mod table;
 mod tls;
+pub mod unpack;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list};

@@ -48,6 +48,11 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
             Reason::Master("expired"),
             "the computer stood still since: look at the robot, take the control, then give it again",
         ),
+        Answer::Revoked => refused(
+            n,
+            Reason::Revoked,
+            "the control was taken away at the robot's computer: look at the robot, then take it anew",
+        ),
         Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(
             n,

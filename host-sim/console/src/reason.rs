@@ -15,6 +15,8 @@ pub enum Reason {
     Busy,
     /// A robot command while the simulation is paused.
     Paused,
+    /// The control was taken away at the robot's computer.
+    Revoked,
     /// The role may not do this.
     Role,
     /// There is no such command, or it has a way of its own.
@@ -39,12 +41,13 @@ pub enum Reason {
 
 impl Reason {
     /// All but the master's.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::NotInControl,
         Self::ControlHeld,
         Self::SeenInFuture,
         Self::Busy,
         Self::Paused,
+        Self::Revoked,
         Self::Role,
         Self::BadCommand,
         Self::BadArgument,
@@ -65,6 +68,7 @@ impl Reason {
             Self::SeenInFuture => "seen_in_future",
             Self::Busy => "busy",
             Self::Paused => "paused",
+            Self::Revoked => "revoked",
             Self::Role => "role",
             Self::BadCommand => "bad_command",
             Self::BadArgument => "bad_argument",

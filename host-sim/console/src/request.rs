@@ -86,13 +86,15 @@ impl Spoken {
     }
 }
 
-/// To whom a command goes.
+/// What a command acts on.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// To the master.
+    /// The robot, by its master.
     Robot(Command),
-    /// To the simulation.
+    /// The simulation, or who is in control.
     Host(HostCommand),
+    /// Who is in control, and is followed by the client of this session.
+    HandOver(String),
 }
 
 /// A command of the host.
@@ -114,6 +116,8 @@ pub enum HostCommand {
     RecordStart,
     /// The recording ends.
     RecordStop,
+    /// The control is taken away.
+    Revoke,
 }
 
 /// Why a frame that is sound in form cannot be done.
@@ -274,7 +278,7 @@ fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
         return Ok(Order::Robot(command));
     }
     if let Some(info) = HOST_TABLE.iter().find(|row| row.name == name) {
-        return host(info, args).map(Order::Host);
+        return host(info, args);
     }
     let robots = TABLE.iter().map(|row| row.name);
     let names = robots.chain(HOST_TABLE.iter().map(|row| row.name));
@@ -292,7 +296,7 @@ fn bad_argument(text: impl ToString) -> BadRequest {
     }
 }
 
-fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadRequest> {
+fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<Order, BadRequest> {
     if let Some(name) = args
         .keys()
         .find(|name| info.arguments.iter().all(|a| a.name != *name))
@@ -319,7 +323,7 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         }
         FaultSpec::at_once(text).map_err(bad_argument)
     };
-    Ok(match info.code {
+    Ok(Order::Host(match info.code {
         HostCode::Pause => HostCommand::Pause,
         HostCode::Resume => HostCommand::Resume,
         HostCode::Step => {
@@ -344,7 +348,14 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<HostCommand, BadReq
         HostCode::EndFault => HostCommand::EndFault(fault()?),
         HostCode::RecordStart => HostCommand::RecordStart,
         HostCode::RecordStop => HostCommand::RecordStop,
-    })
+        HostCode::HandOver => {
+            let json = given("to")?;
+            let no_text = || bad_argument(format!("`to` is {json}, and must be a text"));
+            let to = json.as_str().ok_or_else(no_text)?.to_owned();
+            return Ok(Order::HandOver(to));
+        }
+        HostCode::Revoke => HostCommand::Revoke,
+    }))
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ use wheeleg_telemetry::channels;
 use crate::api::{self, Peer};
 use crate::error::ConsoleError;
 use crate::foxglove::{self, Viewers};
-use crate::guard::{Hosts, Places, WrongKeys, is_host, is_origin};
+use crate::guard::{Hosts, Places, WrongKeys, is_host, is_local, is_origin};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
@@ -43,8 +43,11 @@ const WORKERS: usize = 2;
 /// Time in which a request must have come.
 const HEAD: Duration = Duration::from_secs(3);
 /// Bytes that may wait in the system for a client: who has a slow line sees what was so much before.
-/// Linux takes twice as many, its own overhead with them.
+/// Linux takes twice as many, its own overhead with them. A line of 100 ms there and back needs so many.
 const SEND_BUFFER: u32 = 8 * 1024;
+/// Of these, bytes that are not even on their way: what is newer overtakes all else, at the hub.
+#[cfg(target_os = "linux")]
+const UNSENT: u32 = 2 * 1024;
 /// Connections that may wait to be accepted.
 const BACKLOG: u32 = 256;
 
@@ -405,11 +408,18 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<Tls
         };
         // Without it an answer waits for the client's acknowledgement: 40 ms.
         let _ = stream.set_nodelay(true);
+        #[cfg(target_os = "linux")]
+        let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
         // A socket takes its place along.
         let place = Arc::new(place);
         let router = router
             .clone()
-            .layer(Extension(Peer(peer)))
+            .layer(Extension(Peer {
+                ip: peer.ip(),
+                is_local: stream
+                    .local_addr()
+                    .is_ok_and(|own| is_local(peer.ip(), own.ip())),
+            }))
             .layer(Extension(Arc::clone(&place)));
         let tls = tls.clone();
         tokio::spawn(async move {

@@ -1,6 +1,5 @@
 //! One client's connection: handshake, then frames in and whatever its outbox holds out.
 
-use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -12,6 +11,7 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time::timeout;
 
+use crate::api::Peer;
 use crate::close::Close;
 use crate::door::{Door, Entered};
 use crate::guard::WrongKeys;
@@ -85,7 +85,7 @@ pub(crate) async fn serve(
     mut socket: WebSocket,
     context: Arc<Context>,
     host: String,
-    from: IpAddr,
+    Peer { ip: from, is_local }: Peer,
 ) {
     let admitted = match timeout(HANDSHAKE, handshake(&mut socket, &context, &host)).await {
         Ok(Ok(admitted)) => admitted,
@@ -107,7 +107,10 @@ pub(crate) async fn serve(
         server_mac,
         key,
     } = admitted;
-    let Some((asking, master_us)) = context.hub.enter(role, &name, &session, &outbox) else {
+    let Some((asking, master_us)) = context
+        .hub
+        .enter(role, (&name, &session), is_local, &outbox)
+    else {
         return refuse(&mut socket, Close::TooSlow).await;
     };
     let welcome = json!({

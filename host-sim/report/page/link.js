@@ -45,7 +45,8 @@ const READERS = {
 /** @typedef {{status: string, reason?: string, text?: string, holder?: string, age_ms?: number}} Answer */
 /** @typedef {{key: string, role: "control" | "view", name: string}} Identity */
 /** @typedef {{sample: (topic: string, t_us: number, values: Object<string, any>) => void, state: (state: any) => void,
- *   event: (event: any) => void, asked: (by: string) => void, closed: (why: string) => void}} Listener */
+ *   event: (event: any) => void, asked: (by: string, session: string) => void, offered: (by: string) => void,
+ *   revoked: (by: string) => void, closed: (why: string) => void}} Listener */
 
 /** One session. */
 export class Link {
@@ -211,7 +212,9 @@ export class Link {
       this.waiting.delete(message.n);
     } else if (message.op === "state") this.listener.state(message);
     else if (message.op === "event") this.listener.event(message);
-    else if (message.op === "asked") this.listener.asked(message.by);
+    else if (message.op === "asked") this.listener.asked(message.by, message.session);
+    else if (message.op === "offered") this.listener.offered(message.by);
+    else if (message.op === "revoked") this.listener.revoked(message.by);
     else if (message.op === "error") this.refusal = message.text;
   }
 

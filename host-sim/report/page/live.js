@@ -8,14 +8,16 @@ import { LINKS, boardsView } from "./boards.js";
 import { Pauses, faultsToTry, faultsView } from "./faults.js";
 import { driver } from "./drive.js";
 import { jointCard } from "./joint.js";
+import { eventsView } from "./events.js";
 import { parametersView } from "./parameters.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
 const BEAT_MS = 50;
+/** Who asked for the control longer ago may not wait for it any more. */
+const ASKED_MS = 20000;
 /** How often the line is measured. */
 const ECHO_MS = 100;
-const EVENTS = 200;
 /** Who was in control so shortly ago may be who was lost, ms. */
 const DROVE_MS = 5000;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
@@ -176,7 +178,7 @@ let drove_ms = -Infinity;
 const boards = boardsView();
 /** @type {Scope | null} */
 let scope = null;
-const events = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
+const events = eventsView();
 // ---- recording ----
 const record = button("Record", "", () => command(recording() ? "RecordStop" : "RecordStart"), "RecordStart 0x0307, RecordStop 0x0308");
 const recorded = html("p", { class: "effect", role: "status" }, "Not recording.");
@@ -238,6 +240,9 @@ const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
 const byHand = driver(command);
 const parameters = parametersView(command, () => (link ? link.ask("parameters") : Promise.reject(new Error(lost))));
+/** Who asked for the control last, and how long that is offered here. @type {{session: string, until_ms: number} | null} */
+let heir = null;
+const handOver = html("div", { class: "row", hidden: true }, html("button", { class: "btn", type: "button", onclick: () => heir && command("HandOver", { to: heir.session }) }));
 const mine = () => Boolean(link && now.state?.control?.session === link.session);
 const stepping = () => Boolean(now.state?.stepping);
 
@@ -269,7 +274,7 @@ function build({ robot, commands: list, faults: injectable }) {
   views = { side: sideView(pictures.side, robot.drawing, relief ? reliefHeights(relief) : undefined), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
   say(head.robot.value, robot.name);
   commands = list;
-  which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
+  which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation, and who is in control"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
   which.value = "JointReference";
   showFields();
   toTry.offer(injectable);
@@ -296,7 +301,7 @@ function build({ robot, commands: list, faults: injectable }) {
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), answer),
+        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), handOver, answer),
         faults.root,
         boards.root,
         byHand.root,
@@ -304,7 +309,7 @@ function build({ robot, commands: list, faults: injectable }) {
         parameters.root,
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
         robot.simulated && toTry.root,
-        html("section", { class: "panel eventlist" }, html("h2", {}, "Events"), events),
+        events.root,
         keys,
       ),
     ),
@@ -329,6 +334,7 @@ function showState(state) {
   boards.state(state);
   showRecording(state);
   if (mine()) drove_ms = performance.now();
+  handOver.hidden ||= !mine() || !heir || performance.now() > heir.until_ms;
   faults.state(state, performance.now() - drove_ms < DROVE_MS, pauses);
   toTry.state(state.faults);
 }
@@ -375,13 +381,18 @@ const listener = {
     now.heard_ms = performance.now();
     now.t_us = Math.max(now.t_us, state.master_us);
   },
-  event(event) {
-    const bad = event.kind === "fault";
-    events.prepend(html("li", { class: bad ? "bad" : "" }, html("time", {}, fixed(event.t_ns * 1e-9, 2)), html("span", {}, event.holder ? `${event.text} (${event.holder})` : event.text)));
-    while (events.childElementCount > EVENTS) events.lastElementChild?.remove();
-  },
-  asked(by) {
+  event: events.add,
+  asked(by, session) {
     say(answer, `${by} asks for the control.`);
+    heir = { session, until_ms: performance.now() + ASKED_MS };
+    say(handOver.firstElementChild, `Hand the control over to ${by}`);
+    handOver.hidden = false;
+  },
+  offered(by) {
+    say(answer, `${by} hands the control over to you: press Take control within 2 s. Then it is free for everybody.`);
+  },
+  revoked(by) {
+    say(answer, `${by}, at the robot's computer, has taken the control away. Look at the robot, then take it anew.`);
   },
   closed(why) {
     lost = `${why}. Nothing is sent any more; reload the page to look again.`;
@@ -407,6 +418,7 @@ async function begin() {
     });
     build(about);
     await link.subscribe([...drawn], HZ);
+    events.past((await link.ask("events")).events);
     setInterval(() => {
       pauses.run(link?.late_ms() ?? 0);
       if (mine()) link?.beat();

@@ -3,7 +3,9 @@
 // goes on. A signal is kept from the instant at which its plot was added.
 import { html, say } from "./dom.js";
 import { Player } from "./player.js";
+import { picture } from "./picture.js";
 import { Linked, Plot } from "./plot.js";
+import { save } from "./save.js";
 
 /** Samples per second of a channel. */
 export const HZ = 30;
@@ -106,12 +108,13 @@ export class Scope {
     const add = html("select", { "aria-label": "Add a plot", onchange: (event) => this.chosen(event.target) }, html("option", { value: "" }, "Add a plot…"), html("optgroup", { label: "Usual" }, known.map(option)), html("optgroup", { label: "Every signal" }, others.map(option)));
     const span = html("select", { "aria-label": "Span of the plots", onchange: (event) => this.lasting(Number(event.target.value)) }, SPANS_S.map((s) => html("option", { value: s, selected: s === this.span }, `last ${s} s`)));
     this.freeze = html("button", { class: "btn", type: "button", "aria-pressed": "false", onclick: () => this.toggle() }, "Freeze");
-    const save = html("button", { class: "btn", type: "button", onclick: () => this.save() }, "Save as CSV");
+    const table = html("button", { class: "btn", type: "button", onclick: () => save("wheeleg-plots.csv", "text/csv", this.table()) }, "Save as CSV");
+    const drawn = html("button", { class: "btn", type: "button", onclick: () => this.savePicture() }, "Save as PNG");
     this.note = html("span", { class: "note-live", role: "status" });
     this.list = html("div", { class: "scope-plots" });
     this.list.addEventListener("pointerenter", () => (this.hovered = true));
     this.list.addEventListener("pointerleave", () => (this.hovered = false));
-    this.root = html("section", { class: "panel scope", "data-live": true, "aria-label": "Plots" }, html("header", {}, html("h2", {}, "Plots"), add, span, this.freeze, save, this.note), this.list);
+    this.root = html("section", { class: "panel scope", "data-live": true, "aria-label": "Plots" }, html("header", {}, html("h2", {}, "Plots"), add, span, this.freeze, table, drawn, this.note), this.list);
     this.add(known.find(({ name }) => name === "Left vertical, stroke") ?? known[0]);
   }
 
@@ -216,16 +219,21 @@ export class Scope {
   }
 
   /** What the plots show, as a table for other programs. */
-  save() {
+  table() {
     const columns = this.shown.flatMap(({ choice }) => choice.traces);
     const rows = ["t_s,signal,value"];
     for (const { topic, field } of columns) {
       const points = this.rings.get(topic)?.get(field)?.since(this.player.start);
       points?.x.forEach((t, i) => t <= this.player.end && rows.push(`${t.toFixed(4)},${topic}.${field},${points.y[i]}`));
     }
-    const address = URL.createObjectURL(new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
-    html("a", { href: address, download: "wheeleg-plots.csv" }).click();
-    setTimeout(() => URL.revokeObjectURL(address), 1000);
+    return `${rows.join("\n")}\n`;
+  }
+
+  /** The plots as they are now, one below the other. */
+  async savePicture() {
+    const file = await picture(this.shown.map(({ plot }) => plot));
+    if (file) save("wheeleg-plots.png", "image/png", file);
+    else say(this.note, "There is no plot to save.");
   }
 }
 

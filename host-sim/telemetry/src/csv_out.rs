@@ -8,8 +8,8 @@ use super::samples::channels;
 use super::sink::{Sink, Taken};
 use crate::LogError;
 
-/// Channels without a table: what the log alone is asked for.
-const WITHOUT: [&str; 2] = ["/state", "/run"];
+/// Channels without a table: what the log alone is asked for, and what no run to its end has.
+const WITHOUT: [&str; 4] = ["/state", "/run", "/server", "/session"];
 
 struct Table {
     path: PathBuf,

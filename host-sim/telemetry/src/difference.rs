@@ -6,6 +6,7 @@ use mcap::MessageStream;
 use serde_json::{Map, Value};
 
 use super::derived::Derived;
+use super::registry::Written;
 use super::samples::channels;
 use crate::LogError;
 
@@ -16,11 +17,16 @@ struct Logged {
     payload: Vec<u8>,
 }
 
-/// The messages of a log in the order in which they were written, without what follows from others.
+/// The messages of a log in the order in which they were written, without what follows from others,
+/// and without what a live robot alone has.
 fn messages(bytes: &[u8]) -> Result<impl Iterator<Item = Result<Logged, LogError>>, LogError> {
     let stream = MessageStream::new(bytes)?;
-    let derived = |topic: &str| Derived::of_topic(topic).is_some();
-    let own = stream.filter(move |m| !m.as_ref().is_ok_and(|m| derived(&m.channel.topic)));
+    let live = |topic: &str| {
+        let mut live = channels().iter().filter(|def| def.written == Written::Live);
+        live.any(|def| def.topic == topic)
+    };
+    let other = move |topic: &str| Derived::of_topic(topic).is_some() || live(topic);
+    let own = stream.filter(move |m| !m.as_ref().is_ok_and(|m| other(&m.channel.topic)));
     Ok(own.map(|message| {
         let message = message?;
         Ok(Logged {

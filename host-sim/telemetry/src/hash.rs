@@ -3,7 +3,8 @@
 use super::registry::Sample;
 
 /// BLAKE3 over (channel name, time, field values) of every sample of every channel, in the
-/// order in which the loop gives them and at the rate at which it gives them.
+/// order in which the loop gives them and at the rate at which it gives them. Left out are the
+/// channels of a live robot's server: what it was given, and how it keeps pace with the wall.
 ///
 /// It does not depend on what is written: a run without a log file, or with another encoding,
 /// decimation or compression, has the same hash. The same binary, scenario, robot and seed give

@@ -59,6 +59,7 @@ pub use recover::{Recovered, recover};
 pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written, json_schema};
 pub use samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
+    MasterSample, ProvenanceSample, ServerSample, SessionSample, StateSample, SupplySample,
+    WheelSample, channels,
 };
 pub use sink::{OwnedSample, SampleRef, Sink, Taken};

@@ -188,6 +188,8 @@ impl Memory {
             }
             // Events come typed, by a way of their own.
             SampleRef::Event(_) | SampleRef::Provenance(_) | SampleRef::State(_) => {}
+            // No analysis is of a server.
+            SampleRef::Server(_) | SampleRef::Session(_) => {}
         }
     }
 

@@ -11,7 +11,8 @@ use super::memory::{Keep, Memory, Recording};
 use super::registry::{ChannelDef, Sample};
 use super::samples::{
     BehaviourSample, BodySample, BusSample, FootSample, JointSample, LinkSample, MasterSample,
-    ProvenanceSample, StateSample, SupplySample, WheelSample, channels,
+    ProvenanceSample, ServerSample, SessionSample, StateSample, SupplySample, WheelSample,
+    channels,
 };
 use super::sink::{SampleRef, Sink, Taken};
 use crate::{Event, LogError};
@@ -70,6 +71,8 @@ mod index {
     pub(super) const RUN: usize = 16;
     pub(super) const LINK: usize = 17;
     pub(super) const BEHAVIOURS: usize = 25;
+    pub(super) const SERVER: usize = 26;
+    pub(super) const SESSION: usize = 27;
 }
 
 impl<'a> Recorder<'a> {
@@ -214,6 +217,17 @@ impl<'a> Recorder<'a> {
         self.put(index::LINK, node, t_ns, &sample);
     }
 
+    /// Records how the server of a live robot keeps pace: no part of the hash, as no replay has the
+    /// same.
+    pub fn server(&mut self, t_ns: u64, sample: &ServerSample) {
+        self.hand_on(index::SERVER, 0, t_ns, sample);
+    }
+
+    /// Records what a live robot was given: no part of the hash, which is of what came of it.
+    pub fn session(&mut self, t_ns: u64, sample: &SessionSample) {
+        self.hand_on(index::SESSION, 0, t_ns, sample);
+    }
+
     /// Records an event.
     pub fn event(&mut self, t_ns: u64, event: impl Into<Event>) {
         let event = event.into();
@@ -270,15 +284,24 @@ impl<'a> Recorder<'a> {
         (recording, failed)
     }
 
-    /// Hands on a sample of the channel `first + number`.
+    /// Hands on a sample of the channel `first + number`, and takes it into the hash.
     fn put<S: Sample>(&mut self, first: usize, number: usize, t_ns: u64, sample: &S)
+    where
+        for<'x> &'x S: Into<SampleRef<'x>>,
+    {
+        let topic = self.channels[first + number].def.topic;
+        self.hash.update(topic, t_ns, sample);
+        self.hand_on(first, number, t_ns, sample);
+    }
+
+    /// Hands on a sample of the channel `first + number`.
+    fn hand_on<S: Sample>(&mut self, first: usize, number: usize, t_ns: u64, sample: &S)
     where
         for<'x> &'x S: Into<SampleRef<'x>>,
     {
         let channel = first + number;
         let state = &mut self.channels[channel];
         debug_assert_eq!(state.def.schema, S::SCHEMA);
-        self.hash.update(state.def.topic, t_ns, sample);
         let due = t_ns >= state.next_ns;
         if due {
             // Stay on the grid of the period, whatever the first time was.
@@ -325,6 +348,8 @@ mod tests {
         assert_eq!(topic(index::RUN), "/run");
         assert_eq!(topic(index::LINK), "/link/1");
         assert_eq!(topic(index::BEHAVIOURS), "/behaviours");
-        assert_eq!(channels().len(), index::BEHAVIOURS + 1);
+        assert_eq!(topic(index::SERVER), "/server");
+        assert_eq!(topic(index::SESSION), "/session");
+        assert_eq!(channels().len(), index::SESSION + 1);
     }
 }

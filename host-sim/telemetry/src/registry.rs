@@ -116,6 +116,8 @@ pub enum Written {
     OnChange,
     /// While the robot walks.
     InWalks,
+    /// Where a robot is served live.
+    Live,
 }
 
 impl Written {
@@ -126,6 +128,7 @@ impl Written {
             Self::Always => "always",
             Self::OnChange => "on change",
             Self::InWalks => "in walks",
+            Self::Live => "live",
         }
     }
 }
@@ -158,6 +161,7 @@ impl ChannelDef {
 /// How often a channel has samples, for people.
 pub(crate) fn rate(rate_hz: u32, written: Written) -> String {
     match (rate_hz, written) {
+        (0, Written::Live) => "live".to_owned(),
         (0, _) => "on change".to_owned(),
         (hz, Written::InWalks) => format!("{hz} Hz in walks"),
         (hz, _) => format!("{hz} Hz"),

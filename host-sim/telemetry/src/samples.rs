@@ -398,6 +398,42 @@ samples! {
         text: String, "text", 0, Host;
     }
 
+    /// How a live robot's server kept pace over the last second of its own clock. Not in the hash: no replay has the same.
+    ServerSample = "wheeleg.Server" {
+        /// How late a bus cycle began, median.
+        late_p50_ms: f64, "ms", 3, Host;
+        /// The same, 99th percentile.
+        late_p99_ms: f64, "ms", 3, Host;
+        /// The same, largest.
+        late_max_ms: f64, "ms", 3, Host;
+        /// Simulated over wall time.
+        factor: f64, "1", 3, Host;
+        /// How often the base of the clock was shifted since the start, because a cycle began too late to be caught up with.
+        shifts: u32, "1", 0, Host;
+        /// Clients and viewers that are connected.
+        clients: u32, "1", 0, Host;
+        /// Samples since the start that the clients could not be told, because the server did not keep up.
+        dropped: u32, "1", 0, Host;
+    }
+
+    /// What a live robot was given, at the simulated time up to which it had been simulated then; beats are left out. Not in the hash.
+    SessionSample = "wheeleg.Session" {
+        /// Kind: command, stop, fault_begins, fault_ends, pace.
+        kind: String, "text", 0, Host;
+        /// Code of the command, as in the master's table of commands; 0: none.
+        command: u16, "code", 0, Host;
+        /// Client that takes the control with it; empty where it does not.
+        by: String, "text", 0, Host;
+        /// Fault that begins or ends.
+        fault: String, "text", 0, Host;
+        /// Simulated over wall time that is asked for, from now on; not a number: as fast as it goes.
+        speed: f64, "1", 3, Host;
+        /// Whether the clock stands, from now on.
+        paused: bool, "flag", 0, Host;
+        /// What was given, for a person: a command with its arguments.
+        text: String, "text", 0, Host;
+    }
+
     /// What a log is of.
     ProvenanceSample = "wheeleg.Run" {
         /// Kind: program, scenario, robot, seed, fault, parameter.
@@ -439,7 +475,7 @@ const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
-static CHANNELS: [ChannelDef; 26] = [
+static CHANNELS: [ChannelDef; 28] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),
     channel::<JointSample>("/joint/3", FAST_HZ, "Left vertical cylinder (b6)"),
@@ -467,6 +503,13 @@ static CHANNELS: [ChannelDef; 26] = [
     channel::<LinkSample>("/link/8", 0, "Bus as heard by wheel 8").written(Written::OnChange),
     channel::<BehaviourSample>("/behaviours", CYCLE_HZ, "Legs and behaviours of a walk")
         .written(Written::InWalks),
+    channel::<ServerSample>(
+        "/server",
+        0,
+        "Pace and load of a live robot's server, once a second of its own clock",
+    )
+    .written(Written::Live),
+    channel::<SessionSample>("/session", 0, "What a live robot was given").written(Written::Live),
 ];
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use super::contact::Contact;
 use super::registry::Sample;
 use super::samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
-    MasterSample, ProvenanceSample, StateSample, SupplySample, WheelSample,
+    MasterSample, ProvenanceSample, ServerSample, SessionSample, StateSample, SupplySample,
+    WheelSample,
 };
 use crate::{Event, LogError};
 
@@ -93,6 +94,8 @@ sample_ref! {
     Event: EventSample,
     Link: LinkSample,
     Provenance: ProvenanceSample,
+    Server: ServerSample,
+    Session: SessionSample,
 }
 
 /// One sample on its way to the sinks.

@@ -72,7 +72,8 @@ impl Session {
         let mut number = [0; 8];
         getrandom::fill(&mut number).map_err(|e| e.to_string())?;
         let outbox = Arc::new(Outbox::default());
-        let entered = hub.enter(Role::Control, NAME, &hex::encode(&number), &outbox);
+        let session = hex::encode(&number);
+        let entered = hub.enter(Role::Control, (NAME, &session), false, &outbox);
         let (asking, _) = entered.ok_or("all places of the console are taken")?;
         Ok(Self {
             hub: Arc::clone(hub),

@@ -2,16 +2,17 @@
 
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
-use super::{Asked, Inner, Pending, Role, TICKET};
+use super::{Asked, Client, Inner, Pending, Role, TICKET};
 use crate::desk::{ClientId, Denied};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use crate::reason::Reason;
 use crate::request::{HostCommand, Order, Spoken};
 
+const RELEASE: CommandCode = CommandCode::ReleaseControl;
 /// The holder of the control is told of one who asks for it so often at most: who asks without end
 /// fills no queue of theirs.
 const ASKED: Duration = Duration::from_secs(1);
@@ -32,6 +33,8 @@ impl Inner {
             let text = "the view key may look and stop; connect with the control key";
             return self.tell(id, &refused(n, Reason::Role, text));
         }
+        let now = Instant::now();
+        self.desk.free(now);
         let holds = self.desk.holds(id);
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
@@ -44,11 +47,10 @@ impl Inner {
                 match self.desk.ask(id, who, takes) {
                     Ok(()) => {}
                     Err(Denied::Held) => {
-                        let now = Instant::now();
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
                         if !told {
                             client.asked = Some(now);
-                            let asked = json!({ "op": "asked", "by": client.name });
+                            let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
                             if let Some(holder) = self.desk.holder() {
                                 self.tell(holder.client, &asked);
                             }
@@ -74,6 +76,41 @@ impl Inner {
                     by: takes.then(|| client.name.clone()),
                 };
                 (input, what)
+            }
+            Order::HandOver(to) => {
+                if !holds {
+                    let text = "take the control first";
+                    return self.tell(id, &refused(n, Reason::NotInControl, text));
+                }
+                let drives = |(other, client): &(&ClientId, &Client)| {
+                    client.session == to && client.role == Role::Control && **other != id
+                };
+                let Some((&heir, _)) = self.clients.iter().find(drives) else {
+                    let text = "`to`: no other client that may drive has this session";
+                    return self.tell(id, &refused(n, Reason::BadArgument, text));
+                };
+                let spoken = Spoken {
+                    cmd: RELEASE.name().to_owned(),
+                    args: Map::new(),
+                };
+                let input = Input::Request {
+                    id: self.next_request,
+                    seen_us,
+                    valid_us,
+                    command: Command::ReleaseControl,
+                    spoken,
+                    by: None,
+                };
+                (input, Asked::HandOver(heir))
+            }
+            Order::Host(HostCommand::Revoke) => {
+                if !client.is_local {
+                    let text = "the control is taken away at the robot's own computer alone";
+                    return self.tell(id, &refused(n, Reason::Role, text));
+                }
+                let id = self.next_request;
+                let command = HostCommand::Revoke;
+                (Input::Host { id, command }, Asked::Revoke)
             }
             Order::Host(command) => {
                 if self.desk.holder().is_some() && !holds {
@@ -101,7 +138,7 @@ impl Inner {
         let pending = Pending {
             client: id,
             n,
-            since: Instant::now(),
+            since: now,
             accepted: false,
             what,
         };
@@ -111,8 +148,11 @@ impl Inner {
 
     /// The answer to who wants what another holds.
     fn held(&self, n: u64) -> Value {
-        let name = self.desk.holder().map_or("", |holder| &holder.name);
-        let text = format!("{name:?} holds the control");
+        let name = self.desk.name().unwrap_or_default();
+        let text = match self.desk.holder() {
+            Some(_) => format!("{name:?} holds the control"),
+            None => format!("the control is kept for {name:?}, for 2 s"),
+        };
         let mut answer = refused(n, Reason::ControlHeld, &text);
         answer["holder"] = json!(name);
         answer["age_ms"] = json!(self.age_ms());
@@ -146,10 +186,13 @@ impl Inner {
                 self.desk.grant(client, time_us);
                 if let Some(holder) = self.desk.holder() {
                     self.last_holder.clone_from(&holder.name);
+                    self.revoked_by = None;
                 }
             }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
+            Some(Asked::HandOver(heir)) if is_done => self.handed_over(client, heir),
+            Some(Asked::Revoke) if is_done => self.revoked(client),
             Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
@@ -160,6 +203,28 @@ impl Inner {
             _ => {}
         }
         self.tell(client, &message);
+    }
+
+    fn handed_over(&mut self, client: ClientId, heir: ClientId) {
+        // Where one of them is gone by now, it is a release.
+        self.desk.release(client);
+        let [from, to] = [client, heir].map(|id| Some(&*self.clients.get(&id)?.name));
+        let (Some(from), Some(to)) = (from, to) else {
+            return;
+        };
+        let offered = json!({ "op": "offered", "by": from });
+        self.desk.hand_over(client, (heir, to), Instant::now());
+        self.tell(heir, &offered);
+    }
+
+    fn revoked(&mut self, by: ClientId) {
+        let name = self.clients.get(&by).map(|client| client.name.clone());
+        let name = name.unwrap_or_default();
+        if let Some(holder) = self.desk.holder() {
+            let revoked = json!({ "op": "revoked", "by": name });
+            self.tell(holder.client, &revoked);
+            self.revoked_by = Some(name);
+        }
     }
 
     pub(super) fn take_status(&mut self, status: Status) {

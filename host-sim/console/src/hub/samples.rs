@@ -55,6 +55,9 @@ impl Inner {
                 let mut event = event_json(moving.t_ns, event);
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();
+                    if let Some(by) = &self.revoked_by {
+                        event["revoked_by"] = by.as_str().into();
+                    }
                 }
                 tell_event(&self.clients, &mut self.events, &event);
             }
@@ -71,14 +74,22 @@ impl Inner {
                 moving.sample.pack(&mut arrived.batch);
                 arrived.count += 1;
             }
-            if some {
+            if self.history.keeps_all(moving.channel) {
+                self.history
+                    .keep(moving.channel, moving.t_ns, encode(&moving));
+            }
+            if some || self.history.wants(moving.channel, moving.t_ns) {
                 newest.insert(moving.channel, moving);
             }
         }
+        let mut encoded: BTreeMap<u16, Bytes> = BTreeMap::new();
         for (channel, moving) in &newest {
             self.viewers.show(*channel, moving.t_ns, &moving.sample);
+            if !self.history.keeps_all(*channel) && self.history.wants(*channel, moving.t_ns) {
+                let sample = encoded.entry(*channel).or_insert_with(|| encode(moving));
+                self.history.keep(*channel, moving.t_ns, sample.clone());
+            }
         }
-        let mut encoded: BTreeMap<u16, Bytes> = BTreeMap::new();
         for client in self.clients.values_mut() {
             for (channel, subscription) in &mut client.subscriptions {
                 let (Some(period_ns), Some(moving)) = (subscription.period_ns, newest.get(channel))

@@ -2,21 +2,17 @@
 
 use axum::extract::ws::Utf8Bytes;
 use serde_json::{Value, json};
-use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::phase;
 
 use super::Inner;
 use crate::messages::rounded;
+use crate::record::inputs::fault_name;
 
 impl Inner {
     pub(super) fn active_faults(&self) -> Vec<String> {
-        let text = |(fault, _): &(FaultSpec, u64)| {
-            let text = fault.to_string();
-            // Its time is that of its begin, which is always now.
-            text.split('@').next().unwrap_or_default().to_owned()
-        };
-        self.faults.iter().map(text).collect()
+        let faults = self.faults.iter();
+        faults.map(|(fault, _)| fault_name(fault)).collect()
     }
 
     pub(super) fn tell_state(&self, text: String) {

@@ -8,7 +8,7 @@ mod priority;
 mod robot;
 mod sink;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use wheeleg_config::builtin::{self, Source};
 use wheeleg_config::{ConfigError, RobotConfig, Scenario};
@@ -181,6 +181,8 @@ pub(crate) enum Answer {
     SeenInFuture,
     /// The computer was suspended since the sender saw the robot.
     Suspended,
+    /// The control was taken away from the sender.
+    Revoked,
     /// The master is dead.
     NoMaster,
     /// The clock goes too fast for somebody in control.
@@ -272,6 +274,8 @@ pub(crate) struct Signals {
     end: AtomicBool,
     /// Samples that found the ring full.
     dropped: AtomicU64,
+    /// Clients and viewers that are connected.
+    clients: AtomicUsize,
 }
 
 impl Signals {
@@ -288,6 +292,11 @@ impl Signals {
     /// Ends the robot's thread.
     pub(crate) fn end(&self) {
         self.end.store(true, Ordering::SeqCst);
+    }
+
+    /// So many clients and viewers are connected.
+    pub(crate) fn connected(&self, clients: usize) {
+        self.clients.store(clients, Ordering::Relaxed);
     }
 
     /// Samples that found the ring full.

@@ -8,6 +8,10 @@ use super::PaceStatus;
 const CATCH_UP: Duration = Duration::from_millis(100);
 /// Cycles that are caught up with at most.
 const BURST: u32 = 10;
+/// Time over which the pace is looked at.
+const SECOND: Duration = Duration::from_secs(1);
+/// Cycles of a second whose lateness is looked at: all of them, at the fastest pace that is late at all.
+const CYCLES: usize = 1_024;
 
 /// When the next cycle is due.
 #[derive(Debug)]
@@ -17,8 +21,11 @@ pub(super) struct Pace {
     period: Option<Duration>,
     due: Instant,
     status: PaceStatus,
-    /// Begin of the second that is looked at, and cycles and largest lateness in it.
-    second: (Instant, u32, f64),
+    /// Begin of the second that is looked at, and its cycles.
+    since: Instant,
+    cycles: u32,
+    /// How late they began, ms.
+    late_ms: Vec<f64>,
 }
 
 impl Pace {
@@ -31,7 +38,9 @@ impl Pace {
                 paused,
                 ..PaceStatus::default()
             },
-            second: (now, 0, 0.0),
+            since: now,
+            cycles: 0,
+            late_ms: Vec::with_capacity(CYCLES),
         };
         pace.set_speed(speed, now);
         pace
@@ -68,8 +77,8 @@ impl Pace {
         }
     }
 
-    /// A cycle begins.
-    pub(super) fn begin(&mut self, now: Instant) {
+    /// A cycle begins. How late those of the last second were, if one is over.
+    pub(super) fn begin(&mut self, now: Instant) -> Option<Lateness> {
         let late = match self.period {
             Some(period) => {
                 let late = now.saturating_duration_since(self.due);
@@ -84,15 +93,48 @@ impl Pace {
         };
         let late_ms = late.as_secs_f64() * 1e3;
         self.status.late_ms = late_ms;
-        let (since, cycles, late_max_ms) = &mut self.second;
-        *cycles += 1;
-        *late_max_ms = late_max_ms.max(late_ms);
-        let passed = now.saturating_duration_since(*since);
-        if passed >= Duration::from_secs(1) {
-            self.status.factor =
-                f64::from(*cycles) * self.cycle.as_secs_f64() / passed.as_secs_f64();
-            self.status.late_max_ms = *late_max_ms;
-            self.second = (now, 0, 0.0);
+        self.cycles += 1;
+        if self.late_ms.len() < CYCLES {
+            self.late_ms.push(late_ms);
+        }
+        let passed = now.saturating_duration_since(self.since);
+        if passed < SECOND {
+            return None;
+        }
+        let simulated_s = f64::from(self.cycles) * self.cycle.as_secs_f64();
+        self.status.factor = simulated_s / passed.as_secs_f64();
+        let lateness = Lateness::of(&mut self.late_ms);
+        self.status.late_max_ms = lateness.max_ms;
+        self.late_ms.clear();
+        (self.since, self.cycles) = (now, 0);
+        Some(lateness)
+    }
+}
+
+/// How late the cycles of a second began.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Lateness {
+    /// Median, ms.
+    pub(super) p50_ms: f64,
+    /// 99th percentile, ms.
+    pub(super) p99_ms: f64,
+    /// Largest, ms.
+    pub(super) max_ms: f64,
+}
+
+impl Lateness {
+    /// Of at least one cycle, in any order.
+    fn of(late_ms: &mut [f64]) -> Self {
+        late_ms.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| {
+            let place = (share * late_ms.len() as f64) as usize;
+            let place = place.min(late_ms.len().saturating_sub(1));
+            late_ms.get(place).copied().unwrap_or(0.0)
+        };
+        Self {
+            p50_ms: at(0.5),
+            p99_ms: at(0.99),
+            max_ms: at(1.0),
         }
     }
 }
@@ -151,5 +193,36 @@ mod tests {
         }
         let factor = pace.status().factor;
         assert!((factor - 2.0).abs() < 0.02, "{factor}");
+    }
+
+    #[test]
+    fn each_second_tells_how_late_its_cycles_were() {
+        let start = Instant::now();
+        let mut pace = Pace::new(CYCLE, Some(1.0), false, start);
+        let mut told = Vec::new();
+        for n in 0..=200_u32 {
+            // One in a hundred is 40 ms late, which is caught up with; the rest by 2 ms.
+            let late_ms = if n % 100 == 50 { 40 } else { 2 };
+            let now = start + CYCLE * n + Duration::from_millis(late_ms);
+            told.extend(pace.begin(now));
+        }
+        assert_eq!(told.len(), 2, "{told:?}");
+        for second in told {
+            let Lateness {
+                p50_ms,
+                p99_ms,
+                max_ms,
+            } = second;
+            assert!((p50_ms - 2.0).abs() < 1e-6, "{second:?}");
+            assert!((p99_ms - 2.0).abs() < 1e-6 || (p99_ms - 40.0).abs() < 1e-6);
+            assert!((max_ms - 40.0).abs() < 1e-6, "{second:?}");
+        }
+        let of = |late_ms: &mut [f64]| Lateness::of(late_ms);
+        let many = of(&mut (0..200).map(f64::from).rev().collect::<Vec<f64>>());
+        assert_eq!(
+            (many.p50_ms, many.p99_ms, many.max_ms),
+            (100.0, 198.0, 199.0)
+        );
+        assert_eq!(of(&mut [7.0]).p99_ms, 7.0);
     }
 }

@@ -14,10 +14,10 @@ use wheeleg_master::event::Event;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_protocol::FaultBits;
 use wheeleg_sim::{SimError, provenance};
-use wheeleg_telemetry::{Keep, Recorder};
+use wheeleg_telemetry::{Keep, Recorder, ServerSample};
 
 use super::machine::{Machine, only_simulated};
-use super::pace::Pace;
+use super::pace::{Lateness, Pace};
 use super::priority;
 use super::sink::RingSink;
 use super::{
@@ -118,7 +118,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
             stops: 0,
             seen_us: 0,
             listened: awake(),
-            deaf: false,
+            deaf: None,
             failed: false,
         }
         .run();
@@ -149,6 +149,15 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
     })
 }
 
+/// Why an operator who was in control is not heard again.
+#[derive(Debug, Clone, Copy)]
+enum Deaf {
+    /// The computer was suspended under them.
+    Suspended,
+    /// Their control was taken away.
+    Revoked,
+}
+
 struct Loop {
     machine: Machine,
     recorder: Recorder<'static>,
@@ -170,9 +179,8 @@ struct Loop {
     seen_us: u64,
     /// When it listened last.
     listened: Duration,
-    /// The computer was suspended under an operator, who is not heard again: the master ends the
-    /// lease, and all axes hold.
-    deaf: bool,
+    /// Why the operator is not heard again: the master ends the lease, and all axes hold.
+    deaf: Option<Deaf>,
     /// The simulation cannot go on.
     failed: bool,
 }
@@ -194,7 +202,9 @@ impl Loop {
                 thread::sleep(wait.min(NAP));
                 continue;
             }
-            self.pace.begin(now);
+            if let Some(lateness) = self.pace.begin(now) {
+                self.tell_pace(&lateness);
+            }
             self.steps = self.steps.saturating_sub(1);
             self.cycle();
         }
@@ -207,13 +217,32 @@ impl Loop {
         self.target_ns / 1_000
     }
 
+    /// How the clock went over the last second.
+    fn tell_pace(&mut self, lateness: &Lateness) {
+        let pace = self.pace.status();
+        let count = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        let sample = ServerSample {
+            late_p50_ms: lateness.p50_ms,
+            late_p99_ms: lateness.p99_ms,
+            late_max_ms: lateness.max_ms,
+            factor: pace.factor,
+            shifts: pace.shifts,
+            clients: count(self.signals.clients.load(Ordering::Relaxed) as u64),
+            dropped: count(self.signals.dropped()),
+        };
+        self.recorder.server(self.target_ns, &sample);
+    }
+
     /// The robot was given something now.
-    fn given(&self, given: Given) {
+    fn given(&mut self, given: Given) {
         let ms = self.target_ns / TICK_NS;
+        if let Some(sample) = given.sample(&self.pace.status()) {
+            self.recorder.session(self.target_ns, &sample);
+        }
         self.feed.borrow_mut().given(ms, given);
     }
 
-    fn given_pace(&self) {
+    fn given_pace(&mut self) {
         let pace = self.pace.status();
         self.given(Given::Pace {
             speed: pace.speed,
@@ -246,9 +275,10 @@ impl Loop {
         let now = awake();
         let stood = now.saturating_sub(self.listened) > BLIND;
         self.listened = now;
-        self.deaf = self.is_held() && (self.deaf || stood);
+        self.deaf = self.deaf.or(stood.then_some(Deaf::Suspended));
+        self.deaf = self.deaf.filter(|_| self.is_held());
         let seen_us = self.signals.seen_us.load(Ordering::Acquire);
-        if seen_us != self.seen_us && !self.deaf {
+        if seen_us != self.seen_us && self.deaf.is_none() {
             self.seen_us = seen_us;
             self.machine.beat(seen_us);
             self.given(Given::Beat(seen_us));
@@ -328,8 +358,10 @@ impl Loop {
         if seen_us > now_us {
             return Answer::SeenInFuture;
         }
-        if self.deaf {
-            return Answer::Suspended;
+        match self.deaf {
+            Some(Deaf::Suspended) => return Answer::Suspended,
+            Some(Deaf::Revoked) => return Answer::Revoked,
+            None => {}
         }
         let too_fast = pace.speed.is_none_or(|speed| speed > SPEED_OF_CONTROL);
         if too_fast && request.command.code() == CommandCode::TakeControl {
@@ -392,6 +424,11 @@ impl Loop {
                     .borrow_mut()
                     .end(Some(id), self.recorded_us(), hash);
                 return recorded(ended);
+            }
+            HostCommand::Revoke => {
+                // Where nobody is in control there is nothing to take away.
+                self.deaf = self.is_held().then_some(Deaf::Revoked);
+                return Answer::Done;
             }
         }
         self.given_pace();

@@ -4,6 +4,7 @@
 //! the same `ms` are in the order in which it took them.
 
 use serde::{Deserialize, Serialize};
+use wheeleg_config::faults::FaultSpec;
 
 use super::Given;
 use crate::request::Spoken;
@@ -64,13 +65,14 @@ pub(crate) struct PaceInput {
     pub(crate) paused: bool,
 }
 
+/// A fault without its time: it begins now, and ends where it is ended.
+pub(crate) fn fault_name(fault: &FaultSpec) -> String {
+    let text = fault.to_string();
+    text.split('@').next().unwrap_or_default().to_owned()
+}
+
 impl Line {
     pub(super) fn new(ms: u64, given: Given) -> Self {
-        // A fault begins or ends at its line: the time that its text could hold is none.
-        let name = |fault: &wheeleg_config::faults::FaultSpec| {
-            let text = fault.to_string();
-            text.split('@').next().unwrap_or_default().to_owned()
-        };
         let input = match given {
             Given::Beat(seen_us) => Input::Beat(seen_us),
             Given::Stop(number) => Input::Stop(number),
@@ -85,8 +87,8 @@ impl Line {
                 spoken,
                 by,
             }),
-            Given::Fault(fault, true) => Input::FaultBegins(name(&fault)),
-            Given::Fault(fault, false) => Input::FaultEnds(name(&fault)),
+            Given::Fault(fault, true) => Input::FaultBegins(fault_name(&fault)),
+            Given::Fault(fault, false) => Input::FaultEnds(fault_name(&fault)),
             Given::Pace { speed, paused } => Input::Pace(PaceInput { speed, paused }),
             Given::Hash(hash) => Input::Hash(hash),
         };

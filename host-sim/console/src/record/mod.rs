@@ -9,6 +9,7 @@
 mod feed;
 pub(crate) mod folder;
 pub(crate) mod inputs;
+mod session;
 mod writer;
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,8 @@
 //! What the HTTP API answers is what its OpenAPI document says.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+
 use serde_json::{Value, json};
 use wheeleg_console::client::http;
 
@@ -28,7 +31,10 @@ fn every_answer_is_as_the_document_says() {
     let mut asked = 0;
     for (path, item) in paths {
         for method in item.as_object().expect("methods").keys() {
-            let name = path.trim_start_matches('/');
+            let name = match path.as_str() {
+                "/samples" => "samples?channel=/joint/3&seconds=2",
+                other => other.trim_start_matches('/'),
+            };
             let upper = method.to_uppercase();
             let (status, answer) = http(&rig.url, &upper, name, &rig.keys.view).expect("answered");
             assert_eq!(status, 200, "{path}: {answer}");
@@ -44,7 +50,7 @@ fn every_answer_is_as_the_document_says() {
             asked += 1;
         }
     }
-    assert!(asked >= 8);
+    assert!(asked >= 9);
     let (status, answer) =
         http(&rig.url, "GET", "events?last=0", &rig.keys.view).expect("answered");
     assert_eq!(status, 400);
@@ -71,4 +77,83 @@ fn every_answer_is_as_the_document_says() {
     let mut more = state;
     more["x"] = json!(1);
     assert!(!strict.is_valid(&more));
+}
+
+/// Asks for samples as a spreadsheet would.
+fn csv(rig: &TestRig, query: &str) -> String {
+    let address = rig.server.address();
+    let mut stream = TcpStream::connect(address).expect("connected");
+    let key = rig.keys.view.to_hex();
+    let request = format!(
+        "GET /api/v1/samples?{query} HTTP/1.0\r\nHost: {address}\r\nAuthorization: Bearer {key}\r\nAccept: text/csv\r\n\r\n"
+    );
+    stream.write_all(request.as_bytes()).expect("sent");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    let (head, body) = answer.split_once("\r\n\r\n").expect("a head");
+    assert!(
+        head.starts_with("HTTP/1.0 200") && head.contains("text/csv"),
+        "{head}"
+    );
+    body.to_owned()
+}
+
+#[test]
+fn the_last_seconds_of_a_channel_are_told_as_json_and_csv() {
+    let rig = TestRig::paced(Some(10.0));
+    let get = |query: &str| {
+        let path = format!("samples?{query}");
+        http(&rig.url, "GET", &path, &rig.keys.view).expect("answered")
+    };
+    let now_us = || rig.state()["master_us"].as_u64().expect("a time");
+    rig.until("told for so long", |state| {
+        state["master_us"].as_u64() > Some(4_000_000)
+    });
+    let before_us = now_us();
+    let (status, answer) = get("channel=/joint/3&seconds=2");
+    assert_eq!(status, 200, "{answer}");
+    let fields = answer["fields"].as_array().expect("a list");
+    assert_eq!(
+        fields[..3],
+        [json!("t_ns"), json!("commanded_mm"), json!("reference_mm")]
+    );
+    let rows = answer["rows"].as_array().expect("a list");
+    let times: Vec<u64> = rows.iter().filter_map(|row| row[0].as_u64()).collect();
+    // 50 a second at most, and on a busy computer at this pace fewer.
+    assert!((10..=101).contains(&times.len()), "{} rows", times.len());
+    assert!(
+        times.windows(2).all(|pair| pair[1] >= pair[0] + 1_000_000),
+        "{times:?}"
+    );
+    assert!(times[0] >= (before_us - 2_000_000) * 1_000, "{times:?}");
+    for row in rows {
+        assert_eq!(row.as_array().map(Vec::len), Some(fields.len()));
+        assert!(
+            row[3]
+                .as_f64()
+                .is_some_and(|mm| (-1.0..181.0).contains(&mm)),
+            "{row}"
+        );
+    }
+    let table = csv(&rig, "channel=/joint/3&seconds=2");
+    assert!(
+        table.starts_with("t_ns,commanded_mm,reference_mm,"),
+        "{table:.100}"
+    );
+    assert!((11..=102).contains(&table.lines().count()));
+    // Every event, whenever it was within the minute.
+    let (_, all) = get("channel=/events");
+    let told = rig.events("command_accepted").len() + all["rows"].as_array().map_or(0, Vec::len);
+    assert!(told > 0, "{all}");
+    for wrong in [
+        "",
+        "channel=/joint/9",
+        "channel=/joint/3&seconds=0",
+        "channel=/joint/3&seconds=61",
+        "channel=/joint/3&last=1",
+    ] {
+        let (status, problem) = get(wrong);
+        assert_eq!((status, &problem["status"]), (400, &json!(400)), "{wrong}");
+        assert!(problem["remedy"].is_string(), "{wrong}");
+    }
 }

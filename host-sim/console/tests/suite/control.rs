@@ -364,3 +364,138 @@ fn a_server_that_ends_says_so() {
     drop(server);
     assert_eq!(closed(&mut viewer), 4006);
 }
+
+/// Waits until the state is as wanted, while a driver keeps looking.
+fn until_driven(rig: &TestRig, driver: &mut Client, wanted: impl Fn(&Value) -> bool) -> Value {
+    let begin = Instant::now();
+    loop {
+        let _ = driver.read();
+        let state = rig.state();
+        if wanted(&state) {
+            return state;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(20), "never: {state}");
+    }
+}
+
+/// A hand-over is a release for one other client: it alone may take the control, for 2 s.
+#[test]
+fn who_is_in_control_hands_it_over_to_one_other() {
+    let rig = TestRig::new();
+    let mut first = rig.driver("first");
+    let mut second = rig.control("second");
+    let mut third = rig.control("third");
+    look(&mut second, "state");
+    let nothing = json!({});
+    assert_eq!(
+        refusal(&mut second, "TakeControl", &nothing),
+        "control_held"
+    );
+    let asked = look(&mut first, "asked");
+    assert_eq!(asked["by"], "second");
+    let to = json!({ "to": asked["session"] });
+    // Only who has it gives it away, and to a client that is there and may drive.
+    assert_eq!(refusal(&mut third, "HandOver", &to), "not_in_control");
+    for nobody in [
+        json!("0000000000000000"),
+        rig.state()["control"]["session"].take(),
+    ] {
+        let to = json!({ "to": nobody });
+        assert_eq!(refusal(&mut first, "HandOver", &to), "bad_argument");
+    }
+    // Nobody would watch the motion under way.
+    done(&mut first, "Stand");
+    first.give("StartGait", &nothing, 500).expect("sent");
+    until_driven(&rig, &mut first, |state| state["stepping"] == true);
+    assert_eq!(refusal(&mut first, "HandOver", &to), "moving");
+    done(&mut first, "Hold");
+    until_driven(&rig, &mut first, |state| state["stepping"] == false);
+    let outcome = first.carry_out("HandOver", &to, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    first.keep_control(false);
+    assert_eq!(look(&mut second, "offered")["by"], "first");
+    look(&mut third, "state");
+    for other in [&mut first, &mut third] {
+        assert_eq!(refusal(other, "TakeControl", &nothing), "control_held");
+    }
+    done(&mut second, "TakeControl");
+    second.keep_control(true);
+    let state = until_driven(&rig, &mut second, |state| {
+        state["control"]["holder"] == "second"
+    });
+    assert_eq!(
+        (&state["armed"], &state["hold"]),
+        (&json!(true), &json!(null))
+    );
+    assert_eq!(refusal(&mut first, "Arm", &nothing), "not_in_control");
+}
+
+#[test]
+fn what_is_handed_over_and_not_taken_is_free() {
+    let rig = TestRig::new();
+    let mut first = rig.driver("first");
+    let mut second = rig.control("second");
+    look(&mut second, "state");
+    let nothing = json!({});
+    assert_eq!(
+        refusal(&mut second, "TakeControl", &nothing),
+        "control_held"
+    );
+    let to = json!({ "to": look(&mut first, "asked")["session"] });
+    let outcome = first.carry_out("HandOver", &to, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    first.keep_control(false);
+    look(&mut second, "offered");
+    // Whoever it was kept for goes: it is free at once.
+    drop(second);
+    let begin = Instant::now();
+    loop {
+        look(&mut first, "state");
+        match first.carry_out("TakeControl", &nothing, 500).expect("sent") {
+            Outcome::Done => break,
+            Outcome::Refused { reason, .. } => assert_eq!(reason, "control_held"),
+            other => panic!("{other:?}"),
+        }
+        assert!(begin.elapsed() < Duration::from_secs(10), "never free");
+    }
+}
+
+/// As if they had been lost: an armed robot holds, and nothing of theirs counts any more.
+#[test]
+fn control_that_is_taken_away_ends_as_if_it_were_lost() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let mut local = rig.control("owner");
+    let nothing = json!({});
+    let mut viewer = rig.view();
+    look(&mut viewer, "state");
+    assert_eq!(refusal(&mut viewer, "Revoke", &nothing), "role");
+    done(&mut local, "Revoke");
+    assert_eq!(look(&mut driver, "revoked")["by"], "owner");
+    assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
+    // It asks anew before it is gone: that gains nothing.
+    assert_eq!(refusal(&mut driver, "TakeControl", &nothing), "revoked");
+    // It goes on to beat all the while.
+    let state = until_driven(&rig, &mut driver, |state| state["control"].is_null());
+    assert_eq!(
+        (&state["hold"], &state["armed"]),
+        (&json!("operator_lost"), &json!(false))
+    );
+    let event = rig.event("hold");
+    assert_eq!(
+        (&event["holder"], &event["revoked_by"]),
+        (&json!("driver"), &json!("owner"))
+    );
+    // Whoever looks at the robot may take it anew, and has to clear what happened.
+    look(&mut driver, "state");
+    done(&mut driver, "TakeControl");
+    assert_eq!(refusal(&mut driver, "Arm", &nothing), "latched");
+    done(&mut driver, "ClearFault");
+    done(&mut driver, "Arm");
+    // Where nobody is in control nothing happens.
+    done(&mut driver, "Disarm");
+    done(&mut driver, "ReleaseControl");
+    until_driven(&rig, &mut driver, |state| state["control"].is_null());
+    done(&mut local, "Revoke");
+    done(&mut driver, "TakeControl");
+}

@@ -63,6 +63,9 @@ pub(super) struct CompareArgs {
     case: Option<CaseId>,
     #[command(flatten)]
     drawing: Drawing,
+    /// Print every false alarm, not the first few alone.
+    #[arg(long)]
+    verbose: bool,
     /// Print the summary as JSON on stdout: all cases, one object each.
     #[arg(long)]
     json: bool,
@@ -159,11 +162,16 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
     };
     let settings = settings(&args.out, args.drawing.png)?;
     let finished = compare::compare(&options, &settings)?;
-    end(finished, args.json, |f| text(&f.result, &f.report), true)
+    end(
+        finished,
+        args.json,
+        |f| text(&f.result, &f.report, args.verbose),
+        true,
+    )
 }
 
 /// The tables of the axes, false alarms, and where the report is.
-fn text(comparison: &Comparison, report: &Path) -> String {
+fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
     let mut out = String::new();
     for axis in &comparison.axes {
         out.push_str(&axis_table(comparison, &axis.config.name));
@@ -174,12 +182,13 @@ fn text(comparison: &Comparison, report: &Path) -> String {
     out += &combinations(comparison);
     let alarms = comparison.false_alarms();
     let mut told = String::new();
-    for row in alarms.clone().take(ALARMS_TOLD) {
+    let shown = if all { usize::MAX } else { ALARMS_TOLD };
+    for row in alarms.clone().take(shown) {
         let _ = writeln!(told, "  {}: {}", row.case.id, row.figures.faults);
     }
     let alarms = alarms.count();
-    if alarms > ALARMS_TOLD {
-        let _ = writeln!(told, "  and {} more, in the report", alarms - ALARMS_TOLD);
+    if let Some(more) = alarms.checked_sub(shown).filter(|more| *more > 0) {
+        let _ = writeln!(told, "  and {more} more: with --verbose, and in the report");
     }
     let beyond_force = comparison.beyond_force().len();
     let _ = write!(

@@ -2,18 +2,25 @@
 
 mod param;
 mod reach;
+#[cfg(unix)]
+mod terminal;
+#[cfg(unix)]
+mod top;
 
 use std::fmt::Write as _;
 use std::io::ErrorKind;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
+use wheeleg_console::unpack::unpack;
 use wheeleg_console::{Key, SPEED, STEP_MAX};
 use wheeleg_studies::StudyError;
-use wheeleg_telemetry::{FieldDef, Wire, channels};
+use wheeleg_studies::view::plain;
+use wheeleg_telemetry::channels;
 
 use super::exit::{self, LOST};
 use super::serve::refused;
@@ -44,6 +51,9 @@ enum CtlCommand {
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
         hz: u32,
     },
+    /// Show the robot on the whole terminal: Esc stops it, q quits.
+    #[cfg(unix)]
+    Top,
     /// Take control, send one command, wait until it has finished, and release control.
     Take {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
@@ -52,6 +62,8 @@ enum CtlCommand {
     },
     /// Stop the robot.
     Stop,
+    /// End the control of whoever has it, on the robot's own computer: an armed robot then holds.
+    Revoke,
     /// Read, write or save parameters of a board.
     #[command(subcommand)]
     Param(ParamCommand),
@@ -119,6 +131,8 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
     match command {
         CtlCommand::Status => status(reach, &reach.key(VIEW_FILE)?),
         CtlCommand::Watch { channels, hz } => watch(reach, &reach.key(VIEW_FILE)?, channels, *hz),
+        #[cfg(unix)]
+        CtlCommand::Top => top::top(reach, &reach.key(VIEW_FILE)?),
         CtlCommand::Stop => {
             let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
             stopped.or_else(|why| match why {
@@ -131,6 +145,7 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
             })
         }
         CtlCommand::Take { command } => take(reach, command),
+        CtlCommand::Revoke => revoke(reach),
         CtlCommand::Param(command) => param::command(reach, command),
         CtlCommand::Inject { fault } => host("Inject", json!({ "fault": fault })),
         CtlCommand::EndFault { fault } => host("EndFault", json!({ "fault": fault })),
@@ -212,6 +227,59 @@ fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
         _ => {
             not_answered(&answer);
             Ok(not_confirmed())
+        }
+    }
+}
+
+/// Time within which the master ends a lease that was taken away, and is seen to.
+const ENDS: Duration = Duration::from_secs(3);
+
+/// Takes the control away, and waits until its holder has it no more.
+fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
+    let mut client = reach.control()?;
+    let holder = control(&mut client, |_| true)?;
+    if holder.is_null() {
+        tell("nobody is in control");
+        return reach.print_outcome(&Outcome::Done);
+    }
+    let end = client.carry_out("Revoke", &json!({}), 1_000);
+    let end = end.map_err(refused)?;
+    if end != Outcome::Done {
+        return reach.print_outcome(&end);
+    }
+    let now = control(&mut client, |now| now["session"] != holder["session"])?;
+    if now["session"] == holder["session"] {
+        tell("the control is not free yet: is the clock paused?");
+        return reach.print_outcome(&Outcome::Unknown);
+    }
+    let name = holder["holder"].as_str().unwrap_or_default();
+    tell(&plain(&format!("{name:?} is no longer in control")));
+    reach.print_outcome(&Outcome::Done)
+}
+
+/// Who is in control, as soon as that is as wanted, or after [`ENDS`].
+fn control(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, StudyError> {
+    let begin = Instant::now();
+    let mut newest = None;
+    loop {
+        match client.read() {
+            Some(Incoming::Json(mut state)) if state["op"] == "state" => {
+                let control = state["control"].take();
+                if wanted(&control) {
+                    return Ok(control);
+                }
+                newest = Some(control);
+            }
+            Some(Incoming::Closed { reason, .. }) => {
+                return Err(StudyError::refused(
+                    format!("the connection has ended: {}", plain(&reason)),
+                    "is `wheeleg serve` still running?",
+                ));
+            }
+            _ => {}
+        }
+        if begin.elapsed() >= ENDS {
+            return Ok(newest.unwrap_or_default());
         }
     }
 }
@@ -300,38 +368,12 @@ fn line(
     out
 }
 
-/// Time and values of a sample, in the layout of PROTOCOL.md.
-fn sample(channel: u16, body: &[u8]) -> Option<(u64, Map<String, Value>)> {
-    let (time, mut rest) = body.split_at_checked(8)?;
-    let t_ns = u64::from_le_bytes(time.try_into().ok()?);
-    let mut values = Map::new();
-    for field in channels().get(usize::from(channel))?.fields {
-        values.insert(field.name.to_owned(), value(field, &mut rest)?);
-    }
-    Some((t_ns, values))
-}
-
-fn value(field: &FieldDef, rest: &mut &[u8]) -> Option<Value> {
-    let mut take = |n: usize| {
-        let (head, tail) = rest.split_at_checked(n)?;
-        *rest = tail;
-        Some(head)
-    };
-    Some(match field.wire {
-        Wire::F32 => {
-            let value = f32::from_le_bytes(take(4)?.try_into().ok()?);
-            let scale = 10_f64.powi(field.decimals.into());
-            json!((f64::from(value) * scale).round() / scale)
-        }
-        Wire::U32 => json!(u32::from_le_bytes(take(4)?.try_into().ok()?)),
-        Wire::I32 => json!(i32::from_le_bytes(take(4)?.try_into().ok()?)),
-        Wire::U64 => json!(u64::from_le_bytes(take(8)?.try_into().ok()?)),
-        Wire::Bool => json!(take(1)?[0] != 0),
-        Wire::Text => {
-            let length = u16::from_le_bytes(take(2)?.try_into().ok()?);
-            json!(String::from_utf8_lossy(take(length.into())?))
-        }
-    })
+/// Time and values of a sample by their names.
+fn sample(channel: u16, mut body: &[u8]) -> Option<(u64, Map<String, Value>)> {
+    let (t_ns, values) = unpack(channel, &mut body)?;
+    let fields = channels().get(usize::from(channel))?.fields;
+    let names = fields.iter().map(|field| field.name.to_owned());
+    Some((t_ns, names.zip(values).collect()))
 }
 
 /// `NAME=VALUE` as an argument: a number or flag where it reads as one, else a word.
@@ -368,36 +410,6 @@ fn take(reach: &Reach, words: &[String]) -> Result<ExitCode, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_telemetry::{BodySample, EventSample, Sample as _};
-
-    #[test]
-    fn a_sample_is_read_as_it_was_packed() {
-        let body = BodySample {
-            x_mm: 12.5,
-            pitch_deg: -0.25,
-            ..BodySample::default()
-        };
-        let mut bytes = 7_u64.to_le_bytes().to_vec();
-        body.pack(&mut bytes);
-        let (t_ns, values) = sample(8, &bytes).expect("whole");
-        assert_eq!(
-            (t_ns, &values["x_mm"], &values["pitch_deg"]),
-            (7, &json!(12.5), &json!(-0.25))
-        );
-        assert!(sample(8, &bytes[..bytes.len() - 1]).is_none());
-        let event = EventSample {
-            text: "so é".to_owned(),
-            start_up_us: u64::MAX,
-            ..EventSample::default()
-        };
-        let mut bytes = vec![0; 8];
-        event.pack(&mut bytes);
-        let (_, values) = sample(15, &bytes).expect("whole");
-        assert_eq!(
-            (&values["text"], &values["start_up_us"]),
-            (&json!("so é"), &json!(u64::MAX))
-        );
-    }
 
     #[test]
     fn arguments_are_numbers_flags_or_words() {

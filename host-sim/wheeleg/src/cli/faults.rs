@@ -48,6 +48,9 @@ struct RunArgs {
     /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/faults")]
     out: PathBuf,
+    /// Print every row of --all; else those that passed are counted alone.
+    #[arg(long)]
+    verbose: bool,
     /// Print the summary as JSON on stdout.
     #[arg(long)]
     json: bool,
@@ -96,18 +99,24 @@ fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
     let rows = matrix::select(&args.row)?;
     let finished = matrix::write(&rows, args.seed, &settings(&args.out, false)?)?;
     let passed = matrix::count(&finished.result, Verdict::Fail) == 0;
-    let text = |f: &Finished<Vec<Outcome>>| verdicts(&f.result, &f.report);
+    // Whoever names rows wants to see them.
+    let all = args.verbose || !args.all;
+    let text = |f: &Finished<Vec<Outcome>>| verdicts(&f.result, &f.report, all);
     end(finished, args.json, text, passed)
 }
 
-fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
+/// Rows that failed, then the others, if all are wanted.
+fn verdicts(outcomes: &[Outcome], report: &Path, all: bool) -> String {
     let width = id_width();
+    let (failed, others): (Vec<_>, Vec<_>) =
+        outcomes.iter().partition(|o| o.verdict == Verdict::Fail);
+    let others = others.into_iter().filter(|_| all);
     let mut out = format!(
         "{:15}  {:width$} {:>9} {:>9} {:>9} {:>9}  latched\n",
         "verdict", "row", "detected", "commanded", "telemetry", "physical"
     );
     let ms = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1} ms"));
-    for o in outcomes {
+    for o in failed.into_iter().chain(others) {
         let m = &o.measured;
         let _ = write!(out, "{:15}  {:width$}", o.verdict.label(), o.row.id);
         if o.verdict != Verdict::NotImplemented {
@@ -125,14 +134,19 @@ fn verdicts(outcomes: &[Outcome], report: &Path) -> String {
         }
     }
     let count = |verdict| matrix::count(outcomes, verdict);
-    let _ = write!(
+    let _ = writeln!(
         out,
-        "\n{} rows passed, {} failed, {} not implemented\n{}",
+        "\n{} rows passed, {} failed, {} not implemented{}",
         count(Verdict::Pass),
         count(Verdict::Fail),
         count(Verdict::NotImplemented),
-        place(report, 8)
+        if all {
+            ""
+        } else {
+            "; --verbose shows them all"
+        },
     );
+    out.push_str(&place(report, 8));
     out
 }
 
@@ -185,6 +199,7 @@ fn row_json(row: &KindInfo) -> serde_json::Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_studies::study::Progress;
 
     #[test]
     fn every_fault_is_listed_with_its_state() {
@@ -198,6 +213,44 @@ mod tests {
         }
         let json: serde_json::Value = serde_json::from_str(&listing(true)).expect("JSON");
         assert_eq!(json["faults"].as_array().map(Vec::len), Some(KINDS.len()));
+    }
+
+    #[test]
+    fn what_failed_comes_first_and_what_passed_is_told_if_it_is_wanted() {
+        let missing = matrix::ROWS
+            .iter()
+            .find(|row| row.not_implemented().is_some());
+        let missing = missing.expect("a row that is not implemented");
+        let outcomes = matrix::run(&[missing], 1, &Progress::silent()).expect("listed");
+        let [missing] = &outcomes[..] else {
+            panic!("{} outcomes", outcomes.len());
+        };
+        let of = |row: usize, verdict, failures: Vec<String>| Outcome {
+            row: matrix::ROWS[row],
+            verdict,
+            failures,
+            ..missing.clone()
+        };
+        let outcomes = [
+            of(0, Verdict::Pass, Vec::new()),
+            missing.clone(),
+            of(1, Verdict::Fail, vec!["never".to_owned()]),
+        ];
+        let rows = |all: bool| {
+            let text = verdicts(&outcomes, Path::new("none/report.html"), all);
+            let lines = text.lines().skip(1).take_while(|line| !line.is_empty());
+            let starts = lines.map(|line| line.split("  ").next().unwrap_or("").to_owned());
+            (starts.collect::<Vec<String>>(), text)
+        };
+        let (few, text) = rows(false);
+        assert_eq!(few, ["FAIL", ""], "{text}");
+        assert!(
+            text.contains("1 rows passed, 1 failed, 1 not implemented; --verbose"),
+            "{text}"
+        );
+        let (all, text) = rows(true);
+        assert_eq!(all, ["FAIL", "", "PASS", "not implemented", ""], "{text}");
+        assert!(!text.contains("--verbose"), "{text}");
     }
 
     #[test]

@@ -1,0 +1,159 @@
+//! Samples of a channel as an answer of the HTTP API: JSON or CSV, made piece by piece while it is
+//! sent, so that an answer that nobody reads costs no memory.
+
+use std::convert::Infallible;
+
+use axum::body::{Body, Bytes};
+use axum::http::HeaderMap;
+use axum::http::header::{ACCEPT, CONTENT_TYPE};
+use axum::response::{IntoResponse as _, Response};
+use futures_util::stream;
+use serde_json::{Value, json};
+use wheeleg_telemetry::channels;
+
+use crate::unpack::unpack;
+
+/// Samples of one piece.
+const PIECE: usize = 64;
+/// Name of the first column.
+const TIME: &str = "t_ns";
+
+/// Whether a client would rather have CSV than JSON: the first of both that it names counts.
+pub(crate) fn prefers_csv(headers: &HeaderMap) -> bool {
+    let named = headers.get_all(ACCEPT).iter();
+    let kinds = named.filter_map(|value| value.to_str().ok());
+    let mut kinds = kinds
+        .flat_map(|value| value.split(','))
+        .filter_map(|kind| kind.split(';').next())
+        .map(str::trim);
+    kinds.find_map(|kind| match kind {
+        "text/csv" => Some(true),
+        "application/json" | "application/*" | "*/*" => Some(false),
+        _ => None,
+    }) == Some(true)
+}
+
+/// The answer with these samples of a channel, each as a frame has it.
+pub(crate) fn table(channel: u16, samples: Vec<Bytes>, csv: bool) -> Response {
+    let def = &channels()[usize::from(channel)];
+    let fields = def.fields.iter().map(|field| field.name);
+    let columns: Vec<&str> = [TIME].into_iter().chain(fields).collect();
+    let (kind, head, end) = if csv {
+        let head = format!("{}\n", columns.join(","));
+        ("text/csv; charset=utf-8", head, "")
+    } else {
+        let (topic, columns) = (json!(def.topic), json!(columns));
+        let head = format!(r#"{{"channel":{topic},"fields":{columns},"rows":["#);
+        ("application/json", head, "]}")
+    };
+    let rows = move |first: usize, samples: &[Bytes]| {
+        let mut out = String::new();
+        for (at, sample) in (first..).zip(samples) {
+            let Some((t_ns, mut values)) = unpack(channel, &mut &sample[..]) else {
+                continue;
+            };
+            values.insert(0, json!(t_ns));
+            if csv {
+                let cells: Vec<String> = values.iter().map(cell).collect();
+                out.push_str(&cells.join(","));
+                out.push('\n');
+            } else {
+                if at > 0 {
+                    out.push(',');
+                }
+                out.push_str(&Value::Array(values).to_string());
+            }
+        }
+        out
+    };
+    // Head, rows, end; each piece with the number of its first sample.
+    let pieces = stream::unfold(Some((head, 0)), move |piece| {
+        let next = piece.map(|(text, at)| {
+            let upto = samples.len().min(at + PIECE);
+            let rest = match at.cmp(&samples.len()) {
+                std::cmp::Ordering::Less => Some((rows(at, &samples[at..upto]), upto)),
+                std::cmp::Ordering::Equal => Some((end.to_owned(), at + 1)),
+                std::cmp::Ordering::Greater => None,
+            };
+            (Ok::<_, Infallible>(Bytes::from(text)), rest)
+        });
+        async move {
+            // Between two pieces it is others' turn.
+            tokio::task::yield_now().await;
+            next
+        }
+    });
+    ([(CONTENT_TYPE, kind)], Body::from_stream(pieces)).into_response()
+}
+
+/// A value in a table; what is no number is empty.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) if text.contains([',', '"', '\n', '\r']) => {
+            format!("\"{}\"", text.replace('"', "\"\""))
+        }
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+    use wheeleg_telemetry::{EventSample, Sample as _};
+
+    fn events(texts: &[&str]) -> (u16, Vec<Bytes>) {
+        let channel = channels().iter().position(|def| def.topic == "/events");
+        let pack = |text: &&str| {
+            let event = EventSample {
+                text: (*text).to_owned(),
+                ..EventSample::default()
+            };
+            let mut bytes = 7_u64.to_le_bytes().to_vec();
+            event.pack(&mut bytes);
+            bytes.into()
+        };
+        let samples = texts.iter().map(pack).collect();
+        (channel.expect("a channel") as u16, samples)
+    }
+
+    async fn text(texts: &[&str], csv: bool) -> String {
+        let (channel, samples) = events(texts);
+        let body = table(channel, samples, csv).into_body();
+        let bytes = axum::body::to_bytes(body, 1 << 20).await.expect("a body");
+        String::from_utf8(bytes.to_vec()).expect("UTF-8")
+    }
+
+    #[tokio::test]
+    async fn every_sample_is_a_row_however_many_there_are() {
+        for count in [0, 1, PIECE - 1, PIECE, PIECE + 1, 3 * PIECE] {
+            let texts = vec!["so"; count];
+            let json: Value = serde_json::from_str(&text(&texts, false).await).expect("JSON");
+            assert_eq!(json["rows"].as_array().map(Vec::len), Some(count));
+            assert_eq!(json["fields"].as_array().map(Vec::len), Some(9));
+            assert_eq!(text(&texts, true).await.lines().count(), 1 + count);
+        }
+    }
+
+    #[tokio::test]
+    async fn texts_are_quoted_where_they_need_it() {
+        let csv = text(&["a, \"b\"\nc", "plain"], true).await;
+        assert!(csv.contains(",\"a, \"\"b\"\"\nc\"\n"), "{csv}");
+        assert!(csv.ends_with(",plain\n"), "{csv}");
+        assert!(csv.starts_with("t_ns,kind,code,"), "{csv}");
+    }
+
+    #[test]
+    fn the_first_kind_that_is_named_counts() {
+        let csv = |accept: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(ACCEPT, HeaderValue::from_static(accept));
+            prefers_csv(&headers)
+        };
+        assert!(!prefers_csv(&HeaderMap::new()));
+        assert!(csv("text/csv") && csv("text/html, text/csv;q=0.9, */*"));
+        assert!(!csv("application/json, text/csv") && !csv("*/*") && !csv("text/html"));
+    }
+}

@@ -1,0 +1,133 @@
+// The events of the robot, the newest on top: sieved by kind, board and text, and saved as they were
+// recorded. What several boards tell of one cause is one line, as on a terminal.
+import { html, say, fixed } from "./dom.js";
+import { save } from "./save.js";
+
+/** Lines that are kept; with them the events that they are of. */
+const KEPT = 500;
+/** What several boards tell alike within this time is one line, ns. */
+const ALIKE_NS = 50e6;
+/** Lines among which such a one is looked for. */
+const RECENT = 32;
+const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
+const FIRST_WHEEL = 7;
+const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "text"];
+
+/** A board tells of its own log. */
+const DIAGNOSIS = "diagnosis";
+
+/** A board as texts of events name it. @param {number} board */
+const name = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
+
+/** Boards as a person would list them: "joints 1–6, wheel 7". @param {number[]} boards */
+function named(boards) {
+  const listed = (one, several, of) => {
+    /** @type {number[][]} */
+    const runs = [];
+    for (const board of of) {
+      const last = runs[runs.length - 1];
+      if (last && board === last[1] + 1) last[1] = board;
+      else runs.push([board, board]);
+    }
+    const text = runs.map(([a, b]) => (a === b ? `${a}` : `${a}–${b}`)).join(", ");
+    return of.length > 0 && `${of.length > 1 ? several : one} ${text}`;
+  };
+  const sorted = [...boards].sort((a, b) => a - b);
+  const split = [listed("joint", "joints", sorted.filter((b) => b < FIRST_WHEEL)), listed("wheel", "wheels", sorted.filter((b) => b >= FIRST_WHEEL))];
+  return split.filter(Boolean).join(", ");
+}
+
+/** A field of a table, in quotes where it needs them. @param {any} value */
+function cell(value) {
+  const text = value == null ? "" : String(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+/** @typedef {{t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string}} RobotEvent */
+/** @typedef {{events: RobotEvent[], boards: number[], before: string, after: string, root: HTMLElement, what: HTMLElement}} Line */
+
+/** List, sieve and table. */
+export function eventsView() {
+  /** The newest first. @type {Line[]} */
+  let lines = [];
+  /** Events that have come over the line, until those of before are there. @type {RobotEvent[] | null} */
+  let first = [];
+  const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
+  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: "" }, "every kind"));
+  const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, name(b))));
+  const words = html("input", { type: "search", "aria-label": "Events whose text has", placeholder: "text", size: 8, oninput: sieve });
+  const count = html("span", { class: "effect", role: "status" });
+  const table = html("button", { class: "btn", type: "button", onclick: () => save("wheeleg-events.csv", "text/csv", csv()) }, "Save events as CSV");
+
+  const shown = (line) => `${line.before}${line.boards.length > 0 ? named(line.boards) : ""}${line.after}`;
+  function fits(line) {
+    const { kind } = line.events[0];
+    const wanted = words.value.trim().toLowerCase();
+    const of = board.value === "" || (board.value === "0" ? line.events[0].board === 0 : line.events.some((event) => event.board === Number(board.value)));
+    return of && (kinds.value === "" || kind === kinds.value) && line.what.textContent.toLowerCase().includes(wanted);
+  }
+  function sieve() {
+    for (const line of lines) line.root.hidden = !fits(line);
+    tell();
+  }
+  function tell() {
+    const left = lines.filter((line) => !line.root.hidden).length;
+    say(count, left === lines.length ? "" : `${left} of ${lines.length} lines`);
+  }
+  /** Every event whose line is shown, each as it was recorded, the oldest first. */
+  function csv() {
+    const events = lines.filter((line) => !line.root.hidden).flatMap((line) => line.events).sort((a, b) => a.t_ns - b.t_ns);
+    return `${[COLUMNS, ...events.map((event) => COLUMNS.map((column) => event[column]))].map((row) => row.map(cell).join(",")).join("\n")}\n`;
+  }
+  /** @param {RobotEvent} event */
+  function add(event) {
+    if (![...kinds.options].some(({ value }) => value === event.kind)) kinds.append(html("option", { value: event.kind }, event.kind));
+    // Where its text names the board, the same of another board differs in the name alone.
+    const at = event.board > 0 ? event.text.indexOf(name(event.board)) : -1;
+    const before = at < 0 ? event.text : event.text.slice(0, at);
+    const after = at < 0 ? "" : event.text.slice(at + name(event.board).length);
+    /** @param {Line} line */
+    const alike = (line) => {
+      const [other] = line.events;
+      // Each board says for itself how long ago its first fault was.
+      const told = event.code === DIAGNOSIS || (line.before === before && line.after === after);
+      return told && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
+    };
+    const known = at < 0 ? undefined : lines.find((line, i) => i < RECENT && Math.abs(event.t_ns - line.events[0].t_ns) <= ALIKE_NS && alike(line));
+    if (known) {
+      known.events.push(event);
+      known.boards.push(event.board);
+      say(known.what, shown(known));
+      known.root.hidden = !fits(known);
+      return tell();
+    }
+    const who = [event.holder, event.revoked_by && `revoked by ${event.revoked_by}`].filter(Boolean).join(", ");
+    const line = { events: [event], boards: at < 0 ? [] : [event.board], before, after: who ? `${after} (${who})` : after, what: html("span"), root: html("li", { class: event.kind === "fault" ? "bad" : "" }) };
+    say(line.what, shown(line));
+    line.root.append(html("time", {}, fixed(event.t_ns * 1e-9, 2)), line.what);
+    line.root.hidden = !fits(line);
+    lines.unshift(line);
+    list.prepend(line.root);
+    for (const old of lines.splice(KEPT)) old.root.remove();
+    tell();
+  }
+  return {
+    root: html("section", { class: "panel eventlist", "aria-label": "Events of the robot" }, html("h2", {}, "Events"), html("div", { class: "row" }, kinds, board, words), html("div", { class: "row" }, table, count), list),
+    /** @param {RobotEvent} event */
+    add(event) {
+      first?.push(event);
+      add(event);
+    },
+    /** What the server has kept, the oldest first; its end may have come over the line, too. @param {RobotEvent[]} kept */
+    past(kept) {
+      const came = first ?? [];
+      first = null;
+      const same = (a, b) => COLUMNS.every((column) => a[column] === b[column]);
+      let begin = 0;
+      while (begin < kept.length && !kept.slice(begin).every((event, i) => came[i] && same(event, came[i]))) begin += 1;
+      lines = [];
+      list.replaceChildren();
+      for (const event of [...kept.slice(0, begin), ...came]) add(event);
+    },
+  };
+}

@@ -1,0 +1,177 @@
+//! A terminal that a program draws on as a whole, and reads key by key. However the program ends, by
+//! itself, by a panic or by a signal that it waits for, the terminal is as it was before.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::sync::Mutex;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
+
+/// Another screen than the one with what was said before; no cursor; lines are cut, not wrapped.
+const ENTER: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[?7l";
+const LEAVE: &str = "\u{1b}[?7h\u{1b}[?25h\u{1b}[?1049l";
+const HOME: &str = "\u{1b}[H";
+const TO_LINE_END: &str = "\u{1b}[K";
+const TO_SCREEN_END: &str = "\u{1b}[J";
+const INVERSE: &str = "\u{1b}[7m";
+const PLAIN: &str = "\u{1b}[0m";
+
+/// Columns and rows of a terminal that does not tell.
+const USUAL: (usize, usize) = (80, 24);
+
+/// How the terminal was, while it is ours.
+static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
+
+/// A key that means something here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Key {
+    /// Esc by itself, not as the first of an arrow key's bytes.
+    Escape,
+    /// Ctrl-C, which is a key while the terminal is ours.
+    Interrupt,
+    /// A letter.
+    Letter(char),
+}
+
+/// A line of the screen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Line {
+    pub(super) text: String,
+    /// Dark on light, or light on dark: what must be seen.
+    pub(super) stands_out: bool,
+}
+
+/// The terminal, until it is dropped.
+pub(super) struct Terminal(());
+
+impl Terminal {
+    /// Takes the terminal; `None`: there is none that can be drawn on.
+    pub(super) fn take() -> Option<Self> {
+        let (input, output) = (std::io::stdin(), std::io::stdout());
+        let dumb = std::env::var("TERM").is_ok_and(|term| term == "dumb");
+        if dumb || !input.is_terminal() || !output.is_terminal() {
+            return None;
+        }
+        let before = tcgetattr(&input).ok()?;
+        let mut raw = before.clone();
+        raw.make_raw();
+        if let Ok(mut place) = BEFORE.lock() {
+            *place = Some(before);
+        }
+        let then = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            // What it says must not go with our screen.
+            give_back();
+            then(panic);
+        }));
+        let terminal = Self(());
+        tcsetattr(&input, OptionalActions::Now, &raw).ok()?;
+        write(ENTER).ok()?;
+        Some(terminal)
+    }
+
+    /// Columns and rows.
+    pub(super) fn size(&self) -> (usize, usize) {
+        let size = tcgetwinsize(std::io::stdout()).ok();
+        let size = size.map(|size| (size.ws_col.into(), size.ws_row.into()));
+        size.filter(|size| *size > (0, 0)).unwrap_or(USUAL)
+    }
+
+    /// Draws the lines over those of before.
+    ///
+    /// # Errors
+    /// What the operating system says: the terminal is gone.
+    pub(super) fn draw(&self, lines: &[Line]) -> std::io::Result<()> {
+        let (columns, rows) = self.size();
+        let mut out = HOME.to_owned();
+        for (row, Line { text, stands_out }) in lines.iter().take(rows).enumerate() {
+            if row > 0 {
+                out.push_str("\r\n");
+            }
+            let text: String = text.chars().take(columns).collect();
+            match stands_out {
+                true => out.extend([INVERSE, &text, PLAIN]),
+                false => out.push_str(&text),
+            }
+            out.push_str(TO_LINE_END);
+        }
+        out.push_str(TO_SCREEN_END);
+        write(&out)
+    }
+
+    /// Keys that were pressed since the last look.
+    pub(super) fn keys(&self) -> Vec<Key> {
+        let input = std::io::stdin();
+        let mut bytes = [0; 64];
+        let mut fds = [PollFd::new(&input, PollFlags::IN)];
+        let there = poll(&mut fds, Some(&Timespec::default())).unwrap_or(0) > 0;
+        let count = match there {
+            // Past the buffer of the standard library, which would wait for more.
+            true => rustix::io::read(&input, &mut bytes).unwrap_or(0),
+            false => 0,
+        };
+        keys(&bytes[..count])
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        give_back();
+    }
+}
+
+/// Gives the terminal back, once.
+fn give_back() {
+    let Some(before) = BEFORE.lock().ok().and_then(|mut place| place.take()) else {
+        return;
+    };
+    // A terminal that is gone needs nothing.
+    let _ = write(LEAVE);
+    let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &before);
+}
+
+fn write(text: &str) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    out.flush()
+}
+
+/// Keys of what a terminal sends. An Esc with more behind it is an arrow key or the like, but for
+/// another Esc: whoever presses it more than once means it.
+fn keys(bytes: &[u8]) -> Vec<Key> {
+    const ESCAPE: u8 = 0x1b;
+    const INTERRUPT: u8 = 0x03;
+    let mut keys = Vec::new();
+    let mut rest = bytes;
+    while let [first, tail @ ..] = rest {
+        rest = tail;
+        match *first {
+            ESCAPE if matches!(tail.first(), Some(b'[' | b'O')) => {
+                // Up to the letter or `~` that ends it.
+                let end = tail[1..].iter().position(|b| (0x40..=0x7e).contains(b));
+                rest = end.map_or(&[], |end| &tail[end + 2..]);
+            }
+            ESCAPE => keys.push(Key::Escape),
+            INTERRUPT => keys.push(Key::Interrupt),
+            letter if letter.is_ascii_graphic() => keys.push(Key::Letter(letter.into())),
+            _ => {}
+        }
+    }
+    keys
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escape_alone_is_a_key_and_arrows_are_none() {
+        assert_eq!(keys(b"\x1b"), [Key::Escape]);
+        assert_eq!(keys(b"\x1b\x1b"), [Key::Escape; 2]);
+        assert_eq!(keys(b"\x1b[A\x1bOP\x1b[15~"), []);
+        assert_eq!(keys(b"\x1b[Aq"), [Key::Letter('q')]);
+        assert_eq!(keys(b"\x1b["), []);
+        assert_eq!(keys(b"\x03"), [Key::Interrupt]);
+        assert_eq!(keys(b"q\xc3\xa9\x1b"), [Key::Letter('q'), Key::Escape]);
+    }
+}

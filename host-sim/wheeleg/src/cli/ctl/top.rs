@@ -1,0 +1,399 @@
+//! `wheeleg ctl top`: the page for terminals. It looks and may stop, and drives nothing.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use serde_json::{Map, Value, json};
+use wheeleg_console::Key as AccessKey;
+use wheeleg_console::client::{Client, Incoming};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::view::plain;
+use wheeleg_telemetry::channels;
+
+use super::super::exit::LOST;
+use super::super::serve::refused;
+use super::super::{stop_on_signals, tell};
+use super::reach::Reach;
+use super::sample;
+use super::terminal::{Key, Line, Terminal};
+
+/// Samples a second of each channel.
+const HZ: u32 = 10;
+/// How often the screen is drawn anew.
+const DRAWN: Duration = Duration::from_millis(100);
+/// What is older does not look as if it were now.
+const STALE: Duration = Duration::from_millis(300);
+/// A stop that is not answered for so long is not confirmed.
+const UNCONFIRMED: Duration = Duration::from_millis(200);
+/// Events that are kept.
+const EVENTS: usize = 200;
+
+const JOINTS: [&str; 6] = [
+    "left yaw",
+    "left horizontal",
+    "left vertical",
+    "right yaw",
+    "right horizontal",
+    "right vertical",
+];
+const WHEELS: [(&str, &str); 2] = [("/wheel/7", "left wheel"), ("/wheel/8", "right wheel")];
+const FEET: [(&str, &str); 2] = [("/foot/left", "left foot"), ("/foot/right", "right foot")];
+
+/// What has come.
+#[derive(Default)]
+struct Seen {
+    state: Value,
+    /// Newest sample of each channel.
+    samples: BTreeMap<&'static str, Map<String, Value>>,
+    /// The newest last.
+    events: VecDeque<String>,
+    /// A stop that was asked for, with the number of its request.
+    stopping: Option<(u64, Instant)>,
+    /// It was refused, or not answered in time.
+    unconfirmed: bool,
+}
+
+/// Draws until somebody leaves, or the connection ends.
+pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError> {
+    let mut client = Client::connect(&reach.url(), "view", "top", key).map_err(refused)?;
+    let topics = (1..=6).map(|n| format!("/joint/{n}"));
+    let others = WHEELS
+        .iter()
+        .chain(&FEET)
+        .map(|(topic, _)| (*topic).to_owned());
+    let topics: Vec<String> = topics.chain(others).collect();
+    let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
+    client.send(frame).map_err(refused)?;
+    let stop = stop_on_signals()?;
+    let Some(terminal) = Terminal::take() else {
+        return Err(StudyError::refused(
+            "`ctl top` draws on a terminal, and this is none that it can draw on",
+            "use `wheeleg ctl watch`, or `wheeleg ctl status`",
+        ));
+    };
+    stop.begin();
+    let mut seen = Seen::default();
+    let (mut heard, mut drawn) = (Instant::now(), None::<Instant>);
+    let end = loop {
+        match client.read() {
+            Some(Incoming::Closed { .. }) => break Err(()),
+            Some(message) => {
+                heard = Instant::now();
+                seen.take(message);
+            }
+            None => {}
+        }
+        let mut leaves = false;
+        for key in terminal.keys() {
+            match key {
+                Key::Escape => {
+                    let n = client.send(json!({ "op": "stop" }));
+                    // Of a connection that has ended, nothing is confirmed.
+                    seen.stopping = Some((n.unwrap_or_default(), Instant::now()));
+                }
+                Key::Interrupt | Key::Letter('q') => leaves = true,
+                Key::Letter(_) => {}
+            }
+        }
+        if leaves || stop.is_asked() {
+            break Ok(stop.signal());
+        }
+        if drawn.is_none_or(|drawn| drawn.elapsed() >= DRAWN) {
+            drawn = Some(Instant::now());
+            let lines = seen.screen(heard.elapsed(), terminal.size().1);
+            if terminal.draw(&lines).is_err() {
+                break Err(());
+            }
+        }
+    };
+    let unconfirmed = seen.is_unconfirmed();
+    drop(terminal);
+    if unconfirmed {
+        return Ok(super::not_confirmed());
+    }
+    match end {
+        Ok(None) => Ok(ExitCode::SUCCESS),
+        Ok(Some(signal)) => Ok(ExitCode::from(signal.exit_code())),
+        Err(()) => {
+            tell("the connection has ended");
+            Ok(ExitCode::from(LOST))
+        }
+    }
+}
+
+impl Seen {
+    fn take(&mut self, message: Incoming) {
+        match message {
+            Incoming::Json(message) => match message["op"].as_str() {
+                Some("state") => self.state = message,
+                Some("event") => {
+                    if self.events.len() == EVENTS {
+                        self.events.pop_front();
+                    }
+                    let t_s = message["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
+                    let text = message["text"].as_str().unwrap_or_default();
+                    self.events
+                        .push_back(format!("{t_s:10.2} s  {}", plain(text)));
+                }
+                Some("answer") => {
+                    let asked = self.stopping.filter(|(n, _)| message["n"] == *n);
+                    if asked.is_some() {
+                        self.unconfirmed = message["status"] != "done";
+                        self.stopping = None;
+                    }
+                }
+                _ => {}
+            },
+            Incoming::Samples { channel, body, .. } => {
+                if let (Some((_, values)), Some(def)) =
+                    (sample(channel, &body), channels().get(usize::from(channel)))
+                {
+                    self.samples.insert(def.topic, values);
+                }
+            }
+            Incoming::Closed { .. } => {}
+        }
+    }
+
+    /// Nobody has confirmed a stop, in the time that it has.
+    fn is_unconfirmed(&self) -> bool {
+        let waits = self.stopping.map(|(_, since)| since.elapsed());
+        self.unconfirmed || waits.is_some_and(|waits| waits > UNCONFIRMED)
+    }
+
+    /// A value of the newest sample of a channel; `-`: none has come, or nobody tells it.
+    fn number(&self, topic: &str, field: &str, decimals: usize) -> String {
+        let value = self
+            .samples
+            .get(topic)
+            .and_then(|values| values[field].as_f64());
+        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+    }
+
+    /// What is shown when the newest message came so long ago, in so many lines.
+    fn screen(&self, age: Duration, rows: usize) -> Vec<Line> {
+        let mut lines = Vec::new();
+        let mut put = |stands_out: bool, text: String| lines.push(Line { text, stands_out });
+        if self.is_unconfirmed() {
+            put(true, " STOP NOT CONFIRMED: CUT THE AIR ".to_owned());
+        }
+        put(true, self.head());
+        if age > STALE {
+            let age_s = age.as_secs_f64();
+            put(
+                true,
+                format!(" nothing new for {age_s:.1} s: what is shown is old "),
+            );
+        }
+        put(false, String::new());
+        put(false, self.joints_head());
+        for (n, name) in (1..).zip(JOINTS) {
+            put(false, self.joint(n, name));
+        }
+        put(false, String::new());
+        for (topic, name) in WHEELS {
+            let [asked, sensed, speed] =
+                [("reference_mm", 1), ("sensed_mm", 1), ("velocity_mm_s", 0)]
+                    .map(|(field, decimals)| self.number(topic, field, decimals));
+            put(
+                false,
+                format!("{name:20}{asked:>9}{sensed:>9} mm{speed:>7} mm/s"),
+            );
+        }
+        for (topic, name) in FEET {
+            let load = self.number(topic, "normal_force_n", 0);
+            let switches = self.number(topic, "switches", 0);
+            put(false, format!("{name:20}{load:>9} N   switches {switches}"));
+        }
+        put(false, String::new());
+        for fault in self.faults() {
+            put(true, fault);
+        }
+        let room = rows.saturating_sub(lines.len());
+        let newest = self.events.iter().rev().take(room);
+        let of = |text: &String| Line {
+            text: text.clone(),
+            stands_out: false,
+        };
+        lines.extend(newest.map(of));
+        lines
+    }
+
+    fn head(&self) -> String {
+        let state = &self.state;
+        let word = |value: &Value| plain(value.as_str().unwrap_or("-"));
+        let mode = match (&state["emergency_stop"], &state["hold"], &state["armed"]) {
+            _ if state["alive"] == false => "MASTER IS DEAD".to_owned(),
+            (Value::Bool(true), ..) => "STOPPED".to_owned(),
+            (_, Value::String(why), _) => format!("HOLD: {}", plain(why).replace('_', " ")),
+            (.., Value::Bool(true)) => "ARMED".to_owned(),
+            _ => "disarmed".to_owned(),
+        };
+        let of = if state["simulated"] == false {
+            "real boards"
+        } else {
+            "simulated"
+        };
+        let clock = match (&state["pace"]["paused"], state["pace"]["factor"].as_f64()) {
+            (Value::Bool(true), _) => "paused".to_owned(),
+            (_, Some(factor)) => format!("x{factor:.2}"),
+            _ => "-".to_owned(),
+        };
+        let holder = match &state["control"]["holder"] {
+            Value::String(name) => plain(name),
+            _ => "free".to_owned(),
+        };
+        let t_s = state["master_us"].as_f64().unwrap_or(0.0) * 1e-6;
+        format!(
+            " {} | {of} {clock} | {mode} | {}, step {} | control: {holder} | {t_s:.2} s | Esc STOP  q leave ",
+            word(&state["robot"]),
+            word(&state["phase"]),
+            state["step"].as_u64().unwrap_or(0),
+        )
+    }
+
+    fn joints_head(&self) -> String {
+        format!(
+            "{:20}{:>9}{:>9}{:>9}{:>8}{:>8}  {:10}mode",
+            "stroke, mm", "asked", "sensed", "error", "A bar", "B bar", "valves"
+        )
+    }
+
+    fn joint(&self, n: usize, name: &str) -> String {
+        let topic = format!("/joint/{n}");
+        let values = self.samples.get(topic.as_str());
+        let value = |field: &str| values.and_then(|values| values[field].as_f64());
+        let error = value("commanded_mm").zip(value("sensed_mm"));
+        let error = error.map_or_else(
+            || "-".to_owned(),
+            |(asked, sensed)| format!("{:.1}", sensed - asked),
+        );
+        // Bit 0 fill A, 1 vent A, 2 fill B, 3 vent B.
+        let open = value("valves_open").map(|bits| bits as u8);
+        let valves = open.map_or_else(
+            || "-".to_owned(),
+            |open| {
+                let names = ["A+", "A-", "B+", "B-"].iter().enumerate();
+                let shown =
+                    names.map(|(bit, name)| if open >> bit & 1 == 1 { *name } else { " ." });
+                shown.collect()
+            },
+        );
+        let board = &self.state["boards"][n - 1];
+        let mode = match &board["mode"] {
+            Value::String(mode) => plain(mode),
+            _ if board.is_null() => "-".to_owned(),
+            _ => "missing".to_owned(),
+        };
+        format!(
+            "{n} {name:18}{:>9}{:>9}{error:>9}{:>8}{:>8}  {valves:10}{mode}",
+            self.number(&topic, "commanded_mm", 1),
+            self.number(&topic, "sensed_mm", 1),
+            self.number(&topic, "pressure_a_bar", 2),
+            self.number(&topic, "pressure_b_bar", 2),
+        )
+    }
+
+    /// Each fault once, with all boards that have it.
+    fn faults(&self) -> Vec<String> {
+        let mut faults: Vec<(&Value, Vec<String>)> = Vec::new();
+        for board in self.state["boards"].as_array().into_iter().flatten() {
+            for fault in board["faults"].as_array().into_iter().flatten() {
+                let address = board["address"].to_string();
+                match faults.iter_mut().find(|(known, _)| *known == fault) {
+                    Some((_, boards)) => boards.push(address),
+                    None => faults.push((fault, vec![address])),
+                }
+            }
+        }
+        let text = |value: &Value| plain(value.as_str().unwrap_or_default());
+        let line = |(fault, boards): (&Value, Vec<String>)| {
+            let boards = boards.join(", ");
+            let (cause, remedy) = (text(&fault["cause"]), text(&fault["remedy"]));
+            format!(" board {boards}: {cause} {remedy}")
+        };
+        faults.into_iter().map(line).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen() -> Seen {
+        let fault = json!({ "number": 12, "name": "sensor_range", "cause": "The sensor.", "remedy": "Look." });
+        let board = |address: u8| json!({ "address": address, "present": true, "mode": "hold", "faults": [fault] });
+        let mut seen = Seen::default();
+        seen.take(Incoming::Json(json!({
+            "op": "state", "robot": "ro\u{1b}bot", "alive": true, "armed": false, "emergency_stop": false,
+            "hold": "board_fault", "phase": "hold", "step": 2, "simulated": true, "master_us": 12_340_000,
+            "pace": { "paused": false, "factor": 1.0 }, "control": { "holder": "tablet" },
+            "boards": (1..=8).map(board).collect::<Vec<_>>(),
+        })));
+        for n in 0..300 {
+            let event = json!({ "op": "event", "t_ns": n * 1_000_000_000_u64, "text": format!("event {n}") });
+            seen.take(Incoming::Json(event));
+        }
+        seen
+    }
+
+    fn text(lines: &[Line]) -> String {
+        let lines: Vec<&str> = lines.iter().map(|line| &*line.text).collect();
+        lines.join("\n")
+    }
+
+    #[test]
+    fn the_screen_has_state_faults_and_the_newest_events_and_fills_its_rows() {
+        let seen = seen();
+        for rows in [24, 50] {
+            let lines = seen.screen(Duration::ZERO, rows);
+            assert_eq!(lines.len(), rows);
+            let text = text(&lines);
+            for part in [
+                "ro�bot",
+                "HOLD: board fault",
+                "control: tablet",
+                "12.34 s",
+                "left vertical",
+            ] {
+                assert!(text.contains(part), "{part}: {text}");
+            }
+            // Eight alike are one line.
+            assert_eq!(text.matches("The sensor. Look.").count(), 1, "{text}");
+            assert!(text.contains("board 1, 2, 3, 4, 5, 6, 7, 8: "), "{text}");
+            assert!(text.contains("event 299"), "{text}");
+            assert!(!text.contains("event 0\n"), "{text}");
+            assert!(!text.contains("old"), "{text}");
+        }
+        let old = text(&seen.screen(Duration::from_secs(2), 24));
+        assert!(old.contains("nothing new for 2.0 s"), "{old}");
+        // Before anything has come, nothing is made up.
+        let empty = text(&Seen::default().screen(Duration::ZERO, 24));
+        assert!(!empty.contains("0.0 "), "{empty}");
+    }
+
+    #[test]
+    fn a_stop_is_confirmed_by_its_own_answer_and_in_time() {
+        let mut seen = seen();
+        let answer = |n: u64, status: &str| {
+            Incoming::Json(json!({ "op": "answer", "n": n, "status": status }))
+        };
+        seen.stopping = Some((7, Instant::now()));
+        seen.take(answer(6, "done"));
+        assert!(seen.stopping.is_some() && !seen.is_unconfirmed());
+        seen.take(answer(7, "done"));
+        assert!(seen.stopping.is_none() && !seen.is_unconfirmed());
+        seen.stopping = Some((8, Instant::now()));
+        seen.take(answer(8, "refused"));
+        assert!(seen.is_unconfirmed());
+        assert!(text(&seen.screen(Duration::ZERO, 24)).contains("CUT THE AIR"));
+        seen.stopping = Some((9, Instant::now()));
+        seen.take(answer(9, "done"));
+        assert!(!seen.is_unconfirmed());
+        seen.stopping = Instant::now()
+            .checked_sub(2 * UNCONFIRMED)
+            .map(|since| (10, since));
+        assert!(seen.is_unconfirmed());
+    }
+}
