@@ -362,6 +362,19 @@ fn random_file(rng: &mut Pcg64Mcg, text: &str, fields: &[&ParameterInfo]) -> Str
     changed
 }
 
+/// The limit for a field is what a help prints: the value, or up to a thousandth beside it.
+fn ensure_printed(help: &str, path: &str, value: f64) {
+    let quoted = format!("`{path}`");
+    let mut texts = help.split(&quoted).skip(1);
+    let printed = |text: &str| {
+        let number = text
+            .split([' ', ',', ';'])
+            .find_map(|word| word.parse::<f64>().ok());
+        number.is_some_and(|limit| (limit - value).abs() <= 1.001e-3 * limit.abs())
+    };
+    assert!(texts.any(printed), "{path} = {value}: {help}");
+}
+
 /// What a refusal proposes is accepted, of every relation: with the values in the file the relation
 /// holds, and no other one is broken by them; where nothing else was wrong, the file is read.
 fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), ConfigError>) -> usize {
@@ -372,7 +385,7 @@ fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), Confi
             let mut mended = text.to_owned();
             for Advised { path, value, unit } in set {
                 let help = problem.help_text().expect("a help");
-                assert!(help.contains(&format!("`{path}`")), "{path}: {help}");
+                ensure_printed(help, path, *value);
                 mended = with(&mended, path, &format!("{value:?}"), unit);
             }
             let told = format!("{set:?} of {problem} ({:?})", problem.help_text());
@@ -442,6 +455,67 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
         "{}",
         report(&error)
     );
+    let Advised { path, value, unit } = &problem.advice()[0][0];
+    let mended = with(&text, path, &format!("{value:?}"), unit);
+    AxisConfig::parse("my.toml", &mended).expect("accepted with that step");
+}
+
+/// Each of two mistakes has its own remedy, though the file with one of them mended is still refused.
+#[test]
+fn advice_is_given_beside_an_independent_mistake_of_the_whole_robot() {
+    let text = with(ROBOT, "body.chassis_com", "[-0.5, 0.02]", "m");
+    let alone = RobotConfig::parse("my.toml", &text).expect_err("it does not stand");
+    assert_all(&report(&alone), &["the robot does not stand"]);
+    let text = with(&text, "gait.reach", "2.0", "s");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("both wrong");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(paths, ["gait.push", "gait.reach"], "{}", report(&error));
+}
+
+/// The slowest push that the range of its speed allows has a remedy: a faster one.
+#[test]
+fn a_push_that_is_far_too_slow_is_told_the_speed_that_does() {
+    let text = with(ROBOT, "gait.push_speed", "0.001", "m/s");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("too slow");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(paths, ["gait.push_speed"], "{}", report(&error));
+}
+
+/// Where very much is wrong, the file is not read again and again for advice.
+#[test]
+fn no_advice_is_looked_for_where_very_much_is_wrong() {
+    let advised = |unknown: usize| {
+        let text = with(ROBOT, "gait.reach", "2.0", "s");
+        let more: String = (0..unknown).map(|i| format!("unknown{i} = 1\n")).collect();
+        let error = RobotConfig::parse("my.toml", &(more + &text)).expect_err("wrong");
+        let order = error
+            .problems()
+            .iter()
+            .find(|p| p.to_string().contains("out of order"));
+        let order = order.expect("the gait is told of");
+        (
+            order.advice().len(),
+            order.help_text().unwrap_or_default().to_owned(),
+        )
+    };
+    assert_eq!(advised(19).0, 2);
+    let (count, help) = advised(20);
+    assert_eq!(count, 0, "{help}");
+    assert!(help.contains("mend what else is wrong first"), "{help}");
 }
 
 /// What the plant refuses for itself is told by its field, in the unit of the file.
