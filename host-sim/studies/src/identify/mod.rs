@@ -294,7 +294,8 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
     };
     let go_on = || !progress.is_stopped();
     let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
-    let leaves = || unplayed(problem, "leaves its range close to the best fit");
+    let why = ": it leaves its range close to the best fit";
+    let leaves = || unplayed(problem, "the measurement", why);
     let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
     let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
     Ok(Fitted {
