@@ -115,9 +115,20 @@ fn what_claims_more_than_it_holds_is_refused() {
     fs::write(path("page"), claims(&sound)).expect("written");
     let said = read(&path("page")).expect_err("refused");
     assert!(said.contains("claims more bytes"), "{said}");
-    // More rows in one group than this program writes: the levels of all would be kept in memory.
-    written(&path("rows"), 66_000);
+    // More rows in one group than any program has written: the levels of all would be kept in memory.
+    written(&path("most"), 131_071);
+    assert!(read(&path("most")).is_ok());
+    written(&path("rows"), 131_072);
     let said = read(&path("rows")).expect_err("refused");
+    assert!(said.contains("claims more rows"), "{said}");
+    // Very many columns, each of a few bytes.
+    let kind = Kind::Flag;
+    let many = Table {
+        columns: (0..400).map(|n| column(&format!("c{n}"), kind)).collect(),
+        data: vec![Data::Flag(vec![None; 60_000]); 400],
+    };
+    many.write_to(&path("cells"), &[]).expect("written");
+    let said = read(&path("cells")).expect_err("refused");
     assert!(said.contains("claims more rows"), "{said}");
     // A text that all rows share.
     let long = Table {

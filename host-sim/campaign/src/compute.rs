@@ -2,7 +2,7 @@
 
 use crate::cases::{Case, Cases};
 use crate::panics::caught;
-use crate::row::{Figure, Row, Status};
+use crate::row::{self, Figure, Row, Status};
 use crate::simulate::Outcome;
 
 /// What simulates a case; `None` if it was asked to stop before its end.
@@ -50,7 +50,7 @@ pub(crate) fn row_of(cases: &Cases<'_>, case: &Case, block: u64, outcome: Outcom
         figures: figures.collect(),
         factors: case.values.clone(),
         status: outcome.status,
-        error: outcome.error,
+        error: outcome.error.map(row::shortened),
         log_hash: outcome.log_hash,
         simulated_s: outcome.simulated_s,
         passed: outcome.passed,

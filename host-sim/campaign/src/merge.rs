@@ -252,18 +252,16 @@ fn write(
         }
         hash(&mut hasher, &table, columns);
         rows += table.rows() as u64;
-        group.append(table);
-        if group.rows() >= GROUP_ROWS {
+        if group.rows() + table.rows() > GROUP_ROWS {
             writer.write(&group).map_err(full)?;
             group = Table::empty(columns.all.clone());
         }
+        group.append(table);
     }
     if !holes.blocks.is_empty() && (!partial || rows == 0) {
         return Err(holes.told(&stores[0]));
     }
-    if group.rows() > 0 {
-        writer.write(&group).map_err(full)?;
-    }
+    writer.write(&group).map_err(full)?;
     let file = writer.finish().map_err(full)?;
     let file = file.into_inner().map_err(|e| failed(e.into_error()))?;
     file.sync_all().map_err(failed)?;
@@ -304,4 +302,82 @@ fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
         }
     }
     hasher.update(&all);
+}
+
+#[cfg(test)]
+mod tests {
+    use wheeleg_config::plan::{Plan, Sources};
+
+    use super::*;
+    use crate::store::{PlanFile, write_whole};
+    use crate::table::TableReader;
+    use crate::{Figure, Status, report};
+
+    /// A row of a case that was not simulated.
+    fn row(index: u64, columns: &Columns) -> Row {
+        let identity = blake3::hash(&index.to_le_bytes()).to_hex();
+        Row {
+            case: identity[..32].parse().expect("an identity"),
+            index,
+            block: index / 1000,
+            sample: 0,
+            replicate: index,
+            seed: index,
+            factors: Vec::new(),
+            status: Status::Error,
+            error: Some("x".repeat(row::ERROR_MOST)),
+            log_hash: None,
+            simulated_s: None,
+            passed: None,
+            figures: vec![Figure::default(); columns.targets.len()],
+        }
+    }
+
+    /// Blocks that do not divide a row group, with one that is not finished among them, and the longest
+    /// texts: what is written is read.
+    #[test]
+    fn a_table_of_any_blocks_is_read_again() {
+        const CASES: u64 = 66_500;
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("plan.toml");
+        let text = format!(
+            "name = \"long\"\nroot = 1\nblock = 1000\nreplicates = {CASES}\n\
+             [base]\nscenario = \"stand\"\n"
+        );
+        std::fs::write(&file, text).expect("written");
+        let sources = Sources::load(&file.to_string_lossy()).expect("read");
+        let plan = Plan::of(sources).expect("a plan");
+        let columns = Cases::new(&plan).expect("cases").columns().clone();
+        let store = Store::create(folder.path(), PlanFile::of(&plan, 1.0)).expect("a folder");
+        let write = |path: &Path, cases: std::ops::Range<u64>| {
+            let rows: Vec<Row> = cases.map(|index| row(index, &columns)).collect();
+            let bytes = part::bytes(&columns, &store.plan().hash, &rows);
+            write_whole(path, &bytes).expect("written");
+        };
+        for block in 0..store.blocks() {
+            write(&store.part(block), store.cases_of(block));
+        }
+        let out = folder.path().join("cases.parquet");
+        let folders = [folder.path().to_owned()];
+        let groups = || {
+            let file = File::open(&out).expect("a file");
+            TableReader::new(file).expect("a table").groups()
+        };
+        let indices = || {
+            let table = report::Merged::read(&out).expect("a table").table;
+            let indices = table.wholes("index").iter().flatten();
+            indices.map(|index| *index as u64).collect::<Vec<_>>()
+        };
+        let merged = merge(&folders, &out, &Stop::default()).expect("merged");
+        assert_eq!(merged.map(|merged| merged.rows), Some(CASES));
+        assert_eq!(groups(), [65_000, 1_500]);
+        assert!(indices().into_iter().eq(0..CASES));
+
+        std::fs::remove_file(store.part(3)).expect("there");
+        write(&store.new_partial(3), 3_000..3_400);
+        let merged = merge_partial(&folders, &out, &Stop::default()).expect("merged");
+        assert_eq!(merged.map(|merged| merged.missing), Some(600));
+        assert_eq!(groups(), [65_400, 500]);
+        assert!(indices().into_iter().eq((0..3_400).chain(4_000..CASES)));
+    }
 }

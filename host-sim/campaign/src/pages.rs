@@ -1,26 +1,29 @@
-//! Pages of a Parquet file that claim more than a page of so many bytes can hold are found before
-//! anything is unpacked: the library makes room for what they claim.
+//! What a Parquet file claims is compared with its bytes before anything is unpacked: the library makes
+//! room for what is claimed. Work and memory are then within a fixed multiple of the file's size.
 //!
 //! A page begins with its header, a struct of Thrift's compact protocol.
 
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
+use wheeleg_config::plan::MOST_IN_BLOCK;
 
-/// Rows of a row group in a table of many parts; a part has no more.
+/// Most rows of a row group that is written.
 pub(crate) const GROUP_ROWS: usize = 65_536;
+/// Most rows of a row group that is read: earlier programs ended a group after the block that filled it.
+const MOST_ROWS: u64 = GROUP_ROWS as u64 - 1 + MOST_IN_BLOCK;
+/// Cells for each byte of a file. A row has some 40 bytes that do not pack: its case and its seed.
+const CELLS_PER_BYTE: u64 = 32;
 /// Snappy packs 64 bytes in 3 at best.
-const MOST_PACKED: u64 = 22;
-/// Longest header, bytes: it has the least and the greatest value of its page.
-const HEADER_MOST: u64 = 1 << 16;
-/// Deepest struct in a header.
-const DEEPEST: u8 = 8;
+const MOST_PACKED: usize = 22;
+/// Plain, two names of a dictionary, and runs: no value is made of others.
+const ENCODINGS: [usize; 4] = [0, 2, 3, 8];
 
 fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("it is damaged: {what}"))
 }
 
-/// Whether all pages of a file are of a size that their bytes can have.
+/// Whether all that a file claims is of a size that its bytes can have.
 ///
 /// # Errors
 /// What is claimed and cannot be.
@@ -29,13 +32,18 @@ pub(crate) fn check<R: ChunkReader>(
     metadata: &ParquetMetaData,
 ) -> Result<(), ParquetError> {
     let length = from.len();
-    let mut all_rows = 0_u64;
+    let (mut all_rows, mut all_cells, mut all_bytes) = (0_u64, 0_u64, 0_u64);
     for group in metadata.row_groups() {
         let rows = u64::try_from(group.num_rows()).unwrap_or(u64::MAX);
+        let columns = group.columns().len() as u64;
         // Each row has the name of its case, or the time that it took, which do not pack.
         all_rows = all_rows.saturating_add(rows);
-        if rows > GROUP_ROWS as u64 || all_rows > length {
+        all_cells = all_cells.saturating_add(rows.saturating_mul(columns));
+        if rows > MOST_ROWS || all_rows > length || all_cells / CELLS_PER_BYTE > length {
             return Err(damaged("it claims more rows than it can hold"));
+        }
+        if rows == 0 {
+            return Err(damaged("it has a group without rows"));
         }
         for column in group.columns() {
             let begin = column
@@ -44,38 +52,41 @@ pub(crate) fn check<R: ChunkReader>(
             let range = u64::try_from(begin)
                 .ok()
                 .zip(u64::try_from(column.compressed_size()).ok());
-            let end = range.and_then(|(begin, size)| begin.checked_add(size));
-            let (Some((begin, _)), Some(end)) = (range, end.filter(|end| *end <= length)) else {
-                return Err(damaged("a column ends behind its end"));
+            let range = range.filter(|(begin, size)| {
+                let end = begin.checked_add(*size);
+                end.is_some_and(|end| end <= length)
+            });
+            let Some((begin, size)) = range else {
+                return Err(damaged("a column reaches beyond the end of the file"));
             };
-            check_column(from, begin, end, rows)?;
+            // Columns that share their bytes would be read again and again.
+            all_bytes = all_bytes.saturating_add(size);
+            if all_bytes > length {
+                return Err(damaged("its columns have more bytes than the file"));
+            }
+            check_pages(&from.get_bytes(begin, usize::try_from(size)?)?, rows)?;
         }
     }
     Ok(())
 }
 
-fn check_column<R: ChunkReader>(
-    from: &R,
-    mut at: u64,
-    end: u64,
-    rows: u64,
-) -> Result<(), ParquetError> {
-    while at < end {
-        let window = (end - at).min(HEADER_MOST);
-        let bytes = from.get_bytes(at, usize::try_from(window)?)?;
-        let header = Header::read(&bytes).ok_or_else(|| damaged("a page has no header"))?;
-        let most = MOST_PACKED
-            .saturating_mul(header.packed)
-            .saturating_add(MOST_PACKED);
-        if header.unpacked > most {
+/// Whether the pages of a column of so many rows are of a size that their bytes can have.
+fn check_pages(mut pages: &[u8], rows: u64) -> Result<(), ParquetError> {
+    while !pages.is_empty() {
+        let header = Header::read(pages).ok_or_else(|| damaged("a page has no header"))?;
+        let page = &pages[header.length..];
+        pages = page
+            .get(header.packed..)
+            .ok_or_else(|| damaged("a page reaches beyond the end of its column"))?;
+        if header.unpacked > MOST_PACKED.saturating_mul(header.packed.saturating_add(1)) {
             return Err(damaged("a page claims more bytes than it can hold"));
         }
-        if header.values > rows || header.entries > header.unpacked {
+        if header.values as u64 > rows || header.entries > header.unpacked {
             return Err(damaged("a page claims more values than it can hold"));
         }
-        at = at
-            .saturating_add(header.length)
-            .saturating_add(header.packed);
+        if !ENCODINGS.contains(&header.encoding) {
+            return Err(damaged("a page has an encoding that no table has"));
+        }
     }
     Ok(())
 }
@@ -84,48 +95,64 @@ fn check_column<R: ChunkReader>(
 #[derive(Debug, Default, PartialEq)]
 struct Header {
     /// Bytes of itself.
-    length: u64,
+    length: usize,
     /// Bytes of the page, unpacked.
-    unpacked: u64,
+    unpacked: usize,
     /// Bytes of the page as they stand behind the header.
-    packed: u64,
+    packed: usize,
     /// Values of a page of data.
-    values: u64,
+    values: usize,
+    /// How these are written.
+    encoding: usize,
     /// Values of a dictionary.
-    entries: u64,
+    entries: usize,
 }
 
+/// A field of 32 bits.
+const WHOLE: u8 = 5;
+const STRUCT: u8 = 12;
+
 impl Header {
-    /// `None` for bytes that are none.
+    /// `None` for bytes that are none. The library goes by the number of a field and not by its kind:
+    /// a field of another kind than it expects is refused, or the two would read different pages.
     fn read(bytes: &[u8]) -> Option<Self> {
         let mut header = Self::default();
         let mut reader = Compact { bytes, at: 0 };
-        let mut found = [false; 2];
-        reader.fields(0, &mut |path, value| {
-            let place = match path {
-                [2, 0] => {
-                    found[0] = true;
-                    &mut header.unpacked
-                }
-                [3, 0] => {
-                    found[1] = true;
-                    &mut header.packed
-                }
-                // Pages of data of both versions.
-                [5 | 8, 1] => &mut header.values,
-                [7, 1] => &mut header.entries,
-                _ => return Some(()),
-            };
-            *place = u64::try_from(value).ok()?;
-            Some(())
-        })?;
-        header.length = reader.at as u64;
-        (found == [true; 2]).then_some(header)
+        let (mut unpacked, mut packed) = (None, None);
+        let mut number = 0;
+        while let Some(kind) = reader.field(&mut number)? {
+            match (number, kind) {
+                (2, WHOLE) => unpacked = Some(reader.size()?),
+                (3, WHOLE) => packed = Some(reader.size()?),
+                // Type and checksum.
+                (1 | 4, WHOLE) => drop(reader.varint()?),
+                (5 | 7 | 8, STRUCT) => header.read_inner(&mut reader, number)?,
+                _ => return None,
+            }
+        }
+        (header.unpacked, header.packed) = (unpacked?, packed?);
+        header.length = reader.at;
+        Some(header)
+    }
+
+    /// That of data, 5 and 8 by version, or of a dictionary, 7.
+    fn read_inner(&mut self, reader: &mut Compact<'_>, outer: i64) -> Option<()> {
+        let mut number = 0;
+        while let Some(kind) = reader.field(&mut number)? {
+            match (outer, number, kind) {
+                (5 | 8, 1, WHOLE) => self.values = reader.size()?,
+                (7, 1, WHOLE) => self.entries = reader.size()?,
+                (5, 2, WHOLE) | (8, 4, WHOLE) => self.encoding = reader.size()?,
+                (5, 3..=4, WHOLE) | (7, 2, WHOLE) | (8, 2..=6, WHOLE) => drop(reader.size()?),
+                // A flag stands in the head.
+                (7, 3, 1..=2) | (8, 7, 1..=2) => {}
+                (5, 5, STRUCT) | (8, 8, STRUCT) => reader.skip_statistics()?,
+                _ => return None,
+            }
+        }
+        Some(())
     }
 }
-
-/// Sees a whole number, with the numbers of its field and of the field that it is in.
-type See<'a> = dyn FnMut([u64; 2], i64) -> Option<()> + 'a;
 
 /// Reads Thrift's compact protocol.
 struct Compact<'a> {
@@ -138,11 +165,6 @@ impl Compact<'_> {
         let byte = *self.bytes.get(self.at)?;
         self.at += 1;
         Some(byte)
-    }
-
-    fn skip(&mut self, count: u64) -> Option<()> {
-        let at = self.at.checked_add(usize::try_from(count).ok()?)?;
-        (at <= self.bytes.len()).then(|| self.at = at)
     }
 
     /// A number in groups of seven bits, the lowest first.
@@ -163,75 +185,43 @@ impl Compact<'_> {
         Some((zigzag >> 1) as i64 ^ -((zigzag & 1) as i64))
     }
 
-    /// The fields of the struct that the header is.
-    fn fields(&mut self, outer: u64, see: &mut See<'_>) -> Option<()> {
-        self.fields_at(outer, see, 0)
+    /// A number from 0 that 32 bits hold: the library leaves out all others.
+    fn size(&mut self) -> Option<usize> {
+        let size = i32::try_from(self.signed()?).ok()?;
+        usize::try_from(size).ok()
     }
 
-    fn fields_at(&mut self, outer: u64, see: &mut See<'_>, depth: u8) -> Option<()> {
-        if depth > DEEPEST {
-            return None;
+    /// The kind of the next field, and its number after that of the last one; the inner `None` at the
+    /// end of the struct.
+    fn field(&mut self, number: &mut i64) -> Option<Option<u8>> {
+        let head = self.byte()?;
+        let (step, kind) = (i64::from(head >> 4), head & 0x0f);
+        if kind == 0 {
+            return Some(None);
         }
-        let mut number = 0_u64;
-        loop {
-            let head = self.byte()?;
-            let (step, kind) = (u64::from(head >> 4), head & 0x0f);
-            if kind == 0 {
-                return Some(());
-            }
-            number = match step {
-                0 => u64::try_from(self.signed()?).ok()?,
-                step => number.checked_add(step)?,
-            };
-            let path = match depth {
-                0 => [number, 0],
-                1 => [outer, number],
-                // Deeper fields are nobody's.
-                _ => [u64::MAX, number],
-            };
+        *number = match step {
+            0 => self.signed()?,
+            step => number.checked_add(step)?,
+        };
+        Some(Some(kind))
+    }
+
+    /// Goes over the least and the greatest value of a page, and how many there are.
+    fn skip_statistics(&mut self) -> Option<()> {
+        let mut number = 0;
+        while let Some(kind) = self.field(&mut number)? {
             match kind {
-                // A flag stands in the head.
                 1 | 2 => {}
-                4..=6 => {
-                    let value = self.signed()?;
-                    see(path, value)?;
+                4..=6 => drop(self.varint()?),
+                8 => {
+                    let length = usize::try_from(self.varint()?).ok()?;
+                    let left = self.bytes.len() - self.at;
+                    self.at += Some(length).filter(|length| *length <= left)?;
                 }
-                12 => self.fields_at(number, see, depth + 1)?,
-                kind => self.value(kind, depth)?,
+                _ => return None,
             }
         }
-    }
-
-    /// Goes over a value that nobody asks for.
-    fn value(&mut self, kind: u8, depth: u8) -> Option<()> {
-        match kind {
-            1..=3 => self.skip(1),
-            4..=6 => self.varint().map(drop),
-            7 => self.skip(8),
-            8 => {
-                let length = self.varint()?;
-                self.skip(length)
-            }
-            9 | 10 => {
-                let head = self.byte()?;
-                let count = match head >> 4 {
-                    15 => self.varint()?,
-                    count => u64::from(count),
-                };
-                self.list(head & 0x0f, count, depth)
-            }
-            12 => self.fields_at(0, &mut |_, _| Some(()), depth + 1),
-            // No header has a map.
-            _ => None,
-        }
-    }
-
-    fn list(&mut self, kind: u8, count: u64, depth: u8) -> Option<()> {
-        if depth > DEEPEST {
-            return None;
-        }
-        // Each value has a byte at least, so that the end of the bytes ends this.
-        (0..count).try_for_each(|_| self.value(kind, depth + 1))
+        Some(())
     }
 }
 
@@ -244,6 +234,14 @@ mod tests {
         0x15, 0x00, 0x15, 0xd8, 0x04, 0x15, 0x28, 0x2c, 0x15, 0x0e, 0x00, 0x00, 0xff,
     ];
 
+    /// A page of so many bytes whose header claims these sizes, as their varints.
+    fn page(unpacked: &[u8], packed: &[u8], bytes: usize) -> Vec<u8> {
+        let mut page = [&[0x15, 0x00, 0x15], unpacked, &[0x15], packed].concat();
+        page.extend([0x2c, 0x15, 0x0e, 0x00, 0x00]);
+        page.extend(vec![0; bytes]);
+        page
+    }
+
     #[test]
     fn a_header_is_read_and_a_cut_one_is_none() {
         let header = Header::read(&DATA).expect("a header");
@@ -252,7 +250,7 @@ mod tests {
             unpacked: 300,
             packed: 20,
             values: 7,
-            entries: 0,
+            ..Header::default()
         };
         assert_eq!(header, expected);
         for end in 0..12 {
@@ -260,14 +258,48 @@ mod tests {
         }
     }
 
-    /// A list of lists of lists, each of which claims very many.
+    /// The library would see other fields, or others of their bytes.
     #[test]
-    fn what_is_deep_or_long_is_no_header() {
-        assert_eq!(Header::read(&[0x19; 4000]), None);
-        assert_eq!(Header::read(&[0x1c; 4000]), None);
-        assert_eq!(
-            Header::read(&[0x19, 0xf8, 0xff, 0xff, 0xff, 0xff, 0x0f]),
-            None
+    fn what_the_library_reads_otherwise_is_no_header() {
+        let other = |at: usize, bytes: &[u8]| {
+            let mut header = DATA.to_vec();
+            header.splice(at..=at, bytes.iter().copied());
+            header
+        };
+        assert!(Header::read(&other(12, &[])).is_some());
+        for (at, bytes) in [
+            // Another kind of field.
+            (2, &[0x13][..]),
+            (5, &[0x18]),
+            (8, &[0x1c]),
+            // The field 65,539, which is 3 in 16 bits.
+            (5, &[0x05, 0x86, 0x80, 0x08]),
+            // An unknown field: a list of very many.
+            (11, &[0x49, 0xf8, 0xff, 0xff, 0xff, 0xff, 0x0f]),
+        ] {
+            assert_eq!(Header::read(&other(at, bytes)), None, "{at} {bytes:x?}");
+        }
+    }
+
+    #[test]
+    fn a_page_has_no_more_than_its_bytes_can_hold() {
+        let told = |page: &[u8]| check_pages(page, 7).expect_err("refused").to_string();
+        let whole = page(&[0xd8, 0x04], &[0x28], 20);
+        assert!(check_pages(&whole, 7).is_ok());
+        assert!(check_pages(&[whole.clone(), whole.clone()].concat(), 7).is_ok());
+        assert!(told(&whole[..whole.len() - 1]).contains("beyond the end of its column"));
+        // 2^31 - 1 bytes, of 2^32 + 5 packed ones, which are 5 in 32 bits.
+        let most = [0xfe, 0xff, 0xff, 0xff, 0x0f];
+        let hidden = page(&most, &[0x8a, 0x80, 0x80, 0x80, 0x20], 5);
+        assert!(told(&hidden).contains("no header"));
+        assert!(told(&page(&most, &[0x0a], 5)).contains("more bytes"));
+        // Each value made of the one before it.
+        let mut delta = whole;
+        delta.splice(10..10, [0x15, 0x0e]);
+        assert!(told(&delta).contains("encoding"));
+        assert!(
+            check_pages(&page(&[0xd8, 0x04], &[0x28], 20), 6)
+                .is_err_and(|e| e.to_string().contains("more values"))
         );
     }
 }

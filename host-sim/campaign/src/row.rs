@@ -97,6 +97,18 @@ impl Row {
     }
 }
 
+/// Longest text of what went wrong, bytes.
+pub(crate) const ERROR_MOST: usize = 400;
+
+/// What went wrong, cut where it is too long for a table.
+pub(crate) fn shortened(mut error: String) -> String {
+    if error.len() > ERROR_MOST {
+        error.truncate(error.floor_char_boundary(ERROR_MOST - '…'.len_utf8()));
+        error.push('…');
+    }
+    error
+}
+
 /// Rows as a table.
 pub(crate) fn table(columns: &Columns, rows: &[Row]) -> Table {
     let mut table = Table::empty(columns.all.clone());
@@ -199,4 +211,20 @@ pub(crate) fn rows(table: &Table) -> Option<Vec<Row>> {
         })
     };
     (0..table.rows()).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_error_is_cut_between_characters() {
+        let whole = "ü".repeat(ERROR_MOST / 2);
+        assert_eq!(shortened(whole.clone()), whole);
+        let cut = shortened(format!("x{whole}"));
+        assert!(
+            cut.len() <= ERROR_MOST && cut.starts_with("xü") && cut.ends_with("ü…"),
+            "{cut}"
+        );
+    }
 }

@@ -11,7 +11,7 @@ use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::FileReader as _;
+use parquet::file::reader::{FileReader as _, Length as _};
 use parquet::file::serialized_reader::SerializedFileReader;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
@@ -21,8 +21,9 @@ use crate::columns::{Column, Kind};
 use crate::panics::caught;
 use crate::{CampaignError, pages};
 
-/// Bytes of the texts of a column in a row group.
-const GROUP_TEXT: usize = 1 << 25;
+/// Bytes of text for each byte of a file: many rows may share one. A row has some 40 bytes that do not
+/// pack, and its texts are cut ([`crate::row::ERROR_MOST`]) or those of a plan, which have an end.
+const TEXT_PER_BYTE: u64 = 64;
 
 /// Values of one column; `None` is null.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,27 +144,33 @@ impl Table {
         }
     }
 
-    /// Writes it to a new file that says `facts` of itself, besides its columns.
+    /// Writes it to a new file that says `facts` of itself, besides its columns. For tests; nothing is
+    /// left of a file that fails.
     ///
     /// # Errors
     /// What the operating system or the library says.
+    #[doc(hidden)]
     pub fn write_to(&self, path: &Path, facts: &[(&str, &str)]) -> std::io::Result<()> {
         let columns = serde_json::to_string(&self.columns)?;
         let mut all = vec![(crate::columns::FACT, columns.as_str())];
         all.extend(facts);
+        let file = File::create_new(path)?;
         let write = || {
-            let file = File::create_new(path)?;
             let mut writer = TableWriter::new(file, &self.columns, &all)?;
             writer.write(self)?;
             writer.finish().map(drop)
         };
-        write().map_err(|e: ParquetError| std::io::Error::other(e))
+        write().map_err(|e: ParquetError| {
+            let _ = std::fs::remove_file(path);
+            std::io::Error::other(e)
+        })
     }
 
-    /// Reads a file, and of what it says of itself the values of these keys.
+    /// Reads a file, and of what it says of itself the values of these keys. For tests.
     ///
     /// # Errors
     /// [`CampaignError::Unreadable`] for one that is no table, damaged, or made to look like one.
+    #[doc(hidden)]
     pub fn read_from(
         path: &Path,
         keys: &[&str],
@@ -239,8 +246,11 @@ impl<W: std::io::Write + Send> TableWriter<W> {
         Ok(Self { file })
     }
 
-    /// Writes rows as one group.
+    /// Writes rows as one group; none makes no group.
     pub(crate) fn write(&mut self, table: &Table) -> Result<(), ParquetError> {
+        if table.rows() == 0 {
+            return Ok(());
+        }
         let mut group = self.file.next_row_group()?;
         for data in &table.data {
             let Some(mut column) = group.next_column()? else {
@@ -315,6 +325,8 @@ fn sound<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Parquet
 pub(crate) struct TableReader {
     file: SerializedFileReader<File>,
     columns: Vec<Column>,
+    /// Most bytes of its texts.
+    text_most: u64,
 }
 
 impl TableReader {
@@ -329,6 +341,7 @@ impl TableReader {
         let mut reader = Self {
             file,
             columns: Vec::new(),
+            text_most: from.len().saturating_mul(TEXT_PER_BYTE),
         };
         let columns = reader.fact(crate::columns::FACT).unwrap_or_default();
         reader.columns = serde_json::from_str(columns).map_err(|_| {
@@ -351,26 +364,25 @@ impl TableReader {
         fact.value.as_deref()
     }
 
-    /// Number of row groups.
-    fn groups(&self) -> usize {
-        self.file.num_row_groups()
+    /// Rows of each row group.
+    #[cfg(test)]
+    pub(crate) fn groups(&self) -> Vec<i64> {
+        let groups = self.file.metadata().row_groups().iter();
+        groups.map(|group| group.num_rows()).collect()
     }
 
     /// All rows.
     pub(crate) fn read(&self) -> Result<Table, ParquetError> {
         let mut table = Table::empty(self.columns.clone());
-        for group in 0..self.groups() {
-            table.append(self.read_group(group)?);
+        let mut text_left = self.text_most;
+        for group in 0..self.file.num_row_groups() {
+            table.append(sound(|| self.group(group, &mut text_left))?);
         }
         Ok(table)
     }
 
-    /// One row group.
-    fn read_group(&self, group: usize) -> Result<Table, ParquetError> {
-        sound(|| self.group(group))
-    }
-
-    fn group(&self, group: usize) -> Result<Table, ParquetError> {
+    /// One row group. `text_left`: bytes that its texts may have.
+    fn group(&self, group: usize, text_left: &mut u64) -> Result<Table, ParquetError> {
         let group = self.file.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows())
             .map_err(|e| ParquetError::General(e.to_string()))?;
@@ -397,10 +409,10 @@ impl TableReader {
                         read_column(rows, |d, v| r.read_records(rows, Some(d), None, v))?;
                     // Many rows may share a long text of a dictionary.
                     let length = bytes.iter().flatten().map(ByteArray::len).sum::<usize>();
-                    if length > GROUP_TEXT {
-                        let large = format!("its texts have more than {GROUP_TEXT} bytes");
-                        return Err(ParquetError::General(large));
-                    }
+                    *text_left = text_left.checked_sub(length as u64).ok_or_else(|| {
+                        let most = self.text_most;
+                        ParquetError::General(format!("its texts have more than {most} bytes"))
+                    })?;
                     let texts = bytes.into_iter().map(|b| match b {
                         Some(b) => String::from_utf8(b.data().to_vec()).map(Some),
                         None => Ok(None),

@@ -284,7 +284,7 @@ fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
         axis.as_ref()
             .map_or(Ok(()), |axis| Axis::new(axis).map(drop))
     };
-    Some(relations::tried(&mut r, &facts(axis.as_ref()), built))
+    Some(relations::tried(&r, &facts(axis.as_ref()), built))
 }
 
 fn read(r: &mut Reader) -> Option<AxisParams> {

@@ -238,5 +238,5 @@ fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
             .as_ref()
             .map_or(Ok(()), |plant| Plant::new(plant).map(drop))
     };
-    Some(relations::tried(&mut r, &facts(plant.as_ref()), built))
+    Some(relations::tried(&r, &facts(plant.as_ref()), built))
 }

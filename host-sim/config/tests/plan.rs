@@ -7,7 +7,8 @@ use wheeleg_config::Measure;
 use wheeleg_config::builtin::PLANS;
 use wheeleg_config::plan::{Plan, Resolver, Sources, Text, Value};
 
-const HEAD: &str = "name = \"test\"\nroot = 1\nsamples = 10\n[base]\nscenario = \"three-step\"\n";
+const HEAD: &str =
+    "name = \"test\"\nroot = 1\nreplicates = 10\n[base]\nscenario = \"three-step\"\n";
 
 /// The built-in texts that a plan on `three-step` stands on.
 fn sources(plan: &str) -> Sources {
@@ -389,7 +390,15 @@ fn a_plan_needs_its_head() {
         (
             "name = \"x\"\nroot = 1\n[base]\nscenario = \"stand\"\n\
              [factor.a]\nparameter = \"robot.friction.coulomb\"\ngrid = []\n",
-            "`factor.a.grid` = [] must be a list of at least one number",
+            "`factor.a.grid` = [] must be a non-empty list of numbers",
+        ),
+        (
+            &format!(
+                "name = \"x\"\nroot = 1\n[base]\nscenario = \"stand\"\n\
+                 [factor.a]\nparameter = \"robot.node.joint.law\"\ngrid = [\"{}\"]\n",
+                "x".repeat(501)
+            ),
+            "of names (up to 500 bytes)",
         ),
         (
             "name = \"x\"\nroot = 1\nsampler = \"sobbol\"\n[base]\nscenario = \"stand\"\n",
@@ -411,7 +420,13 @@ fn a_plan_needs_its_head() {
         ),
         (
             "name = \"x\"\nroot = 1\nsamples = 5\n[base]\nscenario = \"stand\"\n",
-            "`samples` = 5 would compute each case as often: no factor is drawn",
+            "`samples` = 5 would compute each case 5 times, as no factor is drawn: allowed is 1",
+        ),
+        // Whatever else is wrong.
+        (
+            "name = \"x\"\nroot = 1\nsamples = 5\n[base]\nscenario = \"stand\"\n\
+             [factor.a]\nparameter = \"robot.supply.droop\"\ngrid = [-1.0]\nunit = \"bar\"\n",
+            "`samples` = 5 would compute each case 5 times, as no factor is drawn: allowed is 1",
         ),
         ("name = ", "not valid TOML"),
     ] {
@@ -419,6 +434,14 @@ fn a_plan_needs_its_head() {
         let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
         assert!(all.iter().any(|p| p.contains(told)), "{told}: {all:?}");
     }
+    // What cannot be given is not proposed.
+    let text = "name = \"x\"\nroot = 1\ncase = 0\n[base]\nscenario = \"stand\"\n";
+    let error = Plan::of(sources(text)).expect_err(text);
+    let shown = format!("{:?}", error.problems());
+    assert!(
+        shown.contains("unknown field `case`") && !shown.contains("`cases`"),
+        "{shown}"
+    );
     let missing = Sources {
         plan: Text {
             file: "plan.toml".to_owned(),

@@ -29,6 +29,9 @@ struct Example {
     field: Set,
     broken: f64,
     sound: f64,
+    /// Fields, or those of several that do together, that are advised at `broken`; none where what is
+    /// allowed is told in words.
+    advised: &'static [&'static str],
 }
 
 const fn example(
@@ -37,6 +40,7 @@ const fn example(
     beside: &'static [Set],
     field: Set,
     [broken, sound]: [f64; 2],
+    advised: &'static [&'static str],
 ) -> Example {
     Example {
         relation,
@@ -45,6 +49,7 @@ const fn example(
         field,
         broken,
         sound,
+        advised,
     }
 }
 
@@ -102,82 +107,82 @@ const SMALL_RESERVOIR: &[Set] = &[("supply.reservoir", "10.0", "cm3")];
 
 #[rustfmt::skip]
 const EXAMPLES: &[Example] = &[
-    example("hysteresis of the supply's contact", AXIS, &[], ("supply.switch_off", "{}", "Pa"), [551_326.0, 551_325.0]),
-    example("supply's contact", AXIS, &[], ("supply.switch_on", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("hysteresis of the source's contact", ROBOT, &[], ("source_switch.off", "{}", "Pa"), [821_326.0, 821_325.0]),
-    example("source's contact", ROBOT, &[], ("source_switch.on", "{}", "bar"), [11.01326, 11.01325]),
-    example("regulator", AXIS, &[], ("supply.set_pressure", "{}", "bar"), [11.01326, 11.01325]),
-    example("filled reservoir", ROBOT, &[], ("supply.initial_pressure", "{}", "bar"), [11.01326, 11.01325]),
-    example("droop", AXIS, &[], ("supply.droop", "{}", "bar"), [6.0, 5.9999]),
-    example("trapped air A", AXIS, &[], ("start.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air B", AXIS, &[], ("start.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air A, yaw", ROBOT, &[], ("start.yaw.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air B, yaw", ROBOT, &[], ("start.yaw.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air A, horizontal", ROBOT, &[], ("start.horizontal.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air B, horizontal", ROBOT, &[], ("start.horizontal.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air A, vertical", ROBOT, &[], ("start.vertical.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("trapped air B, vertical", ROBOT, &[], ("start.vertical.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0]),
-    example("rod", AXIS, &[], ("cylinder.rod", "{}", "mm"), [18.001, 18.0]),
-    example("cushion", AXIS, &[("cylinder.stroke", "45.0", "mm")], ("end_stop.cushion_length", "{}", "mm"), [45.001, 45.0]),
-    example("break-away", AXIS, &[], ("friction.static", "{}", "N"), [9.999, 10.0]),
-    example("start", AXIS, &[], ("start.stroke", "{}", "mm"), [180.001, 180.0]),
-    example("start, yaw", ROBOT, SHORT, ("start.yaw.stroke", "{}", "mm"), [90.001, 90.0]),
-    example("start, horizontal", ROBOT, SHORT, ("start.horizontal.stroke", "{}", "mm"), [90.001, 90.0]),
-    example("start, vertical", ROBOT, SHORT, ("start.vertical.stroke", "{}", "mm"), [90.001, 90.0]),
-    example("track of the sensor", AXIS, &[], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [180.0, 200.0]),
-    example("begin of the sensor", AXIS, &[], ("sensor.potentiometer.offset", "{}", "mm"), [1.999, 2.0]),
-    example("step and friction", AXIS, SOFT_STOP, ("moving.mass", "{}", "kg"), [0.054_24, 0.054_29]),
-    example("step and friction, robot", ROBOT, SOFT_ROBOT, ("link.vertical_rod.mass", "{}", "kg"), [0.054_24, 0.054_29]),
-    example("step and end stop", AXIS, &[], ("moving.mass", "{}", "kg"), [0.07, 1.5]),
-    example("step and end stop, robot", ROBOT, &[], ("link.vertical_rod.mass", "{}", "kg"), [0.07, 0.8]),
-    example("step and air A", AXIS, TIGHT_A, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 4.0]),
-    example("step and air B", AXIS, TIGHT_B, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 4.0]),
-    example("step and supply", AXIS, SMALL_RESERVOIR, ("regulator.conductance", "{}", "dm3/(s bar)"), [900.0, 1.0]),
-    example("air in the stop A", AXIS, SHORT_STEP, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 1.0]),
-    example("air in the stop B", AXIS, SHORT_STEP, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 1.0]),
-    example("settling in time", ROBOT, &[], ("homing.timeout", "{}", "s"), [0.3, 0.300_1]),
-    example("ready in time", ROBOT, &[], ("start_up.limit", "{}", "s"), [1.3, 1.300_1]),
-    example("returning load", ROBOT, &[], ("reference.reload_start", "{}", "s"), [2.0, 1.999]),
-    example("stroke of the gait", ROBOT, &[("cylinder.stroke", "175.0", "mm"), ("gait.held_leg_s6", "175.0", "mm"), ("start.vertical.stroke", "175.0", "mm")], ("gait.stroke", "{}", "mm"), [175.001, 175.0]),
-    example("held leg, forward", ROBOT, SHORT, ("gait.held_leg_s5", "{}", "mm"), [90.001, 90.0]),
-    example("held leg, down", ROBOT, SHORT, ("gait.held_leg_s6", "{}", "mm"), [90.001, 90.0]),
-    example("yaw of the gait", ROBOT, SHORT, ("gait.yaw_s2", "{}", "mm"), [90.001, 90.0]),
-    example("lift before reach", ROBOT, &[], ("gait.lift", "{}", "s"), [0.5, 0.499]),
-    example("lift before lower", ROBOT, &[("gait.reach", "1.5", "s")], ("gait.lift", "{}", "s"), [1.0, 0.999]),
-    example("reach before push", ROBOT, &[], ("gait.reach", "{}", "s"), [2.0, 1.999]),
-    example("lower before push", ROBOT, &[], ("gait.lower", "{}", "s"), [2.0, 1.999]),
-    example("push before the end", ROBOT, QUICK_PUSH, ("gait.push", "{}", "s"), [30.0, 29.971]),
-    example("time to touch down", ROBOT, &[], ("gait.touchdown_speed", "{}", "mm/s"), [15.0, 15.02]),
-    example("time to push", ROBOT, &[], ("gait.push_speed", "{}", "m/s"), [0.1, 0.18]),
-    example("inertias of the chassis", ROBOT, &[], ("spatial.chassis_roll_inertia", "{}", "kg m2"), [0.1, 0.2]),
-    example("inertias of a wheel", ROBOT, &[], ("spatial.wheel_transverse_inertia", "{}", "kg m2"), [0.008, 0.0081]),
-    example("inertias of the yaw barrel", ROBOT, &[], ("link.yaw_barrel.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3]),
-    example("inertias of the yaw rod", ROBOT, &[], ("link.yaw_rod.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [2.001e-3, 2e-3]),
-    example("inertias of the crank", ROBOT, &[], ("link.crank.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [2.001e-3, 2e-3]),
-    example("inertias of the yaw carriage", ROBOT, &[], ("link.yaw_carriage.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [2.001e-3, 2e-3]),
-    example("inertias of the horizontal carriage", ROBOT, &[], ("link.horizontal_carriage.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3]),
-    example("inertias of the vertical rod", ROBOT, &[], ("link.vertical_rod.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [2.001e-3, 2e-3]),
-    example("friction of a sole", ROBOT, &[], ("contact.mu_kinetic", "{}", "1"), [0.801, 0.8]),
-    example("friction of a wheel", ROBOT, &[], ("wheel_contact.mu_kinetic", "{}", "1"), [0.801, 0.8]),
-    example("friction of the chassis", ROBOT, &[], ("chassis_contact.mu_kinetic", "{}", "1"), [0.401, 0.4]),
-    example("spheres of a sole", ROBOT, &[], ("contact.sphere_radius", "{}", "mm"), [30.01, 30.0]),
-    example("corners of the chassis", ROBOT, &[], ("chassis_contact.from", "[-0.433, -0.2, {}]", "m"), [0.120_1, 0.12]),
-    example("belly above the ground", ROBOT, &[], ("chassis_contact.from", "[-0.433, -0.2, {}]", "m"), [-0.15, -0.149_9]),
-    example("chassis between the wheels", ROBOT, &[], ("chassis_contact.to", "[0.167, {}, 0.12]", "m"), [0.255_1, 0.255]),
-    example("drawn chassis between the wheels", ROBOT, &[], ("spatial.chassis_size", "[0.6, {}, 0.2]", "m"), [0.510_1, 0.51]),
-    example("ground below", ROBOT, &[], ("body.gravity", "[0.0, 0.0, {}]", "m/s2"), [9.81, -9.81]),
-    example("codes of the sensor", ROBOT, &[], ("node.joint.sensor_code_max", "{}", "code"), [62_259.0, 62_260.0]),
-    example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0]),
-    example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0]),
-    example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5]),
-    example("told full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9]),
-    example("told volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0]),
-    example("told volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0]),
-    example("told conductance", AXIS, &[], ("fill_valve.conductance", "{}", "dm3/(s bar)"), [0.004_9, 0.005_1]),
-    example("told band of rest", AXIS, &[("sensor.adc.bits", "8", "bit"), ("sensor.potentiometer.offset", "7.0", "mm")], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [512.01, 512.0]),
-    example("closed leg", ROBOT, &[], ("body.crank", "{}", "m"), [1.9, 0.29]),
-    example("standing", ROBOT, &[], ("body.chassis_com", "[{}, 0.02]", "m"), [-0.5, -0.133]),
-    example("carried by its air", ROBOT, &[("body.chassis_com", "[0.3, 0.02]", "m")], ("body.chassis_mass", "{}", "kg"), [300.0, 15.4]),
+    example("hysteresis of the supply's contact", AXIS, &[], ("supply.switch_off", "{}", "Pa"), [551_326.0, 551_325.0], &["supply.switch_off", "supply.switch_on"]),
+    example("supply's contact", AXIS, &[], ("supply.switch_on", "{}", "Pa"), [701_326.0, 701_325.0], &["supply.switch_on", "supply.set_pressure"]),
+    example("hysteresis of the source's contact", ROBOT, &[], ("source_switch.off", "{}", "Pa"), [821_326.0, 821_325.0], &["source_switch.off", "source_switch.on"]),
+    example("source's contact", ROBOT, &[], ("source_switch.on", "{}", "bar"), [11.01326, 11.01325], &["source_switch.on", "supply.source_pressure"]),
+    example("regulator", AXIS, &[], ("supply.set_pressure", "{}", "bar"), [11.01326, 11.01325], &["supply.set_pressure", "supply.source_pressure"]),
+    example("filled reservoir", ROBOT, &[], ("supply.initial_pressure", "{}", "bar"), [11.01326, 11.01325], &["supply.initial_pressure", "supply.source_pressure"]),
+    example("droop", AXIS, &[], ("supply.droop", "{}", "bar"), [6.0, 5.9999], &["supply.droop", "supply.set_pressure"]),
+    example("trapped air A", AXIS, &[], ("start.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.pressure_a", "supply.set_pressure"]),
+    example("trapped air B", AXIS, &[], ("start.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.pressure_b", "supply.set_pressure"]),
+    example("trapped air A, yaw", ROBOT, &[], ("start.yaw.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.yaw.pressure_a", "supply.set_pressure"]),
+    example("trapped air B, yaw", ROBOT, &[], ("start.yaw.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.yaw.pressure_b", "supply.set_pressure"]),
+    example("trapped air A, horizontal", ROBOT, &[], ("start.horizontal.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.horizontal.pressure_a", "supply.set_pressure"]),
+    example("trapped air B, horizontal", ROBOT, &[], ("start.horizontal.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.horizontal.pressure_b", "supply.set_pressure"]),
+    example("trapped air A, vertical", ROBOT, &[], ("start.vertical.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_a", "supply.set_pressure"]),
+    example("trapped air B, vertical", ROBOT, &[], ("start.vertical.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_b", "supply.set_pressure"]),
+    example("rod", AXIS, &[], ("cylinder.rod", "{}", "mm"), [18.001, 18.0], &["cylinder.rod", "cylinder.bore"]),
+    example("cushion", AXIS, &[("cylinder.stroke", "45.0", "mm")], ("end_stop.cushion_length", "{}", "mm"), [45.001, 45.0], &["end_stop.cushion_length", "cylinder.stroke"]),
+    example("break-away", AXIS, &[], ("friction.static", "{}", "N"), [9.999, 10.0], &["friction.static", "friction.coulomb"]),
+    example("start", AXIS, &[], ("start.stroke", "{}", "mm"), [180.001, 180.0], &["start.stroke", "cylinder.stroke"]),
+    example("start, yaw", ROBOT, SHORT, ("start.yaw.stroke", "{}", "mm"), [90.001, 90.0], &["start.yaw.stroke", "cylinder.stroke"]),
+    example("start, horizontal", ROBOT, SHORT, ("start.horizontal.stroke", "{}", "mm"), [90.001, 90.0], &["start.horizontal.stroke", "cylinder.stroke"]),
+    example("start, vertical", ROBOT, SHORT, ("start.vertical.stroke", "{}", "mm"), [90.001, 90.0], &["start.vertical.stroke", "cylinder.stroke"]),
+    example("track of the sensor", AXIS, &[], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [180.0, 200.0], &["sensor.potentiometer.electrical_stroke", "cylinder.stroke"]),
+    example("begin of the sensor", AXIS, &[], ("sensor.potentiometer.offset", "{}", "mm"), [1.999, 2.0], &["sensor.potentiometer.offset", "sensor.potentiometer.electrical_stroke"]),
+    example("step and friction", AXIS, SOFT_STOP, ("moving.mass", "{}", "kg"), [0.054_24, 0.054_29], &["numerics.step", "moving.mass"]),
+    example("step and friction, robot", ROBOT, SOFT_ROBOT, ("link.vertical_rod.mass", "{}", "kg"), [0.054_24, 0.054_29], &["numerics.step", "link.vertical_rod.mass"]),
+    example("step and end stop", AXIS, &[], ("moving.mass", "{}", "kg"), [0.07, 1.5], &["numerics.step", "moving.mass"]),
+    example("step and end stop, robot", ROBOT, &[], ("link.vertical_rod.mass", "{}", "kg"), [0.07, 0.8], &["numerics.step", "link.vertical_rod.mass"]),
+    example("step and air A", AXIS, TIGHT_A, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 4.0], &["numerics.step", "cylinder.dead_volume_a"]),
+    example("step and air B", AXIS, TIGHT_B, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 4.0], &["numerics.step", "cylinder.dead_volume_b"]),
+    example("step and supply", AXIS, SMALL_RESERVOIR, ("regulator.conductance", "{}", "dm3/(s bar)"), [900.0, 1.0], &["supply.reservoir"]),
+    example("air in the stop A", AXIS, SHORT_STEP, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 1.0], &["cylinder.dead_volume_a", "end_stop.stiffness"]),
+    example("air in the stop B", AXIS, SHORT_STEP, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 1.0], &["cylinder.dead_volume_b", "end_stop.stiffness"]),
+    example("settling in time", ROBOT, &[], ("homing.timeout", "{}", "s"), [0.3, 0.300_1], &["homing.timeout", "homing.settle"]),
+    example("ready in time", ROBOT, &[], ("start_up.limit", "{}", "s"), [1.3, 1.300_1], &["start_up.limit", "start_up.rest", "homing.settle"]),
+    example("returning load", ROBOT, &[], ("reference.reload_start", "{}", "s"), [2.0, 1.999], &["reference.reload_start", "reference.reload_end"]),
+    example("stroke of the gait", ROBOT, &[("cylinder.stroke", "175.0", "mm"), ("gait.held_leg_s6", "175.0", "mm"), ("start.vertical.stroke", "175.0", "mm")], ("gait.stroke", "{}", "mm"), [175.001, 175.0], &["gait.stroke", "cylinder.stroke"]),
+    example("held leg, forward", ROBOT, SHORT, ("gait.held_leg_s5", "{}", "mm"), [90.001, 90.0], &["gait.held_leg_s5", "cylinder.stroke"]),
+    example("held leg, down", ROBOT, SHORT, ("gait.held_leg_s6", "{}", "mm"), [90.001, 90.0], &["gait.held_leg_s6", "cylinder.stroke"]),
+    example("yaw of the gait", ROBOT, SHORT, ("gait.yaw_s2", "{}", "mm"), [90.001, 90.0], &["gait.yaw_s2", "cylinder.stroke"]),
+    example("lift before reach", ROBOT, &[], ("gait.lift", "{}", "s"), [0.5, 0.499], &["gait.reach", "gait.lift"]),
+    example("lift before lower", ROBOT, &[("gait.reach", "1.5", "s")], ("gait.lift", "{}", "s"), [1.0, 0.999], &["gait.lower", "gait.lift"]),
+    example("reach before push", ROBOT, &[], ("gait.reach", "{}", "s"), [2.0, 1.999], &["gait.push", "gait.reach"]),
+    example("lower before push", ROBOT, &[], ("gait.lower", "{}", "s"), [2.0, 1.999], &["gait.push", "gait.lower"]),
+    example("push before the end", ROBOT, QUICK_PUSH, ("gait.push", "{}", "s"), [30.0, 29.971], &["gait.period", "gait.push"]),
+    example("time to touch down", ROBOT, &[], ("gait.touchdown_speed", "{}", "mm/s"), [15.0, 15.02], &["gait.touchdown_speed", "gait.touchdown_speed", "gait.push", "gait.lower"]),
+    example("time to push", ROBOT, &[], ("gait.push_speed", "{}", "m/s"), [0.1, 0.18], &["gait.period", "gait.push", "gait.push_speed"]),
+    example("inertias of the chassis", ROBOT, &[], ("spatial.chassis_roll_inertia", "{}", "kg m2"), [0.1, 0.2], &[]),
+    example("inertias of a wheel", ROBOT, &[], ("spatial.wheel_transverse_inertia", "{}", "kg m2"), [0.008, 0.0081], &[]),
+    example("inertias of the yaw barrel", ROBOT, &[], ("link.yaw_barrel.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("inertias of the yaw rod", ROBOT, &[], ("link.yaw_rod.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("inertias of the crank", ROBOT, &[], ("link.crank.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("inertias of the yaw carriage", ROBOT, &[], ("link.yaw_carriage.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("inertias of the horizontal carriage", ROBOT, &[], ("link.horizontal_carriage.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("inertias of the vertical rod", ROBOT, &[], ("link.vertical_rod.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("friction of a sole", ROBOT, &[], ("contact.mu_kinetic", "{}", "1"), [0.801, 0.8], &["contact.mu_kinetic", "contact.mu_static"]),
+    example("friction of a wheel", ROBOT, &[], ("wheel_contact.mu_kinetic", "{}", "1"), [0.801, 0.8], &["wheel_contact.mu_kinetic", "wheel_contact.mu_static"]),
+    example("friction of the chassis", ROBOT, &[], ("chassis_contact.mu_kinetic", "{}", "1"), [0.401, 0.4], &["chassis_contact.mu_kinetic", "chassis_contact.mu_static"]),
+    example("spheres of a sole", ROBOT, &[], ("contact.sphere_radius", "{}", "mm"), [30.01, 30.0], &["contact.sphere_radius", "contact.sole_radius"]),
+    example("corners of the chassis", ROBOT, &[], ("chassis_contact.from", "[-0.433, -0.2, {}]", "m"), [0.120_1, 0.12], &[]),
+    example("belly above the ground", ROBOT, &[], ("chassis_contact.from", "[-0.433, -0.2, {}]", "m"), [-0.15, -0.149_9], &[]),
+    example("chassis between the wheels", ROBOT, &[], ("chassis_contact.to", "[0.167, {}, 0.12]", "m"), [0.255_1, 0.255], &["spatial.track", "spatial.wheel_width"]),
+    example("drawn chassis between the wheels", ROBOT, &[], ("spatial.chassis_size", "[0.6, {}, 0.2]", "m"), [0.510_1, 0.51], &["spatial.track", "spatial.wheel_width"]),
+    example("ground below", ROBOT, &[], ("body.gravity", "[0.0, 0.0, {}]", "m/s2"), [9.81, -9.81], &[]),
+    example("codes of the sensor", ROBOT, &[], ("node.joint.sensor_code_max", "{}", "code"), [62_259.0, 62_260.0], &[]),
+    example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
+    example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
+    example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5], &["sensor.adc.bits", "node.joint.settle_band"]),
+    example("told full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9], &[]),
+    example("told volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0], &[]),
+    example("told volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0], &[]),
+    example("told conductance", AXIS, &[], ("fill_valve.conductance", "{}", "dm3/(s bar)"), [0.004_9, 0.005_1], &[]),
+    example("told band of rest", AXIS, &[("sensor.adc.bits", "8", "bit"), ("sensor.potentiometer.offset", "7.0", "mm")], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [512.01, 512.0], &[]),
+    example("closed leg", ROBOT, &[], ("body.crank", "{}", "m"), [1.9, 0.29], &[]),
+    example("standing", ROBOT, &[], ("body.chassis_com", "[{}, 0.02]", "m"), [-0.5, -0.133], &[]),
+    example("carried by its air", ROBOT, &[("body.chassis_com", "[0.3, 0.02]", "m")], ("body.chassis_mass", "{}", "kg"), [300.0, 15.4], &[]),
 ];
 
 /// A file with other values; a key that its section has not got is put below the heading.
@@ -264,6 +269,22 @@ fn ensure_told(relation: &Relation, example: &Example, value: f64, error: &Confi
     assert!(said.len() < 1500, "{name}: {said}");
 }
 
+/// The fields are advised that can mend the example, and no others.
+fn ensure_advised(relation: &Relation, example: &Example, error: &ConfigError) {
+    let paths = |set: &Vec<Advised>| {
+        let each: Vec<&str> = set.iter().map(|advised| advised.path.as_str()).collect();
+        each.join(" + ")
+    };
+    let advised: Vec<String> = error.problems()[0].advice().iter().map(paths).collect();
+    assert_eq!(
+        advised,
+        example.advised,
+        "{}: {}",
+        relation.name,
+        report(error)
+    );
+}
+
 /// Narrows the example down to where the relation begins to hold: all that is refused on the way is
 /// refused for it alone.
 fn ensure_held(relation: &Relation, example: &Example) {
@@ -272,6 +293,7 @@ fn ensure_held(relation: &Relation, example: &Example) {
     let refused = example.read(broken);
     let error = refused.expect_err(&format!("{name} at {broken} is accepted"));
     ensure_told(relation, example, broken, &error);
+    ensure_advised(relation, example, &error);
     if let Err(error) = example.read(sound) {
         panic!("{name} at {sound}: {}", report(&error));
     }
@@ -362,6 +384,19 @@ fn random_file(rng: &mut Pcg64Mcg, text: &str, fields: &[&ParameterInfo]) -> Str
     changed
 }
 
+/// The limit for a field is what a help prints: the value, or up to a thousandth beside it.
+fn ensure_printed(help: &str, path: &str, value: f64) {
+    let quoted = format!("`{path}`");
+    let mut texts = help.split(&quoted).skip(1);
+    let printed = |text: &str| {
+        let number = text
+            .split([' ', ',', ';'])
+            .find_map(|word| word.parse::<f64>().ok());
+        number.is_some_and(|limit| (limit - value).abs() <= 1.001e-3 * limit.abs())
+    };
+    assert!(texts.any(printed), "{path} = {value}: {help}");
+}
+
 /// What a refusal proposes is accepted, of every relation: with the values in the file the relation
 /// holds, and no other one is broken by them; where nothing else was wrong, the file is read.
 fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), ConfigError>) -> usize {
@@ -372,7 +407,7 @@ fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), Confi
             let mut mended = text.to_owned();
             for Advised { path, value, unit } in set {
                 let help = problem.help_text().expect("a help");
-                assert!(help.contains(&format!("`{path}`")), "{path}: {help}");
+                ensure_printed(help, path, *value);
                 mended = with(&mended, path, &format!("{value:?}"), unit);
             }
             let told = format!("{set:?} of {problem} ({:?})", problem.help_text());
@@ -442,6 +477,67 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
         "{}",
         report(&error)
     );
+    let Advised { path, value, unit } = &problem.advice()[0][0];
+    let mended = with(&text, path, &format!("{value:?}"), unit);
+    AxisConfig::parse("my.toml", &mended).expect("accepted with that step");
+}
+
+/// Each of two mistakes has its own remedy, though the file with one of them mended is still refused.
+#[test]
+fn advice_is_given_beside_an_independent_mistake_of_the_whole_robot() {
+    let text = with(ROBOT, "body.chassis_com", "[-0.5, 0.02]", "m");
+    let alone = RobotConfig::parse("my.toml", &text).expect_err("it does not stand");
+    assert_all(&report(&alone), &["the robot does not stand"]);
+    let text = with(&text, "gait.reach", "2.0", "s");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("both wrong");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(paths, ["gait.push", "gait.reach"], "{}", report(&error));
+}
+
+/// The slowest push that the range of its speed allows has a remedy: a faster one.
+#[test]
+fn a_push_that_is_far_too_slow_is_told_the_speed_that_does() {
+    let text = with(ROBOT, "gait.push_speed", "0.001", "m/s");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("too slow");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    let paths: Vec<&str> = problem
+        .advice()
+        .iter()
+        .map(|set| set[0].path.as_str())
+        .collect();
+    assert_eq!(paths, ["gait.push_speed"], "{}", report(&error));
+}
+
+/// Where very much is wrong, the file is not read again and again for advice.
+#[test]
+fn no_advice_is_looked_for_where_very_much_is_wrong() {
+    let advised = |unknown: usize| {
+        let text = with(ROBOT, "gait.reach", "2.0", "s");
+        let more: String = (0..unknown).map(|i| format!("unknown{i} = 1\n")).collect();
+        let error = RobotConfig::parse("my.toml", &(more + &text)).expect_err("wrong");
+        let order = error
+            .problems()
+            .iter()
+            .find(|p| p.to_string().contains("out of order"));
+        let order = order.expect("the gait is told of");
+        (
+            order.advice().len(),
+            order.help_text().unwrap_or_default().to_owned(),
+        )
+    };
+    assert_eq!(advised(19).0, 2);
+    let (count, help) = advised(20);
+    assert_eq!(count, 0, "{help}");
+    assert!(help.contains("mend what else is wrong first"), "{help}");
 }
 
 /// What the plant refuses for itself is told by its field, in the unit of the file.

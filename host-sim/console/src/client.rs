@@ -312,10 +312,10 @@ impl Client {
     pub fn prompt(&mut self, frame: Value) -> Result<Outcome, ConsoleError> {
         let end = Some(self.url.end());
         self.socket.get_mut().look(LOOK, end);
-        let n = self.send(frame)?;
-        let outcome = self.outcome_until(n, end);
+        let sent = self.send(frame);
+        let outcome = sent.map(|n| self.outcome_until(n, end));
         self.socket.get_mut().look(LOOK, None);
-        Ok(outcome)
+        outcome
     }
 
     fn outcome_until(&mut self, n: u64, end: Option<Instant>) -> Outcome {

@@ -16,6 +16,7 @@
 mod ahead;
 mod touchdown;
 
+pub use touchdown::GUARD_MM;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use super::params::{GaitParams, ParamError, Pattern};

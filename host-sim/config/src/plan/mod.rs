@@ -143,8 +143,10 @@ impl Plan {
         let what = format!("the plan {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
         let plan = read(&mut r, &sources);
-        if let Some(plan) = plan.as_ref().filter(|_| r.is_clean()) {
-            check::check(&mut r, plan)?;
+        if let Some(plan) = &plan {
+            if r.is_clean() {
+                check::check(&mut r, plan)?;
+            }
             ensure_samples_differ(&mut r, plan);
         }
         r.finish(&what, plan).map(|(plan, _)| plan)
@@ -165,14 +167,17 @@ impl Plan {
 
 fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
     let top = r.table("")?;
-    r.reject_unknown(&top, &[&TOP[..], &["cases"]].concat());
-    if let Some((key, _)) = top.get("cases") {
-        r.problem(
-            Some(key),
-            "`cases` cannot be given: it is grid cells × `samples` × `replicates`".to_owned(),
-            "follows from others",
-            Some("write `samples` or `replicates`, from 1".to_owned()),
-        );
+    for (key, span) in top.keys() {
+        if key == "cases" {
+            r.problem(
+                Some(span),
+                "`cases` cannot be given: it is grid cells × `samples` × `replicates`".to_owned(),
+                "follows from others",
+                Some("write `samples` or `replicates`, from 1".to_owned()),
+            );
+        } else if !TOP.contains(&key) {
+            r.reject_field(&top, key, span, &TOP, &[]);
+        }
     }
     let name = r.name(&top, "name");
     let mut count = |key: &str, most: u64| match top.get(key) {
@@ -263,7 +268,8 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
 /// Samples differ in what is drawn: without it each case would be computed once more.
 fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
     let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
-    if !r.is_clean() || plan.samples == 1 || plan.factors.iter().any(drawn) {
+    let samples = plan.samples;
+    if samples == 1 || plan.factors.iter().any(drawn) {
         return;
     }
     let top = r.table("");
@@ -271,10 +277,10 @@ fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
     r.problem(
         key.map(|(key, _)| key),
         format!(
-            "`samples` = {} would compute each case as often: no factor is drawn, and allowed is then 1",
-            plan.samples
+            "`samples` = {samples} would compute each case {samples} times, as no factor is drawn: \
+             allowed is 1"
         ),
-        "the same again",
+        "no factor is drawn",
         Some("for other noise write `replicates`; for other values let a factor be drawn".into()),
     );
 }

@@ -5,6 +5,9 @@ use toml_edit::Item;
 
 use crate::reader::{Entry, Reader};
 
+/// Longest text, bytes: each row of a table has it.
+const TEXT_MOST: usize = 500;
+
 /// A value of a factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -43,8 +46,8 @@ pub(super) fn list(r: &mut Reader, entry: &Entry, key: &str) -> Option<Vec<Value
         r.problem(
             item.span().or(Some(span)),
             format!(
-                "`{path}` = {} must be a list of at least one number, name, true or false, none of \
-                 them twice",
+                "`{path}` = {} must be a non-empty list of numbers, of names (up to {TEXT_MOST} \
+                 bytes) or of true and false, none of them twice",
                 item.to_string().trim()
             ),
             "not a list of values",
@@ -59,7 +62,8 @@ fn one_kind(item: &Item) -> Option<Vec<Value>> {
     let list = item.as_array()?;
     let value = |v: &toml_edit::Value| {
         let number = v.as_float().or(v.as_integer().map(|n| n as f64));
-        let text = v.as_str().map(|text| Value::Text(text.to_owned()));
+        let text = v.as_str().filter(|text| text.len() <= TEXT_MOST);
+        let text = text.map(|text| Value::Text(text.to_owned()));
         let flag = v.as_bool().map(Value::Flag);
         number
             .filter(|n| n.is_finite())

@@ -4,16 +4,16 @@
 //! field's own range. So each offer is put into the file, which is checked again; what is refused is
 //! not told. Where no offer does alone, those are added that the relations broken by it ask for.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
 use super::{Facts, Found};
 use crate::quantity::{pretty, suffix};
 
-/// Files that are tried at most for one relation: each is read as a whole.
+/// Files that are tried at most for all relations of a file: each is read as a whole.
 const TRIES: usize = 24;
-/// The same for all relations of a file.
-const ALL_TRIES: usize = 120;
+/// Where more than this is wrong, none is tried.
+const MOST_WRONG: usize = 20;
 /// Offers that are put together at most.
 const TOGETHER: usize = 4;
 /// From a limit that is not allowed itself, the value that is tried is this share of it away.
@@ -94,19 +94,26 @@ impl Offer {
 /// A limit as it is printed, on its own side of what was worked out.
 fn written(limit: f64, bound: Bound) -> f64 {
     let printed = |value: f64| pretty(value).parse().unwrap_or(value);
-    let (near, digit) = (printed(limit), 1e-7 * limit.abs());
+    let inwards = match bound {
+        Bound::UpTo => -limit.abs(),
+        Bound::From => limit.abs(),
+        Bound::Below | Bound::Above | Bound::At => return printed(limit),
+    };
     let slack = super::ROUNDING * limit.abs();
-    match bound {
-        Bound::UpTo if near > limit + slack => printed(limit - digit),
-        Bound::From if near < limit - slack => printed(limit + digit),
-        _ => near,
-    }
+    // Numbers are printed with eight digits, very large and very small ones with six.
+    let mut near = [0.0, 1e-7, 1e-5]
+        .map(|share| printed(limit + share * inwards))
+        .into_iter();
+    near.find(|near| (near - limit) * inwards.signum() >= -slack)
+        .unwrap_or(limit)
 }
 
 /// What a file with other values would be refused for.
 pub(crate) struct Tried {
-    /// Relations.
+    /// Relations of fields.
     pub found: Vec<Found>,
+    /// The relation of the whole robot, or the parameter of the plant, if the rest was fit to ask.
+    pub whole: Option<&'static str>,
     /// Everything else.
     pub others: usize,
 }
@@ -128,6 +135,8 @@ pub(super) struct Search<'a> {
     before: BTreeSet<&'static str>,
     others: usize,
     attempt: &'a Try<'a>,
+    /// [`Tried::whole`] of the file as it is.
+    whole: OnceCell<Option<&'static str>>,
     /// Tries that are left for a relation, and for all.
     left: Cell<usize>,
     all_left: Cell<usize>,
@@ -140,8 +149,12 @@ impl<'a> Search<'a> {
             before: found.iter().map(|found| found.relation.name).collect(),
             others,
             attempt,
+            whole: OnceCell::new(),
             left: Cell::new(0),
-            all_left: Cell::new(ALL_TRIES),
+            all_left: Cell::new(match found.len() + others {
+                0..=MOST_WRONG => TRIES,
+                _ => 0,
+            }),
         }
     }
 
@@ -150,9 +163,10 @@ impl<'a> Search<'a> {
         self.left.get() == 0
     }
 
-    /// Sets of offers that are each accepted: of one field if there are any, otherwise of several.
-    pub(super) fn accepted(&self, broken: &Found) -> Vec<Vec<Offer>> {
-        self.left.set(TRIES.min(self.all_left.get()));
+    /// Sets of offers that are each accepted: of one field if there are any, otherwise of several. This
+    /// relation and the `relations` - 1 after it share the tries that are left.
+    pub(super) fn accepted(&self, broken: &Found, relations: usize) -> Vec<Vec<Offer>> {
+        self.left.set(self.all_left.get().div_ceil(relations));
         let offers = &broken.broken.offers;
         let (single, several): (Vec<_>, Vec<_>) = offers.iter().partition(|set| set.len() == 1);
         for sets in [single, several] {
@@ -184,8 +198,15 @@ impl<'a> Search<'a> {
             let name = found.relation.name;
             name == own || !self.before.contains(name)
         };
-        let mut found = tried.found.into_iter();
-        found.find(new).map_or(Answer::Accepted, Answer::Broken)
+        if let Some(next) = tried.found.into_iter().find(new) {
+            return Answer::Broken(next);
+        }
+        // What is as wrong without these values is not their fault.
+        let before = || (self.attempt)(&[]).and_then(|tried| tried.whole);
+        match tried.whole {
+            Some(whole) if *self.whole.get_or_init(before) != Some(whole) => Answer::Refused,
+            _ => Answer::Accepted,
+        }
     }
 
     /// Some of these added to others, and what the relations ask for that are broken by it.
@@ -251,4 +272,34 @@ pub(super) fn text(sets: &[Vec<Offer>]) -> String {
         all += &one;
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_is_printed_on_its_own_side() {
+        for limit in [
+            12_345_678.4,
+            12_345_671.4,
+            1.234_564e-5,
+            1.234_567_8e-5,
+            0.123_456_784_9,
+            31.25,
+        ] {
+            for limit in [limit, -limit] {
+                let (most, least) = (written(limit, Bound::UpTo), written(limit, Bound::From));
+                assert!(most <= limit + 1e-9 * limit.abs(), "{most} for {limit}");
+                assert!(least >= limit - 1e-9 * limit.abs(), "{least} for {limit}");
+                for value in [most, least] {
+                    assert!(
+                        (value - limit).abs() < 2e-5 * limit.abs(),
+                        "{value} for {limit}"
+                    );
+                    assert_eq!(pretty(value).parse(), Ok(value));
+                }
+            }
+        }
+    }
 }

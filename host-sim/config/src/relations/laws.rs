@@ -2,6 +2,7 @@
 
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{ParamError, Pattern};
+use wheeleg_master::layer1::square::GUARD_MM;
 
 use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
 use crate::gait::GaitParams;
@@ -104,53 +105,57 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         return None;
     };
     let seconds = |us: u32| pretty(f64::from(us) * 1e-6);
-    let [period, push] = [0, 1].map(|i| it.fields[i]);
+    let [period, push, stroke, speed, acceleration] = [0, 1, 2, 3, 4].map(|i| it.fields[i]);
     let (period_s, push_s) = (f.si(period)?, f.si(push)?);
     let needs_s = f64::from(needs_us) * 1e-6;
-    let offers = [
+    let mut offers = vec![
         Offer::new(f, period, Bound::From, push_s + needs_s),
         Offer::new(f, push, Bound::UpTo, period_s - needs_s),
     ];
-    Some(Broken {
-        figures: format!(
+    // The speed v at which a trapezoid takes the time t that there is: s/v + v/a = t.
+    let (s, a, t) = (f.si(stroke)?, f.si(acceleration)?, period_s - push_s);
+    let root = a * t * a * t - 4.0 * a * s;
+    if root >= 0.0 {
+        // A thousandth more, as the master counts in whole steps.
+        let v = 1.001 * 0.5 * (a * t - root.sqrt());
+        offers.push(Offer::new(f, speed, Bound::From, (v * 1e4).ceil() * 1e-4));
+    }
+    offered(
+        format!(
             "with this stroke, speed and acceleration it takes {} s, and there are {} s",
             seconds(needs_us),
             seconds(has_us)
         ),
-        offers: offers.map(|offer| vec![offer]).to_vec(),
-        words: "a faster push is allowed, too".to_owned(),
-    })
+        offers,
+    )
 }
 
-/// Height above the expected ground from which the master lowers a foot slowly, m. The fast way down
-/// to it takes time of its own, which depends on the air.
-const SLOW_WAY_M: f64 = 0.015;
-
-/// The slow way of a foot down to the ground ends before the push begins.
+/// The slow way of a foot down to the ground ends before the push begins. The fast way down to it takes
+/// time of its own, which depends on the air.
 pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [speed, lower, push] = [0, 1, 2].map(|i| it.fields[i]);
     let (speed_m_s, lower_s, push_s) = (f.si(speed)?, f.si(lower)?, f.si(push)?);
-    let has_s = push_s - lower_s;
+    let (has_s, slow_way_m) = (push_s - lower_s, GUARD_MM.to_f64() * 1e-3);
     // At 0 the reference jumps; a push before the lowering is told as such.
-    if speed_m_s <= 0.0 || has_s <= 0.0 || SLOW_WAY_M / speed_m_s < has_s {
+    if speed_m_s <= 0.0 || has_s <= 0.0 || slow_way_m / speed_m_s < has_s {
         return None;
     }
-    let needs_s = SLOW_WAY_M / speed_m_s;
-    let offers = [
-        Offer::new(f, speed, Bound::Above, SLOW_WAY_M / has_s),
+    let needs_s = slow_way_m / speed_m_s;
+    let offers = vec![
+        Offer::new(f, speed, Bound::Above, slow_way_m / has_s),
+        Offer::new(f, speed, Bound::At, 0.0).which_is("a jump of the reference"),
         Offer::new(f, push, Bound::Above, lower_s + needs_s),
         Offer::new(f, lower, Bound::Below, push_s - needs_s),
     ];
-    Some(Broken {
-        figures: format!(
+    offered(
+        format!(
             "the last {} mm take {} s, and there are {} s",
-            pretty(SLOW_WAY_M * 1e3),
+            pretty(GUARD_MM.to_f64()),
             brief(needs_s),
             brief(has_s)
         ),
-        offers: offers.map(|offer| vec![offer]).to_vec(),
-        words: "a speed of 0 is allowed, too: the reference jumps".to_owned(),
-    })
+        offers,
+    )
 }
 
 /// Of the three principal inertias of a body none exceeds the sum of the others: each is a
@@ -360,7 +365,7 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     Some(Broken {
         figures: sensor.told(measured, "mm"),
         offers: vec![sensor.calibrated(f, it)],
-        words: format!("strokes that a board takes are allowed from {range}"),
+        words: format!("a board takes strokes of {range}"),
     })
 }
 

@@ -2,8 +2,9 @@
 //!
 //! [`RELATIONS`] is the table. Each entry names its fields and says what they must be; a check
 //! sees the listed values of the file, so that it works beside sections that are wrong or
-//! missing. Those of the whole plant come last, where nothing else is wrong. A value that a refusal
-//! proposes has been tried on the whole file ([`advice`]).
+//! missing. Those of the whole plant come last, where nothing else is wrong. An [`Offer`] is told only
+//! if it was tried on the whole file ([`advice`]). What several fields decide together is told in words,
+//! which nobody tries.
 
 mod advice;
 mod board;
@@ -102,7 +103,15 @@ pub(crate) struct Read<'a> {
     pub robot: Option<&'a PlantParams>,
 }
 
-impl Facts<'_> {
+impl<'a> Facts<'a> {
+    fn of(r: &'a Reader, read: &'a Read<'a>) -> Self {
+        Self {
+            parameters: r.parameters(),
+            moved: read.moved.as_ref(),
+            axis: read.axis,
+        }
+    }
+
     fn info(&self, path: &str) -> Option<&ParameterInfo> {
         self.parameters.iter().find(|p| p.path == path)
     }
@@ -209,7 +218,7 @@ impl Relation {
         }
     }
 
-    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], cut_short: bool) {
+    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
@@ -217,11 +226,11 @@ impl Relation {
         let mut fields = self.fields.to_vec();
         fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         let allowed = match (advice::text(accepted), broken.words.as_str()) {
-            (offers, "") if offers.is_empty() && cut_short => {
+            (offers, "") if offers.is_empty() && untried => {
                 "what is allowed depends on other fields: mend what else is wrong first".to_owned()
             }
             (offers, "") if offers.is_empty() => {
-                "no value of one of them is allowed with the rest of the file".to_owned()
+                "no value of a single field is enough: the rest of the file refuses it".to_owned()
             }
             (offers, words) if offers.is_empty() => words.to_owned(),
             (offers, "") => offers,
@@ -231,63 +240,65 @@ impl Relation {
     }
 }
 
-/// Every relation that does not hold: of the listed values, of the cylinder with what it moves, and
-/// of the robot, if it is one.
-pub(crate) fn broken(r: &Reader, read: &Read<'_>) -> Vec<Found> {
-    let facts = Facts {
-        parameters: r.parameters(),
-        moved: read.moved.as_ref(),
-        axis: read.axis,
+/// Every relation that does not hold of the listed values and of the cylinder with what it moves.
+fn broken(facts: &Facts<'_>) -> Vec<Found> {
+    let found = |relation: &'static Relation| {
+        let broken = relation.check(facts)?;
+        Some(Found { relation, broken })
     };
-    let mut found: Vec<Found> = RELATIONS
-        .iter()
-        .filter_map(|relation| {
-            let broken = relation.check(&facts)?;
-            Some(Found { relation, broken })
-        })
-        .collect();
-    // What the others name, these would name less well: the first alone is told.
-    if let Some(robot) = read.robot.filter(|_| r.is_clean() && found.is_empty()) {
-        // A rest is looked for once, and only where a leg closes.
-        let at_rest = LazyCell::new(|| AtRest::new(&facts, robot));
-        found.extend(RELATIONS.iter().find_map(|relation| {
-            let broken = match relation.rule {
-                Rule::Whole(law) => law(robot),
-                Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
-                _ => None,
-            };
-            Some(Found {
-                relation,
-                broken: broken?,
-            })
-        }));
-    }
-    found
+    RELATIONS.iter().filter_map(found).collect()
+}
+
+/// The first relation that does not hold of the whole robot.
+fn broken_whole(facts: &Facts<'_>, robot: &PlantParams) -> Option<Found> {
+    // A rest is looked for once, and only where a leg closes.
+    let at_rest = LazyCell::new(|| AtRest::new(facts, robot));
+    RELATIONS.iter().find_map(|relation| {
+        let broken = match relation.rule {
+            Rule::Whole(law) => law(robot),
+            Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
+            _ => None,
+        }?;
+        Some(Found { relation, broken })
+    })
 }
 
 /// Reports every relation that does not hold, with values that the file would be accepted with.
 pub(crate) fn check(r: &mut Reader, read: &Read<'_>, attempt: &Try<'_>) {
-    let found = broken(r, read);
-    let search = Search::new(&found, r.problem_count(), attempt);
-    for one in &found {
-        let accepted = search.accepted(one);
-        one.relation
-            .report(r, &one.broken, &accepted, search.is_cut_short());
+    let facts = Facts::of(r, read);
+    let mut found = broken(&facts);
+    // What the others name, that of the whole robot would name less well.
+    if r.is_clean() && found.is_empty() {
+        found.extend(read.robot.and_then(|robot| broken_whole(&facts, robot)));
+    }
+    let others = r.problem_count();
+    let search = Search::new(&found, others, attempt);
+    for (at, one) in found.iter().enumerate() {
+        let accepted = search.accepted(one, found.len() - at);
+        let untried = search.is_cut_short() && found.len() + others > 1;
+        one.relation.report(r, &one.broken, &accepted, untried);
     }
 }
 
 /// What a file is refused for, to compare with the same file with other values in it.
 pub(crate) fn tried(
-    r: &mut Reader,
+    r: &Reader,
     read: &Read<'_>,
     built: impl FnOnce() -> Result<(), PlantError>,
 ) -> Tried {
-    let found = broken(r, read);
-    if r.is_clean() && found.is_empty() {
-        check_plant(r, built());
-    }
+    let facts = Facts::of(r, read);
+    let whole = || {
+        let relation = read.robot.and_then(|robot| broken_whole(&facts, robot));
+        relation.map(|found| found.relation.name).or_else(|| {
+            built().err().map(|error| match error {
+                PlantError::Parameter { name, .. } => name,
+                _ => "plant",
+            })
+        })
+    };
     Tried {
-        found,
+        found: broken(&facts),
+        whole: r.is_clean().then(whole).flatten(),
         others: r.problem_count(),
     }
 }

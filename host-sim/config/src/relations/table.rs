@@ -117,7 +117,7 @@ pub const RELATIONS: &[Relation] = &[
     above("reach before push", &["gait.push", "gait.reach"], IN_ORDER),
     above("lower before push", &["gait.push", "gait.lower"], IN_ORDER),
     above("push before the end", &["gait.period", "gait.push"], IN_ORDER),
-    law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push"], "a foot would still be on its slow way down when the push begins", laws::touchdown),
+    law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push"], "a foot would still be coming down slowly when the push begins", laws::touchdown),
     law("time to push", &["gait.period", "gait.push", "gait.stroke", "gait.push_speed", "gait.push_acceleration"], "the push does not end within its step", laws::push),
     // Bodies and what they touch.
     law("inertias of the chassis", &["spatial.chassis_roll_inertia", "body.chassis_pitch_inertia", "spatial.chassis_yaw_inertia"], NO_BODY, laws::chassis_inertias),

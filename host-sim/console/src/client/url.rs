@@ -3,6 +3,7 @@
 use std::io::{ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs as _};
 use std::sync::mpsc;
+use std::thread::Builder;
 use std::time::{Duration, Instant};
 
 use rustls::pki_types::ServerName;
@@ -143,13 +144,18 @@ impl Url {
     /// Addresses of the host. Whoever knows its name may take long to say so: the system's look-up has
     /// no deadline of its own, and goes on in a thread that nobody waits for.
     fn addresses(&self, end: Instant) -> Result<Vec<SocketAddr>, ConsoleError> {
+        if let Ok(address) = self.host.parse() {
+            return Ok(vec![address]);
+        }
         let (found, addresses) = mpsc::channel();
         let host = self.host.clone();
-        std::thread::spawn(move || {
+        let look_up = move || {
             let all = host.to_socket_addrs().map(Iterator::collect);
             // Nobody may listen any more.
             let _ = found.send(all);
-        });
+        };
+        let thread = Builder::new().spawn(look_up);
+        thread.map_err(|e| self.error(format!("no thread to look up the host: {e}")))?;
         let left = end.saturating_duration_since(Instant::now());
         match addresses.recv_timeout(left) {
             Ok(all) => all.map_err(|e| self.error(e)),
@@ -158,23 +164,28 @@ impl Url {
     }
 
     fn tcp(&self, end: Instant) -> Result<Timed, ConsoleError> {
-        let addresses = self.addresses(end)?;
-        let mut stream = Err(self.error("no such host"));
-        // `localhost` may have an address at which nobody listens before the right one.
-        for address in addresses {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(self.broken(ErrorKind::TimedOut.into()));
-            }
-            stream = TcpStream::connect_timeout(&address, left).map_err(|e| self.broken(e));
-            if stream.is_ok() {
-                break;
-            }
-        }
-        let stream = stream?;
+        let stream = connect(&self.addresses(end)?, end).map_err(|e| self.broken(e))?;
         stream.set_nodelay(true).map_err(|e| self.error(e))?;
         Ok(Timed::new(stream, PATIENCE, end))
     }
+}
+
+/// A connection to the first of these that answers. Each has its share of the time that is left: a
+/// firewall may keep silent for one of them, and `localhost` may have one at which nobody listens.
+fn connect(addresses: &[SocketAddr], end: Instant) -> std::io::Result<TcpStream> {
+    let mut stream = Err(std::io::Error::other("no such host"));
+    for (address, others) in addresses.iter().zip((1..=addresses.len()).rev()) {
+        let left = end.saturating_duration_since(Instant::now());
+        let share = left / u32::try_from(others).unwrap_or(u32::MAX);
+        if share.is_zero() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        stream = TcpStream::connect_timeout(address, share);
+        if stream.is_ok() {
+            break;
+        }
+    }
+    stream
 }
 
 /// A connection.
@@ -220,5 +231,27 @@ impl Write for Stream {
             Self::Plain(tcp) => tcp.flush(),
             Self::Tls(tls) => tls.flush(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    /// Of the addresses of a name one is behind a firewall: here, a server that accepts nothing while
+    /// others wait for it already.
+    #[test]
+    fn an_address_that_keeps_silent_leaves_time_for_the_next() {
+        let [silent, good] = [0, 1].map(|_| TcpListener::bind("127.0.0.1:0").expect("a port"));
+        let [silent_at, good_at] = [&silent, &good].map(|it| it.local_addr().expect("bound"));
+        let look = Duration::from_millis(100);
+        let waiting: Vec<TcpStream> =
+            std::iter::from_fn(|| TcpStream::connect_timeout(&silent_at, look).ok()).collect();
+        assert!(!waiting.is_empty());
+        let stream = connect(&[silent_at, good_at], Instant::now() + PATIENCE);
+        let reached = stream.expect("a connection").peer_addr();
+        assert_eq!(reached.expect("an address"), good_at);
     }
 }

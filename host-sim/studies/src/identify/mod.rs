@@ -158,7 +158,7 @@ pub struct Options<'a> {
 /// Identifies an axis, and writes report, figures, `summary.json`, [`AXIS`] and [`NEXT`].
 ///
 /// # Errors
-/// [`StudyError`] if a file is wrong, the plant cannot play the measurement, or something cannot
+/// [`StudyError`] if a file is wrong, the plant cannot follow the measurement, or something cannot
 /// be drawn or written.
 pub fn identify(
     options: &Options<'_>,
@@ -219,15 +219,15 @@ pub fn best(
     let stopped = progress.stopped(done, starts.len() as u64, "starts");
     let fits = fits.into_iter().flatten().flatten();
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = best.ok_or_else(|| unplayed(problem, "cannot play it"))?;
+    let best = best.ok_or_else(|| unplayed(problem, "the measurement", ""))?;
     Ok((best, stopped))
 }
 
 /// A measurement with which the plant of an axis does not do.
-fn unplayed(problem: &Problem<'_>, what: &str) -> StudyError {
+fn unplayed(problem: &Problem<'_>, what: &str, why: &str) -> StudyError {
     let Problem { file, lab, .. } = problem;
     StudyError::refused(
-        format!("{}: the plant of {file} {what}", lab.file),
+        format!("the plant of {file} cannot follow {what} {}{why}", lab.file),
         format!("check stroke, mass, load and supply in {file} against the bench"),
     )
 }
@@ -294,7 +294,8 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
     };
     let go_on = || !progress.is_stopped();
     let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
-    let leaves = || unplayed(problem, "leaves its range close to the best fit");
+    let why = ": it leaves its range close to the best fit";
+    let leaves = || unplayed(problem, "the measurement", why);
     let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
     let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
     Ok(Fitted {
@@ -331,7 +332,7 @@ impl Identified {
         } = fitted(&problem, options.seed, progress)?;
         let play = |axis: &AxisParams| {
             predict(axis, &lab, lab.on_us.len())
-                .map_err(|e| unplayed(&problem, &format!("cannot play the rest of it: {e}")))
+                .map_err(|e| unplayed(&problem, "the rest of the measurement", &format!(": {e}")))
         };
         let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
         let parameters = FREE.iter().zip(&fit.logs).zip(&told);

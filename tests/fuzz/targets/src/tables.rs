@@ -11,14 +11,12 @@ const LENGTH_MAX: usize = 16 * 1024;
 /// Changes of one file.
 const CHANGES: usize = 4;
 
-/// A file of this thread, in a folder of this process.
+/// A file of this thread of this process.
 fn file() -> PathBuf {
     let thread = format!("{:?}", std::thread::current().id());
     let thread: String = thread.chars().filter(char::is_ascii_alphanumeric).collect();
-    let folder = format!("wheeleg-fuzz-tables-{}", std::process::id());
-    let folder = std::env::temp_dir().join(folder);
-    fs::create_dir_all(&folder).expect("created");
-    folder.join(format!("{thread}.parquet"))
+    let process = std::process::id();
+    std::env::temp_dir().join(format!("wheeleg-fuzz-tables-{process}-{thread}.parquet"))
 }
 
 fn written(path: &Path, table: &Table, facts: &[(&str, &str)]) {

@@ -11,7 +11,7 @@ use crate::setpoint::Phase;
 
 /// Height above the expected ground from which on a foot is slow. A foot that stands is up to
 /// 4 mm lower than where it meets the ground, and the foot is to be slow for 10 mm.
-const GUARD_MM: PositionMm = PositionMm::from_int(15);
+pub const GUARD_MM: PositionMm = PositionMm::from_int(15);
 /// As near to the begin of the slow part a foot has arrived there.
 const ARRIVED_MM: PositionMm = PositionMm::from_int(3);
 
