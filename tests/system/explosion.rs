@@ -140,7 +140,7 @@ fn an_axis_that_explodes_names_time_cause_and_the_last_values() {
         for part in [
             "within 1 ms of ",
             " s: ",
-            "last sound values: stroke ",
+            "last valid values: stroke ",
             " bar",
         ] {
             assert!(what.contains(part), "{part}: {what}");

@@ -1,6 +1,5 @@
 //! Routes of the server: page, socket and HTTP API.
 
-use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,7 +20,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::foxglove::{self, Viewing};
-use crate::guard::{Hosts, Place};
+use crate::guard::{Hosts, Peer, Place};
 use crate::hex;
 use crate::hub::LONGEST_S;
 use crate::page::Page;
@@ -59,15 +58,6 @@ pub(crate) struct Server {
 /// The name under which a request asks.
 #[derive(Clone)]
 struct Host(String);
-
-/// Where a connection comes from.
-#[derive(Clone, Copy)]
-pub(crate) struct Peer {
-    /// The client's address.
-    pub(crate) ip: IpAddr,
-    /// It is on the robot's own computer.
-    pub(crate) is_local: bool,
-}
 
 /// The document of the HTTP API, OpenAPI 3.1.
 const OPENAPI: &str = include_str!("../openapi.json");

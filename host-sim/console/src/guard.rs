@@ -15,6 +15,15 @@ const WINDOW: Duration = Duration::from_secs(60);
 /// Addresses that are remembered.
 const ADDRESSES: usize = 1_024;
 
+/// Where a connection comes from.
+#[derive(Clone, Copy)]
+pub(crate) struct Peer {
+    /// The client's address.
+    pub(crate) ip: IpAddr,
+    /// It is on the robot's own computer.
+    pub(crate) is_local: bool,
+}
+
 /// Names under which the server answers.
 #[derive(Debug)]
 pub(crate) struct Hosts {

@@ -22,10 +22,10 @@ use tokio_rustls::TlsAcceptor;
 use wheeleg_config::{Drawing, Relief};
 use wheeleg_telemetry::channels;
 
-use crate::api::{self, Peer};
+use crate::api;
 use crate::error::ConsoleError;
 use crate::foxglove::{self, Viewers};
-use crate::guard::{Hosts, Places, WrongKeys, is_host, is_local, is_origin};
+use crate::guard::{Hosts, Peer, Places, WrongKeys, is_host, is_local, is_origin};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};

@@ -11,10 +11,9 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time::timeout;
 
-use crate::api::Peer;
 use crate::close::Close;
 use crate::door::{Door, Entered};
-use crate::guard::WrongKeys;
+use crate::guard::{Peer, WrongKeys};
 use crate::hex;
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;

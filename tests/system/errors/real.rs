@@ -186,7 +186,7 @@ fn robots(folder: &Path, all: &mut Vec<Driven>) {
     let words = vec![
         "the plant left its range at ",
         "in wheel ",
-        "last sound values",
+        "last valid values",
     ];
     all.push(("SimError::Unphysical", Box::new(exploded), words));
 
@@ -226,7 +226,7 @@ fn axes(all: &mut Vec<Driven>) {
         vec!["bore_m", "9"],
     ));
     let exploded = plant_check::check(&crate::explosion::heavy()).expect_err("it explodes");
-    let words = vec!["within 1 ms of ", "last sound values"];
+    let words = vec!["within 1 ms of ", "last valid values"];
     all.push(("AxisSimError::Unphysical", Box::new(exploded), words));
     let mut turned = plan;
     turned.gains.stroke_max = turned.gains.stroke_min;
