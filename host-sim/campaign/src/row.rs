@@ -103,7 +103,9 @@ pub(crate) const ERROR_MOST: usize = 400;
 /// What went wrong, cut where it is too long for a table.
 pub(crate) fn shortened(mut error: String) -> String {
     if error.len() > ERROR_MOST {
-        error.truncate(error.floor_char_boundary(ERROR_MOST - '…'.len_utf8()));
+        let room = ERROR_MOST - '…'.len_utf8();
+        let end = (0..=room).rfind(|end| error.is_char_boundary(*end));
+        error.truncate(end.unwrap_or(0));
         error.push('…');
     }
     error
