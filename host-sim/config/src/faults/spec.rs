@@ -468,8 +468,8 @@ mod tests {
                 "not implemented: there is no firmware update",
             ),
             ("master-silent=3@1s", "takes no value"),
-            ("master-silent@3", "no time"),
-            ("master-silent@-1s", "no time"),
+            ("master-silent@3", "not a time"),
+            ("master-silent@-1s", "not a time"),
             ("master-silent@3s..2s", "not after its begin"),
             ("valve-slow:joint1.fill@1s", "fill-a"),
             (

@@ -237,7 +237,10 @@ const ENDS: Duration = Duration::from_secs(3);
 /// Takes the control away, and waits until its holder has it no more.
 fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     let mut client = reach.control()?;
-    let holder = control(&mut client, |_| true)?;
+    let holder = match control(&mut client, |_| true) {
+        Ok(holder) => holder,
+        Err(unknown) => return reach.print_outcome(&unknown),
+    };
     if holder.is_null() {
         tell("nobody is in control");
         return reach.print_outcome(&Outcome::Done);
@@ -247,41 +250,32 @@ fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     if end != Outcome::Done {
         return reach.print_outcome(&end);
     }
-    let now = control(&mut client, |now| now["session"] != holder["session"])?;
-    if now["session"] == holder["session"] {
-        tell("the control is not free yet: is the clock paused?");
-        return reach.print_outcome(&Outcome::Unknown);
+    if let Err(unknown) = control(&mut client, |now| now["session"] != holder["session"]) {
+        tell("the control is still held: the simulation may be paused");
+        return reach.print_outcome(&unknown);
     }
     let name = holder["holder"].as_str().unwrap_or_default();
     tell(&plain(&format!("{name:?} is no longer in control")));
     reach.print_outcome(&Outcome::Done)
 }
 
-/// Who is in control, as soon as that is as wanted, or after [`ENDS`].
-fn control(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, StudyError> {
+/// Who is in control, as soon as the server reports that as it is wanted. [`Outcome::Unknown`]: it has not
+/// within [`ENDS`]; [`Outcome::Lost`]: the connection has ended.
+fn control(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, Outcome> {
     let begin = Instant::now();
-    let mut newest = None;
-    loop {
+    while begin.elapsed() < ENDS {
         match client.read() {
             Some(Incoming::Json(mut state)) if state["op"] == "state" => {
                 let control = state["control"].take();
                 if wanted(&control) {
                     return Ok(control);
                 }
-                newest = Some(control);
             }
-            Some(Incoming::Closed { reason, .. }) => {
-                return Err(StudyError::refused(
-                    format!("the connection has ended: {}", plain(&reason)),
-                    "is `wheeleg serve` still running?",
-                ));
-            }
+            Some(Incoming::Closed { .. }) => return Err(Outcome::Lost),
             _ => {}
         }
-        if begin.elapsed() >= ENDS {
-            return Ok(newest.unwrap_or_default());
-        }
     }
+    Err(Outcome::Unknown)
 }
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.

@@ -349,7 +349,6 @@ mod tests {
         root.build();
         let mut found = Vec::new();
         walk(&root, &[], &mut found);
-        println!("{found:#?}");
         for wanted in [
             "wheeleg ctl param get board",
             "wheeleg ctl step cycles",

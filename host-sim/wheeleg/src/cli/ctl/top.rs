@@ -48,9 +48,9 @@ struct Seen {
     samples: BTreeMap<&'static str, Map<String, Value>>,
     /// The newest last.
     events: VecDeque<String>,
-    /// A stop that was asked for, with the number of its request.
+    /// A stop that was asked for and is not confirmed: number of its first request, and when.
     stopping: Option<(u64, Instant)>,
-    /// It was refused, or not answered in time.
+    /// The last answer was a refusal.
     unconfirmed: bool,
 }
 
@@ -66,13 +66,14 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
     let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
     client.send(frame).map_err(refused)?;
     let stop = stop_on_signals()?;
+    // From here on a signal ends the loop, which gives the terminal back.
+    stop.begin();
     let Some(terminal) = Terminal::take() else {
         return Err(StudyError::refused(
-            "`ctl top` draws on a terminal, and this is none that it can draw on",
+            "`ctl top` needs a terminal with cursor control",
             "use `wheeleg ctl watch`, or `wheeleg ctl status`",
         ));
     };
-    stop.begin();
     let mut seen = Seen::default();
     let (mut heard, mut drawn) = (Instant::now(), None::<Instant>);
     let end = loop {
@@ -87,11 +88,8 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
         let mut leaves = false;
         for key in terminal.keys() {
             match key {
-                Key::Escape => {
-                    let n = client.send(json!({ "op": "stop" }));
-                    // Of a connection that has ended, nothing is confirmed.
-                    seen.stopping = Some((n.unwrap_or_default(), Instant::now()));
-                }
+                // Of a connection that has ended, nothing is confirmed.
+                Key::Escape => seen.stop(client.send(json!({ "op": "stop" })).unwrap_or_default()),
                 Key::Interrupt | Key::Letter('q') => leaves = true,
                 Key::Letter(_) => {}
             }
@@ -107,9 +105,16 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
             }
         }
     };
-    let unconfirmed = seen.is_unconfirmed();
+    // Whoever stops and leaves at once is told what came of it.
+    while seen.stopping.is_some() && !seen.is_unconfirmed() {
+        match client.read() {
+            Some(Incoming::Closed { .. }) => break,
+            Some(message) => seen.take(message),
+            None => {}
+        }
+    }
     drop(terminal);
-    if unconfirmed {
+    if seen.stopping.is_some() || seen.unconfirmed {
         return Ok(super::not_confirmed());
     }
     match end {
@@ -137,8 +142,9 @@ impl Seen {
                         .push_back(format!("{t_s:10.2} s  {}", plain(text)));
                 }
                 Some("answer") => {
-                    let asked = self.stopping.filter(|(n, _)| message["n"] == *n);
-                    if asked.is_some() {
+                    // Nothing but stops is asked for after the first of them.
+                    let n = message["n"].as_u64();
+                    if self.stopping.is_some_and(|(first, _)| n >= Some(first)) {
                         self.unconfirmed = message["status"] != "done";
                         self.stopping = None;
                     }
@@ -154,6 +160,11 @@ impl Seen {
             }
             Incoming::Closed { .. } => {}
         }
+    }
+
+    /// A stop is asked for. One after another, the first that is not answered counts.
+    fn stop(&mut self, n: u64) {
+        self.stopping.get_or_insert((n, Instant::now()));
     }
 
     /// Nobody has confirmed a stop, in the time that it has.
@@ -246,7 +257,7 @@ impl Seen {
         };
         let t_s = state["master_us"].as_f64().unwrap_or(0.0) * 1e-6;
         format!(
-            " {} | {of} {clock} | {mode} | {}, step {} | control: {holder} | {t_s:.2} s | Esc STOP  q leave ",
+            " Esc STOP | {mode} | {} | {of} {clock} | {}, step {} | control: {holder} | {t_s:.2} s | q leave ",
             word(&state["robot"]),
             word(&state["phase"]),
             state["step"].as_u64().unwrap_or(0),
@@ -267,7 +278,7 @@ impl Seen {
         let error = value("commanded_mm").zip(value("sensed_mm"));
         let error = error.map_or_else(
             || "-".to_owned(),
-            |(asked, sensed)| format!("{:.1}", sensed - asked),
+            |(asked, sensed)| format!("{:.1}", asked - sensed),
         );
         // Bit 0 fill A, 1 vent A, 2 fill B, 3 vent B.
         let open = value("valves_open").map(|bits| bits as u8);
@@ -300,7 +311,7 @@ impl Seen {
         let mut faults: Vec<(&Value, Vec<String>)> = Vec::new();
         for board in self.state["boards"].as_array().into_iter().flatten() {
             for fault in board["faults"].as_array().into_iter().flatten() {
-                let address = board["address"].to_string();
+                let address = board["address"].as_u64().unwrap_or_default().to_string();
                 match faults.iter_mut().find(|(known, _)| *known == fault) {
                     Some((_, boards)) => boards.push(address),
                     None => faults.push((fault, vec![address])),
@@ -364,7 +375,16 @@ mod tests {
             assert!(text.contains("board 1, 2, 3, 4, 5, 6, 7, 8: "), "{text}");
             assert!(text.contains("event 299"), "{text}");
             assert!(!text.contains("event 0\n"), "{text}");
-            assert!(!text.contains("old"), "{text}");
+            assert!(!text.contains("nothing new"), "{text}");
+            // What stops the robot is not cut off on a terminal of 80 columns.
+            let head = &lines[0].text;
+            assert!(
+                head.chars()
+                    .take(20)
+                    .collect::<String>()
+                    .contains("Esc STOP"),
+                "{head}"
+            );
         }
         let old = text(&seen.screen(Duration::from_secs(2), 24));
         assert!(old.contains("nothing new for 2.0 s"), "{old}");
@@ -390,6 +410,14 @@ mod tests {
         assert!(text(&seen.screen(Duration::ZERO, 24)).contains("CUT THE AIR"));
         seen.stopping = Some((9, Instant::now()));
         seen.take(answer(9, "done"));
+        assert!(!seen.is_unconfirmed());
+        // Esc that is held does not put off what is due to the first.
+        seen.stopping = Instant::now()
+            .checked_sub(2 * UNCONFIRMED)
+            .map(|since| (10, since));
+        seen.stop(11);
+        assert!(seen.is_unconfirmed());
+        seen.take(answer(11, "done"));
         assert!(!seen.is_unconfirmed());
         seen.stopping = Instant::now()
             .checked_sub(2 * UNCONFIRMED)
