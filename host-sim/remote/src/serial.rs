@@ -272,7 +272,7 @@ mod tests {
         assert_eq!((slow.port.as_str(), slow.baud), ("COM3", 115_200));
         for wrong in ["", "@9600", "COM3@fast", "COM3@0", "COM3@99999999"] {
             let error = HilOptions::parse(wrong).expect_err(wrong);
-            assert!(error.to_string().contains("no serial port"), "{error}");
+            assert!(error.to_string().contains("not a serial port"), "{error}");
         }
     }
 }

@@ -23,7 +23,7 @@ use wheeleg_console::{Live, Options, Protection, Server};
 
 const URDF: &str = "package://wheeleg/wheeleg.urdf";
 /// What is told at events alone, or once: a robot that stands may have no need of it.
-const SELDOM: [&str; 2] = ["/events", "/log"];
+const SELDOM: [&str; 3] = ["/events", "/log", "/session"];
 
 /// One viewer.
 struct Viewer(WebSocket<TcpStream>);

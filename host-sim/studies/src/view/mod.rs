@@ -273,8 +273,8 @@ mod tests {
         };
         for (options, word) in [
             (part(5.0, 6.0), "no sample"),
-            (part(2.0, 1.0), "no part"),
-            (part(f64::NAN, 1.0), "no part"),
+            (part(2.0, 1.0), "not part"),
+            (part(f64::NAN, 1.0), "not part"),
             (
                 Options {
                     signals: vec!["/joint/3.colour".to_owned()],

@@ -236,7 +236,7 @@ mod tests {
         );
         assert!(asked(&[]).expect("none").is_none());
         for (name, word) in [
-            ("force", "no signal"),
+            ("force", "not a signal"),
             ("/joint/9.force", "/joint/9"),
             ("/joint/3.speed", "no field `speed`"),
             ("/events.text", "text"),
