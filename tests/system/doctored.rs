@@ -171,7 +171,11 @@ fn tables_in_each_others_place_are_told_in_few_words() {
     let (code, text) = place.said(&["export", "parquet", "run", "--out", "log"]);
     assert_eq!(code, Some(0), "{text}");
     let other = ["campaign", "report", "log/body.parquet"];
-    place.refusal(&other, 2, &["log/body.parquet", "not a table of a campaign"]);
+    place.refusal(
+        &other,
+        2,
+        &["log/body.parquet", "not a table of a campaign"],
+    );
 }
 
 /// What another version kept is compared with what is played: a file of other combinations, or one

@@ -253,7 +253,7 @@ fn other_images_are_refused_by_the_handshake() {
         while end.read(&mut swallowed) > 0 && end.write(b"login: \0\0") {}
     });
     let error = said(&connect(&bench.options, "joint").expect_err("rubbish"));
-    assert!(error.contains("no message of the board link"), "{error}");
+    assert!(error.contains("not a message of the board link"), "{error}");
     drop(bench);
 
     // The same image of another version, and one that drives real outputs.

@@ -9,8 +9,8 @@ use wheeleg_master::contact::Side;
 use wheeleg_telemetry::{
     Attached, BehaviourSample, BodySample, BusSample, CONTACTS_HZ, Cause, Contact, Derive, Derived,
     FootSample, JointSample, LinkSample, LogFile, MasterSample, Put, Recorder, Recording,
-    SampleRef, SupplySample, Tables, Taken, WheelSample, attachments, channels, read, read_derived,
-    recover,
+    SampleRef, SupplySample, Tables, Taken, WheelSample, Written, attachments, channels, read,
+    read_derived, recover,
 };
 
 /// Three seconds of made-up but lively samples on every channel.
@@ -112,7 +112,9 @@ fn every_channel_has_name_unit_and_schema_and_every_message_fits_it() {
             }
         }
     }
-    let declared: BTreeSet<String> = channels().iter().map(|c| c.topic.to_owned()).collect();
+    // A run is not served: what a server alone has is not there.
+    let declared = channels().iter().filter(|c| c.written != Written::Live);
+    let declared: BTreeSet<String> = declared.map(|c| c.topic.to_owned()).collect();
     assert_eq!(topics, declared);
     assert_eq!(messages, recording.messages);
 }
