@@ -72,7 +72,7 @@ def test_load_and_mass_act():
         (lambda c: c.run([[0, 0, 0, 0]], [1.0, 2.0]), "load_n has 2 values, not 1"),
         (lambda c: c.run([[0, 0, 0, 0]], [float("nan")]), r"load_n\[0\] = NaN is outside"),
         (lambda c: setattr(c, "mass_kg", 0.0), "mass_kg = 0 is outside 0.02 to 200"),
-        (lambda c: c.restore(b"{}"), "no state of a cylinder"),
+        (lambda c: c.restore(b"{}"), "not a state of a cylinder"),
         (lambda c: wheeleg.Cylinder("bench-vq110u", seed=-1), "seed = -1 is outside 0 to 1844674"),
         (lambda c: wheeleg.Cylinder("bench-vq110u", seed=2**64), "seed = 18446744073709551616 is"),
         (lambda c: wheeleg.Cylinder("bench-vq110u", seed=10**50000), "seed = a number of very"),
