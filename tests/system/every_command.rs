@@ -235,7 +235,7 @@ impl Inputs {
 }
 
 /// Commands that neither write nor compute for long, and why they are not on the list.
-const BRIEF: [(&str, &str); 27] = [
+const BRIEF: [(&str, &str); 29] = [
     ("list", "prints"),
     ("params", "prints"),
     ("faults list", "prints"),
@@ -256,6 +256,11 @@ const BRIEF: [(&str, &str); 27] = [
         "ctl watch",
         "prints until it is stopped: `service` has its tests",
     ),
+    (
+        "ctl top",
+        "draws until it is left: `check_client.py` has its tests",
+    ),
+    ("ctl revoke", "asks a server"),
     ("ctl take", "asks a server"),
     ("ctl stop", "asks a server"),
     ("ctl inject", "asks a server"),
