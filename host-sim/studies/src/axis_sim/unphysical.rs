@@ -25,7 +25,7 @@ pub(super) fn tick(
             AxisSimError::Unphysical {
                 what: format!(
                     "the axis left the range of its model within 1 ms of {:.3} s: {error}; last \
-                     sound values: stroke {:.2} mm, speed {:.1} mm/s, pressures {a_bar:.3} and \
+                     valid values: stroke {:.2} mm, speed {:.1} mm/s, pressures {a_bar:.3} and \
                      {b_bar:.3} bar",
                     time_ns as f64 * 1e-9,
                     motion.stroke_m * 1e3,
