@@ -198,7 +198,9 @@ fn a_limit_on_the_size_of_files_ends_no_command_without_a_message() {
             .arg(inputs.path(&format!("limited-{number}")))
             .output()
             .expect("start");
-        let said = String::from_utf8_lossy(&output.stderr);
+        // Lines of a message may break anywhere.
+        let said = String::from_utf8_lossy(&output.stderr).replace('│', " ");
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         let code = output.status.code().expect("a code");
         let told = format!("{:?}: {code}, {said}", tried.arguments);
         tried_commands += 1;
