@@ -161,7 +161,7 @@ fn a_disk_that_fills_under_any_command_is_told() {
                 assert!(stdout.contains("passed"), "{stdout}, {told}");
             }
             if arguments[0] == "replay" {
-                assert!(stdout.contains("to the bit") || refused, "{told}");
+                assert!(stdout.contains("bit-identical") || refused, "{told}");
             }
         }
     }
