@@ -155,7 +155,8 @@ def top(command, environment, robot):
     terminal = Terminal(command, **environment)
     terminal.shows("left vertical")
     terminal.process.terminate()
-    assert terminal.end() == 143
+    code = terminal.end()
+    assert code == 143, f"{code}: {terminal.text[-300:]!r}"
     # What cannot be drawn on is not.
     terminal = Terminal(command, **{**environment, "TERM": "dumb"})
     terminal.shows("ctl watch")

@@ -278,7 +278,11 @@ impl Client {
             }
             Ok(_) => return None,
             Err(tungstenite::Error::Io(e))
-                if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                if matches!(
+                    e.kind(),
+                    // A signal of this program ends a read, too, not the connection.
+                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+                ) =>
             {
                 return None;
             }
