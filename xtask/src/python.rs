@@ -4,6 +4,7 @@
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
@@ -22,17 +23,13 @@ pub(crate) fn steps(report: &mut Report) {
     let wheeleg = target_dir().join("release").join("wheeleg");
     report.step("python: tests of the package", || {
         rust::build(&["--bin", "wheeleg"])?;
-        let told = figures(
+        print_figures(
             command(&python)
                 .args(["-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider"])
                 .arg(Path::new(PACKAGE).join("tests"))
                 .env("WHEELEG", &wheeleg),
-            |line| line.starts_with("python: "),
-        )?;
-        for figure in told {
-            println!("    {figure}");
-        }
-        Ok(())
+            "python: ",
+        )
     });
     report.step("python: notebooks", || {
         run(command(&python)
@@ -54,35 +51,35 @@ pub(crate) fn steps(report: &mut Report) {
             fs::remove_dir_all(&folder)?;
         }
         fs::create_dir_all(&folder)?;
-        let told = figures(
+        print_figures(
             command(&python)
                 .arg("tests/python/check_fmu.py")
                 .arg(&wheeleg)
                 .arg(target_dir().join("release/deps/libwheeleg_fmu.so"))
                 .arg(&folder),
-            |line| line.starts_with("fmu: "),
-        )?;
-        for figure in told {
-            println!("    {figure}");
-        }
-        Ok(())
+            "fmu: ",
+        )
     });
 }
 
 /// `wheeleg identify` comes to the cost that SciPy's least squares finds over the package's plant.
-fn identification(python: &Path, wheeleg: &Path) -> StepResult<()> {
+fn identification(python: &Path, wheeleg: &Path) -> StepResult {
     let folder = target_dir().join("xtask").join("identify");
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
-    let found = figures(
+    print_figures(
         command(python)
             .arg("tests/python/check_identify.py")
             .arg(wheeleg)
             .arg(&folder),
-        |line| line.starts_with("identify: "),
-    )?;
-    for figure in found {
+        "identify: ",
+    )
+}
+
+/// Runs a check and prints the lines of its output that have figures: they begin with its name.
+fn print_figures(check: &mut Command, name: &str) -> StepResult {
+    for figure in figures(check, |line| line.starts_with(name))? {
         println!("    {figure}");
     }
     Ok(())

@@ -10,7 +10,7 @@ use common::{assert_all, report};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::{
-    Advised, AxisConfig, ConfigError, ParameterInfo, RELATIONS, Relation, RobotConfig,
+    Advised, AxisConfig, ConfigError, ParameterInfo, Problem, RELATIONS, Relation, RobotConfig,
 };
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
@@ -466,11 +466,7 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
         panic!("{}", report(&error))
     };
     assert!(problem.to_string().contains("friction"), "{problem}");
-    let paths: Vec<&str> = problem
-        .advice()
-        .iter()
-        .map(|set| set[0].path.as_str())
-        .collect();
+    let paths = first_paths(problem);
     assert_eq!(
         paths,
         ["numerics.step", "moving.mass"],
@@ -480,6 +476,12 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
     let Advised { path, value, unit } = &problem.advice()[0][0];
     let mended = with(&text, path, &format!("{value:?}"), unit);
     AxisConfig::parse("my.toml", &mended).expect("accepted with that step");
+}
+
+/// The field that each set of advised values begins with.
+fn first_paths(problem: &Problem) -> Vec<&str> {
+    let sets = problem.advice().iter();
+    sets.map(|set| set[0].path.as_str()).collect()
 }
 
 /// Each of two mistakes has its own remedy, though the file with one of them mended is still refused.
@@ -493,11 +495,7 @@ fn advice_is_given_beside_an_independent_mistake_of_the_whole_robot() {
     let [problem] = error.problems() else {
         panic!("{}", report(&error))
     };
-    let paths: Vec<&str> = problem
-        .advice()
-        .iter()
-        .map(|set| set[0].path.as_str())
-        .collect();
+    let paths = first_paths(problem);
     assert_eq!(paths, ["gait.push", "gait.reach"], "{}", report(&error));
 }
 
@@ -509,11 +507,7 @@ fn a_push_that_is_far_too_slow_is_told_the_speed_that_does() {
     let [problem] = error.problems() else {
         panic!("{}", report(&error))
     };
-    let paths: Vec<&str> = problem
-        .advice()
-        .iter()
-        .map(|set| set[0].path.as_str())
-        .collect();
+    let paths = first_paths(problem);
     assert_eq!(paths, ["gait.push_speed"], "{}", report(&error));
 }
 
