@@ -19,12 +19,9 @@ import traceback
 from pathlib import Path
 
 import check_console
-from check_console import FLAGS, Console, becomes_ready, cell, expect, opened, press, problems, waits, walks
+from check_console import FLAGS, Console, Robot, becomes_ready, cell, expect, opened, press, problems, reported, waits, walks
 from playwright.sync_api import sync_playwright
 from relay import Relay
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "host-sim/console/python"))
-from wheeleg import Robot
 
 # The browser comes by this address, so that its line can be tampered with.
 NEAR = "127.0.0.2"
@@ -264,8 +261,8 @@ def main(program, folder, _axe=None):
         finally:
             console.end()
             browser.close()
-    if problems:
-        print("\n".join(problems))
+    if problems or reported:
+        print("\n".join(problems + reported))
         sys.exit(1)
     assert threading.active_count() < 4
     print("lines, servers, views and time went, and nothing moved unseen")
