@@ -1,5 +1,7 @@
 //! What a campaign costs beside its simulations: the first row of a plan of 1,000,000 cases, the
 //! making of a case, parts, merge, report. Prints times and memory.
+//!
+//! `cargo run --release -p wheeleg-campaign --example large [ROWS]`; without a number, 4,096 rows.
 
 use std::time::Instant;
 
@@ -10,7 +12,7 @@ use wheeleg_config::plan::{Plan, Sources};
 use wheeleg_studies::analysis::Analyser;
 use wheeleg_studies::study::Stop;
 
-/// Cases that get a row.
+/// Cases that get a row, unless the command line asks for another number.
 const ROWS: u64 = 4096;
 
 /// A result without a simulation.
@@ -51,6 +53,9 @@ fn peak_mb() -> f64 {
 }
 
 fn main() {
+    let rows = std::env::args().nth(1).map_or(ROWS, |rows| {
+        rows.parse().expect("a number of rows, an even one")
+    });
     let folder = tempfile::tempdir().expect("a folder");
     let options = |first| Options {
         shard: Shard::ALL,
@@ -80,13 +85,13 @@ fn main() {
         "making a case: {:.2} ms",
         begun.elapsed().as_secs_f64() * 1e3 / 200.0
     );
-    let small = plan(ROWS / 2);
+    let small = plan(rows / 2);
     let cases = Cases::new(&small).expect("a plan");
     let folder = tempfile::tempdir().expect("a folder");
     let store = Store::create(folder.path(), PlanFile::of(&small, 10.0)).expect("a folder");
     let begun = Instant::now();
-    run(&store, &cases, &options(ROWS), &computed).expect("it runs");
-    let each_ms = begun.elapsed().as_secs_f64() * 1e3 / ROWS as f64;
+    run(&store, &cases, &options(rows), &computed).expect("it runs");
+    let each_ms = begun.elapsed().as_secs_f64() * 1e3 / rows as f64;
     println!("a row with all but its simulation: {each_ms:.2} ms");
     let table = folder.path().join("cases.parquet");
     let begun = Instant::now();
