@@ -40,4 +40,5 @@ engine! {
     files: 2_000, 4_000;
     written: 500, 2_000;
     tables: 2_000, 300;
+    console: 5_000, 2_000;
 }
