@@ -13,8 +13,8 @@ pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
     json!({
         "op": "event",
         "t_ns": t_ns,
-        "kind": event.kind,
-        "code": event.code,
+        "kind": event.kind.name(),
+        "code": event.code.name(),
         "detail": event.detail,
         "board": event.board,
         "fault": event.fault,
