@@ -290,7 +290,7 @@ impl Session {
                 now_s: world.now_ns() as f64 * 1e-9,
                 joint,
                 board: board.snapshot(),
-                account: board.motion_account(),
+                account: board.node.motion_account(),
                 cylinder,
             });
         }
