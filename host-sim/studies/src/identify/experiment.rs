@@ -3,7 +3,7 @@
 use super::fit::Problem;
 use super::free::Logs;
 use super::lab::{Lab, Sample};
-use super::told::{ignorance, information};
+use super::intervals::{ignorance, information};
 
 /// Length of a sequence \[ms\].
 const TICKS: usize = 4000;
