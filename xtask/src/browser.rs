@@ -40,10 +40,10 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
             let install = format!("apt-get install -y {CHROMIUM}");
             return Err(StepError::missing(CHROMIUM, install));
         }
-        rust::build(&["--bin", "wheeleg"])?;
+        let wheeleg = rust::build_wheeleg()?;
         run(command(tools::python()?)
             .arg("tests/python/check_view.py")
-            .arg(target_dir().join("release").join("wheeleg"))
+            .arg(wheeleg)
             .arg(std::path::absolute(run_dir)?.join("log.mcap"))
             .arg(target_dir().join("view-shots"))
             .arg(axe()?))?;
@@ -68,11 +68,9 @@ fn console(check: &str) -> StepResult<Command> {
 
 /// A check in Python of the program, which is built for it.
 fn of_program(check: &str) -> StepResult<Command> {
-    rust::build(&["--bin", "wheeleg"])?;
+    let wheeleg = rust::build_wheeleg()?;
     let mut python = command(tools::python()?);
-    python
-        .arg(check)
-        .arg(target_dir().join("release").join("wheeleg"));
+    python.arg(check).arg(wheeleg);
     Ok(python)
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::process::{cargo, command, figures, root, run, target_dir};
+use crate::process::{cargo, command, empty_folder, figures, root, run, step_folder, wheeleg};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -62,12 +62,9 @@ const SHIPPED: [Shipped; 3] = [
 /// The shipped plans, cut short, their tables and their SQL in DuckDB.
 pub(crate) fn steps(report: &mut Report) {
     report.step("campaign: the shipped SQL in DuckDB", || {
-        let folder = target_dir().join("xtask").join("campaign");
-        if folder.exists() {
-            fs::remove_dir_all(&folder)?;
-        }
-        fs::create_dir_all(&folder)?;
-        rust::build(&["--bin", "wheeleg"])?;
+        let folder = step_folder("campaign");
+        empty_folder(&folder)?;
+        rust::build_wheeleg()?;
         for shipped in &SHIPPED {
             ask(shipped, &folder)?;
         }
@@ -76,7 +73,7 @@ pub(crate) fn steps(report: &mut Report) {
 }
 
 fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
-    let wheeleg = target_dir().join("release").join("wheeleg");
+    let wheeleg = wheeleg();
     let campaigns = root().join("host-sim/campaigns");
     let mut plan = fs::read_to_string(campaigns.join(format!("{}.toml", shipped.plan)))
         .context("the shipped plan")?;

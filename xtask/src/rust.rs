@@ -1,6 +1,8 @@
 //! Format, lints and host tests.
 
-use crate::process::{cargo, run};
+use std::path::PathBuf;
+
+use crate::process::{cargo, run, wheeleg};
 use crate::report::StepResult;
 
 /// All that needs neither boards nor an emulator's build tools: what `cargo xtask pil` builds is
@@ -18,6 +20,12 @@ pub(crate) fn build(targets: &[&str]) -> anyhow::Result<()> {
         .args(["build", "--locked", "--release", "--test", "determinism"])
         .args(HOST)
         .args(targets))
+}
+
+/// Builds our program; its path.
+pub(crate) fn build_wheeleg() -> anyhow::Result<PathBuf> {
+    build(&["--bin", "wheeleg"])?;
+    Ok(wheeleg())
 }
 
 /// The format of every crate.

@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::no_std::Way;
-use crate::process::{root, target_dir};
+use crate::process::{empty_folder, remove_folder, root, target_dir};
 use crate::qemu;
 use crate::report::StepResult;
 use crate::runs::{ensure_equal, most, put_most, run_nodes};
@@ -199,8 +199,8 @@ pub(super) fn mixed(emulator: &Path, images: &Path, way: Way) -> StepResult<Valu
     qemu::emulator()?;
     let folder = target_dir().join("pil-run").join("mixed");
     let both = folder.join("images");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&both).with_context(|| both.display().to_string())?;
+    remove_folder(&folder)?;
+    empty_folder(&both)?;
     // The program looks for all images in one folder.
     let on_qemu = qemu::images(way)?;
     let wanted = [(images, "joint.elf"), (images, "wheel.elf")]
