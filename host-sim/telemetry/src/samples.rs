@@ -441,7 +441,7 @@ samples! {
         shifts: u32, "1", 0, Host;
         /// Clients and viewers that are connected.
         clients: u32, "1", 0, Host;
-        /// Samples since the start that the clients could not be told, because the server did not keep up.
+        /// Samples since the start that were not sent to clients, because the server could not keep up.
         dropped: u32, "1", 0, Host;
     }
 
@@ -455,9 +455,9 @@ samples! {
         by: String, "text", 0, Host;
         /// Fault that begins or ends.
         fault: String, "text", 0, Host;
-        /// Simulated over wall time that is asked for, from now on; not a number: as fast as it goes.
+        /// Requested ratio of simulated to wall time, from now on; not a number: as fast as possible.
         speed: f64, "1", 3, Host;
-        /// Whether the clock stands, from now on.
+        /// Whether the clock is paused, from now on.
         paused: bool, "flag", 0, Host;
         /// What was given, for a person: a command with its arguments.
         text: String, "text", 0, Host;
