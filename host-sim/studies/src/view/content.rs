@@ -66,13 +66,10 @@ impl LoggedEvent {
 
     /// Whether several boards may do the same at one time.
     fn is_change_of_board(&self) -> bool {
-        let code = self.code;
-        code.is_some_and(|code| {
-            matches!(
-                code,
-                EventCode::Mode | EventCode::FaultLatched | EventCode::FaultsCleared
-            )
-        })
+        matches!(
+            self.code,
+            Some(EventCode::Mode | EventCode::FaultLatched | EventCode::FaultsCleared)
+        )
     }
 
     /// Whether it is the same change of another board.
