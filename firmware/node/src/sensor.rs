@@ -151,7 +151,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Another calibration: the sensor has to prove itself anew. Until it does, the last good
+    /// Another calibration: the sensor has to prove itself again. Until it does, the last good
     /// position stands.
     pub fn restart(&mut self) {
         *self = Self {

@@ -251,7 +251,7 @@ impl Session {
     /// # Errors
     /// [`SimError::Simulation`] if the fault cannot begin beside those under way, or is to end
     /// and is not under way; nothing has changed then. [`SimError::Remote`] if a board elsewhere
-    /// refuses it, or one that starts anew.
+    /// refuses it, or one that restarts.
     pub fn inject(
         &mut self,
         fault: &FaultSpec,

@@ -43,7 +43,7 @@ pub struct Questions {
     quiet: u8,
 }
 
-/// Whether a board has started anew between two replies.
+/// Whether a board has restarted between two replies.
 pub(super) fn has_started(before: Option<&SlotReply>, reply: &SlotReply) -> bool {
     reply.mode == NodeMode::Boot && before.is_some_and(|b| b.mode != NodeMode::Boot)
 }

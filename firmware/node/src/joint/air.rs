@@ -273,7 +273,7 @@ impl Content {
         };
         // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
         let mut sum = i64::from(p).wrapping_mul(i64::from(shrinks));
-        // Of a valve of which nothing is ever certain the rounds begin anew after 15.
+        // Of a valve of which nothing is ever certain the rounds restart after 15.
         let mut next = 0;
         if open & 0xFFFF != 0 {
             let (time, sure, rounds) = taken(open, model.slow);
@@ -304,7 +304,7 @@ impl Content {
 ///
 /// Only the sum of a round is known. Where a valve that is open for certain is shut and energised
 /// again inside one round, the second pulse counts as certain, too: at most 2 ms of air that may
-/// not be there, in this round alone, because after one that is not whole the count begins anew.
+/// not be there, in this round alone, because after one that is not whole the count restarts.
 #[inline(always)]
 fn taken(open: u32, slow: u32) -> (u32, u32, u32) {
     let time = open & TIME;

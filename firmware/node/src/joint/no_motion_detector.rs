@@ -227,7 +227,7 @@ impl MotionWatch {
     }
 
     /// A tick in which the valves are not the law's, open for `on`: the air is followed, nothing
-    /// is expected, and loads have to be learnt anew afterwards.
+    /// is expected, and loads have to be learnt again afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         let third = self.air.follow(on, position, &model.air, false);
