@@ -4,7 +4,7 @@
 use anyhow::Context;
 use clap::Args;
 
-use crate::process::{cargo, figures, output, run, target_dir};
+use crate::process::{cargo, command, figures, output, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::{browser, campaign, fuzz, mutants, pil, record, rust, tools};
 
@@ -243,17 +243,8 @@ fn off_data() -> StepResult<String> {
 fn field() -> StepResult<String> {
     let claims = ["sand-flat", "sand-slope-20", "rocks-30"];
     let printed = output(
-        cargo()
-            .args([
-                "run",
-                "--locked",
-                "--release",
-                "--quiet",
-                "-p",
-                "wheeleg",
-                "--",
-                "field",
-            ])
+        command(rust::build_wheeleg()?)
+            .arg("field")
             .args(claims)
             .args(["--seeds", "100", "--out", "target/deep/field"]),
     )?;
@@ -313,22 +304,9 @@ fn behaviours() -> StepResult<String> {
 }
 
 fn identification() -> StepResult<String> {
-    let found = figures(
-        cargo()
-            .args([
-                "test",
-                "--locked",
-                "--release",
-                "--package",
-                "wheeleg-studies",
-            ])
-            .args(["--test", "identify", "--", "--exact", "--nocapture"])
-            .arg("intervals_have_the_truth_about_as_often_as_they_say")
-            .env("WHEELEG_IDENTIFY_CYLINDERS", "100"),
-        |line| line.contains("identify: "),
-    )?;
-    let first = found.into_iter().next();
-    Ok(first.context("no line with `identify: `")?)
+    let test = "intervals_have_the_truth_about_as_often_as_they_say";
+    let amount = ("WHEELEG_IDENTIFY_CYLINDERS", 100);
+    measured(["identify", test], amount, "identify: ")
 }
 
 fn long_run() -> StepResult<String> {
