@@ -7,8 +7,9 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::process::{cargo, command, empty_folder, figures, root, run, step_folder, wheeleg};
+use crate::process::{command, empty_folder, root, run, step_folder, wheeleg};
 use crate::report::{Report, StepResult};
+use crate::rust::measured;
 use crate::{rust, tools};
 
 /// A shipped plan, with its questions in SQL beside it: how it is cut short for the suite, and the rows that are left.
@@ -108,16 +109,11 @@ fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
 /// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash. Then
 /// Slurm.
 pub(crate) fn deep() -> StepResult<String> {
-    let found = figures(
-        cargo()
-            .args(["test", "--locked", "--release", "--package", "wheeleg"])
-            .args(["--test", "campaign", "--", "--exact", "--nocapture"])
-            .arg("however_it_is_run_the_table_is_the_same")
-            .env("WHEELEG_CAMPAIGN_SAMPLES", "100")
-            .env("WHEELEG_CAMPAIGN_KILLS", "20"),
-        |line| line.contains("campaign: "),
-    )?;
-    let first = found.into_iter().next();
-    let shared = first.context("no line with `campaign: `")?;
+    let test = "however_it_is_run_the_table_is_the_same";
+    let amounts = [
+        ("WHEELEG_CAMPAIGN_SAMPLES", 100),
+        ("WHEELEG_CAMPAIGN_KILLS", 20),
+    ];
+    let shared = measured(["campaign", test], &amounts, "campaign: ")?;
     Ok(format!("{shared}; {}", slurm::check()?))
 }
