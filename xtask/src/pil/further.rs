@@ -83,7 +83,8 @@ fn ensure_reported(events: &str, what: &Reported) -> anyhow::Result<()> {
     let mut rows = lines.map(|line| line.split(',').collect::<Vec<_>>());
     let found = rows.any(|row| match what {
         Reported::Fault(number) => {
-            row.get(code) == Some(&"fault_latched") && row.get(fault) == Some(&&*number.to_string())
+            let is_it = |fault: &&str| fault.parse() == Ok(*number);
+            row.get(code) == Some(&"fault_latched") && row.get(fault).is_some_and(is_it)
         }
         Reported::Restart => {
             row.get(code) == Some(&"diagnosis") && row.get(detail) == Some(&"reset")
