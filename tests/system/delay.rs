@@ -10,7 +10,7 @@ use wheeleg_config::builtin;
 use wheeleg_plant::testing::wheeleg_2003_axis;
 use wheeleg_studies::delay::trial::{Law, Start};
 use wheeleg_studies::delay::{
-    EARLY_LIMIT_MM, PREVIEW_LIMIT_S, Options, PAPER_BAND_S, PAPER_DELAY_S, Study, axis_of, study,
+    EARLY_LIMIT_MM, Options, PAPER_BAND_S, PAPER_DELAY_S, PREVIEW_LIMIT_S, Study, axis_of, study,
 };
 
 /// One study for all tests: few seeds, the shipped robot.

@@ -174,7 +174,11 @@ fn fault_free() -> Vec<Scenario> {
     // Walks of such robots still trip "no motion" now and then: docs/records/known-shortfalls.md.
     let fault_free = fault_free.filter(|s| !matches!(s.motion, Motion::Walk(_)));
     let fault_free: Vec<_> = fault_free.collect();
-    assert!(fault_free.len() >= 7, "{} scenarios without faults", fault_free.len());
+    assert!(
+        fault_free.len() >= 7,
+        "{} scenarios without faults",
+        fault_free.len()
+    );
     fault_free
 }
 

@@ -445,9 +445,7 @@ fn parameters_reach_the_image_and_impossible_ones_are_refused() {
         bytes
     };
     let row = &wheeleg_protocol::param::JOINT_PARAMS[0];
-    let reply = board
-        .ask(&store(&record(row.id, row.max)))
-        .expect("answer");
+    let reply = board.ask(&store(&record(row.id, row.max))).expect("answer");
     assert_eq!(reply, Reply::Done);
     for wrong in [record(row.id, row.max + 1), record(0xEEEE, 0), vec![1; 16]] {
         let reply = board.ask(&store(&wrong)).expect("answer");

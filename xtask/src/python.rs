@@ -8,7 +8,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::process::{command, empty_folder, figures, remove_folder, root, run, step_folder, target_dir, wheeleg};
+use crate::process::{
+    command, empty_folder, figures, remove_folder, root, run, step_folder, target_dir, wheeleg,
+};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 

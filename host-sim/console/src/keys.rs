@@ -103,7 +103,9 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
             path,
             format!("is not a key: a key is {DIGITS} hexadecimal digits"),
         )),
-        Some(bytes) if bytes == [0; 32] => Err(wrong(path, "is not a key: it is all zeros".to_owned())),
+        Some(bytes) if bytes == [0; 32] => {
+            Err(wrong(path, "is not a key: it is all zeros".to_owned()))
+        }
         Some(bytes) => Ok(Key::new(bytes)),
     }
 }

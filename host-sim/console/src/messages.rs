@@ -37,7 +37,11 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
         Answer::Accepted | Answer::Done => done(n, time_us),
         Answer::Rejected(why) => rejected(why),
         Answer::Refused(why) => rejected(&Reject::Refused(*why)),
-        Answer::Paused => refused(n, Reason::Paused, "the simulation is paused: resume it first"),
+        Answer::Paused => refused(
+            n,
+            Reason::Paused,
+            "the simulation is paused: resume it first",
+        ),
         Answer::SeenInFuture => refused(
             n,
             Reason::SeenInFuture,

@@ -259,7 +259,10 @@ impl Repeated {
             Input::Command(command) => {
                 let order = command.spoken.order().map_err(|bad| bad.text)?;
                 let Order::Robot(order) = order else {
-                    return Err(format!("{} is not a command of the robot", command.spoken.cmd));
+                    return Err(format!(
+                        "{} is not a command of the robot",
+                        command.spoken.cmd
+                    ));
                 };
                 let request = Request {
                     client: OPERATOR_CLIENT,

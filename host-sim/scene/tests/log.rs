@@ -8,8 +8,8 @@ use wheeleg_config::{RobotConfig, builtin};
 use wheeleg_plant::robot::{Inputs, Outputs, Plant};
 use wheeleg_scene::{Scene, urdf};
 use wheeleg_telemetry::{
-    BodySample, Contact, ContactBody, Derive, Derived, EventCode, EventKind, EventSample, JointSample, Taken,
-    WheelSample, channels,
+    BodySample, Contact, ContactBody, Derive, Derived, EventCode, EventKind, EventSample,
+    JointSample, Taken, WheelSample, channels,
 };
 
 fn robot() -> RobotConfig {
@@ -370,7 +370,13 @@ fn an_event_has_the_level_of_what_it_means() {
             3,
             "command",
         ),
-        (EventKind::Command, EventCode::ServiceRefused, 8, 3, "wheel 8"),
+        (
+            EventKind::Command,
+            EventCode::ServiceRefused,
+            8,
+            3,
+            "wheel 8",
+        ),
         (EventKind::Command, EventCode::CommandDone, 0, 2, "command"),
         (EventKind::Info, EventCode::GaitDone, 0, 2, "info"),
     ] {

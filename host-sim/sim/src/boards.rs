@@ -77,11 +77,10 @@ impl Clone for JointBoard {
         let sensor = self.sensor.copy();
         let foot = self.foot.each_ref().map(Line::copy);
         let valves = self.valves.each_ref().map(PwmChannel::copy);
-        let node = self.node.clone().on_hardware(
-            bank(&valves),
-            sensor.clone(),
-            feet(self.address, &foot),
-        );
+        let node =
+            self.node
+                .clone()
+                .on_hardware(bank(&valves), sensor.clone(), feet(self.address, &foot));
         Self {
             node,
             address: self.address,

@@ -149,7 +149,8 @@ impl Observer {
                 air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
                 dump_commanded: left_wheel.is_some_and(WheelBoard::dumps),
                 dump_open: out.dumping,
-                pressure_switch: left_wheel.is_some_and(|board| board.node.snapshot().supply_present),
+                pressure_switch: left_wheel
+                    .is_some_and(|board| board.node.snapshot().supply_present),
             },
         );
         if recorder.wants_contacts(t_ns) {

@@ -72,9 +72,9 @@ pub(crate) struct Cause {
 impl Cause {
     fn of(event: &FaultEvent) -> Self {
         let row = match event.code {
-            Some(EventCode::FaultLatched) => event
-                .fault
-                .map(|fault| (fault.sentence(), fault.remedy())),
+            Some(EventCode::FaultLatched) => {
+                event.fault.map(|fault| (fault.sentence(), fault.remedy()))
+            }
             Some(EventCode::Finding) => {
                 finding_of_name(&event.detail).map(|finding| (finding.sentence(), finding.remedy()))
             }
@@ -159,7 +159,14 @@ mod tests {
     fn what_follows_from_a_fault_is_none_of_its_own() {
         let fault = Fault::SensorRange;
         let latched = |ms, joint, fault| {
-            event(ms, EventCode::FaultLatched, "", Some(fault), Some(joint), "")
+            event(
+                ms,
+                EventCode::FaultLatched,
+                "",
+                Some(fault),
+                Some(joint),
+                "",
+            )
         };
         let hold = |ms, reason: HoldReason| {
             let text = "master: all axes hold: so";
@@ -195,14 +202,14 @@ mod tests {
             let all = one.iter().cloned().chain([another.clone()]);
             let (cause, count) = first(all).expect("a cause");
             assert_eq!(count, expected, "{another:?}");
-            assert_eq!(cause.headline, "joint 3: the position sensor reads outside its range");
+            assert_eq!(
+                cause.headline,
+                "joint 3: the position sensor reads outside its range"
+            );
         }
         let lost = hold(10, HoldReason::OperatorLost);
         let (cause, _) = first([lost].into_iter()).expect("a cause");
-        assert_eq!(
-            sentence(&cause, 1),
-            "master: all axes hold: so, at 0.01 s"
-        );
+        assert_eq!(sentence(&cause, 1), "master: all axes hold: so, at 0.01 s");
         assert_eq!(first(std::iter::empty()), None);
     }
 

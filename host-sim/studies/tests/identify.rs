@@ -6,9 +6,9 @@ use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
+use wheeleg_studies::identify::intervals::{covers, undetermined};
 use wheeleg_studies::identify::lab::Lab;
 use wheeleg_studies::identify::map::Mapped;
-use wheeleg_studies::identify::intervals::{covers, undetermined};
 use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
 use wheeleg_studies::study::{Progress, Settings};
 

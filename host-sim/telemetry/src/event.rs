@@ -13,8 +13,8 @@ use wheeleg_protocol::{
 };
 
 use crate::samples::EventSample;
-pub(crate) use names::parameter_name;
 pub use code::{EventCode, EventKind};
+pub(crate) use names::parameter_name;
 pub use names::{finding_of_name, hold_name, reject_name};
 use names::{master_board, master_code, master_detail, master_kind, side_name, snake_case};
 
@@ -407,11 +407,7 @@ mod tests {
         let sample = refused.sample();
         assert_eq!(
             (sample.kind, sample.code, &*sample.detail),
-            (
-                EventKind::Command,
-                EventCode::CommandRefused,
-                "board_busy"
-            )
+            (EventKind::Command, EventCode::CommandRefused, "board_busy")
         );
         assert_eq!((sample.board, sample.command), (8, 0x0132));
 

@@ -180,7 +180,10 @@ pub(crate) fn drag_of(recording: &Recording, geometry: &WalkGeometry) -> f64 {
 
 /// 0 if the robot stands at the end, has said that it is stuck, and no board has latched a fault.
 pub(super) fn not_ended_safely(recording: &Recording) -> f64 {
-    let told = recording.events.iter().any(|e| e.v.cause.code() == EventCode::Stuck);
+    let told = recording
+        .events
+        .iter()
+        .any(|e| e.v.cause.code() == EventCode::Stuck);
     let mut codes = recording.events.iter().map(|e| e.v.cause.code());
     let latched = codes.any(|code| code == EventCode::FaultLatched);
     let end = recording.body.last().map_or(0.0, Row::t_s);

@@ -116,8 +116,7 @@ fn with_faults(emulator: &Path, images: &Path, folder: &str, robot: &str) -> Ste
         )?;
         ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
         let events = target_dir().join(&folder).join("csv/events.csv");
-        let events =
-            fs::read_to_string(&events).with_context(|| events.display().to_string())?;
+        let events = fs::read_to_string(&events).with_context(|| events.display().to_string())?;
         for what in reported {
             ensure_reported(&events, what).with_context(|| format!("{scenario} {faults:?}"))?;
         }

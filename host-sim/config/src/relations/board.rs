@@ -4,9 +4,9 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 
 use super::Broken;
+use crate::derived::{DERIVED, limits};
 use crate::quantity::{brief, suffix};
 use crate::reader::range;
-use crate::derived::{DERIVED, limits};
 
 /// A quantity that is made of several fields, within the limits of the board's parameter.
 pub(super) fn within_limits(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {

@@ -5,10 +5,10 @@ use wheeleg_master::layer1::params::{ParamError, Pattern};
 use wheeleg_master::layer1::square::GUARD_MM;
 
 use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
+use crate::derived::STEPS_AT_REST;
 use crate::gait::GaitParams;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
-use crate::derived::STEPS_AT_REST;
 
 /// Shares of its track between which a wiper stands: beyond, a board takes it for torn off or
 /// shorted. As a commissioned board is told.

@@ -30,7 +30,8 @@ impl Inner {
             return;
         };
         if client.role != Role::Control {
-            let text = "the view key allows viewing and stopping only; connect with the control key";
+            let text =
+                "the view key allows viewing and stopping only; connect with the control key";
             return self.tell(id, &refused(n, Reason::Role, text));
         }
         let now = Instant::now();

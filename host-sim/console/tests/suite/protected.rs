@@ -131,7 +131,10 @@ fn plain_http_from_elsewhere_lets_look_and_stop_and_takes_no_key() {
     let url = rig.url("http");
     let refused = Client::connect(&url, "control", "driver", &rig.keys.control);
     let error = refused.err().expect("refused").to_string();
-    assert!(error.contains("control is refused over plain HTTP"), "{error}");
+    assert!(
+        error.contains("control is refused over plain HTTP"),
+        "{error}"
+    );
     // Keys in clear open nothing, and the lists need none.
     let key = format!("Authorization: Bearer {}\r\n", rig.keys.control.to_hex());
     for path in ["state", "events", "recordings"] {

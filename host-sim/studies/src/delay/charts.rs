@@ -4,7 +4,7 @@ use wheeleg_report::plot::Colour;
 
 use super::preview::Previewed;
 use super::trial::{LEAD_S, Law, Outcome, Start};
-use super::{EARLY_LIMIT_MM, PREVIEW_LIMIT_S, PAPER_BAND_S, PAPER_DELAY_S, Study};
+use super::{EARLY_LIMIT_MM, PAPER_BAND_S, PAPER_DELAY_S, PREVIEW_LIMIT_S, Study};
 use wheeleg_report::plot::{Axis, Content, Figure, Panel, RasterRow, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;

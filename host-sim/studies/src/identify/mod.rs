@@ -8,11 +8,11 @@
 pub mod experiment;
 pub mod fit;
 pub mod free;
+pub mod intervals;
 pub mod lab;
 pub mod map;
 mod page;
 mod predict;
-pub mod intervals;
 
 use std::path::Path;
 
@@ -29,10 +29,10 @@ use wheeleg_plant::sensors::AdcNoise;
 use self::experiment::Experiment;
 use self::fit::{Fit, Noise, Problem, scatter, trust};
 use self::free::{COUNT, FREE, Logs, applied};
+use self::intervals::Interval;
 use self::lab::Lab;
 use self::map::Mapped;
 use self::predict::{Predicted, predict};
-use self::intervals::Interval;
 use crate::StudyError;
 use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};

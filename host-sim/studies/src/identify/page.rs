@@ -101,7 +101,11 @@ pub(super) fn render(
     identified: &Identified,
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
-    let determined = identified.parameters.iter().filter(|p| p.determined).count();
+    let determined = identified
+        .parameters
+        .iter()
+        .filter(|p| p.determined)
+        .count();
     let explained = if identified.is_explained() {
         "the held-out data are matched within three times the sensor's noise"
     } else {

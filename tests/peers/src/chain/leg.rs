@@ -6,10 +6,10 @@
 
 use wheeleg_kinematics::{LegGeometry, LegLengths, LegParameters, LegPosture};
 
+use super::finite;
 use super::link::{End, LinkParams, Py, Pz, Rz};
 use super::model::{Fixed, floats};
 use super::tree::Rates;
-use super::finite;
 use wheeleg_plant::dynamics::{BodyParams, DynamicsError, LegBodies};
 
 /// Origins and products are zero, the mass centre is anywhere.

@@ -92,7 +92,8 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
         )
     })?;
     if reach.json {
-        let answer = json!({ "board": board, "parameter": parameter, "value": value, "unit": unit });
+        let answer =
+            json!({ "board": board, "parameter": parameter, "value": value, "unit": unit });
         return print(&format!("{answer}\n"));
     }
     print(&match unit {
@@ -130,7 +131,11 @@ mod tests {
         assert_eq!(reported(&all, 1, "b"), Some((&json!(2.5), "1")));
         assert_eq!(reported(&all, 2, "a"), Some((&json!(1), "mm")));
         for (board, parameter) in [(2, "b"), (3, "a"), (1, "c")] {
-            assert_eq!(reported(&all, board, parameter), None, "{board} {parameter}");
+            assert_eq!(
+                reported(&all, board, parameter),
+                None,
+                "{board} {parameter}"
+            );
         }
         assert_eq!(reported(&json!({}), 1, "a"), None);
     }
