@@ -396,7 +396,10 @@ mod tests {
             let url = url(exposed);
             assert!(url.is_exposed(), "{exposed}");
             let error = http(&url, "GET", "state", &Key::new([7; 32])).expect_err("refused");
-            assert!(error.to_string().contains("could be intercepted"), "{error}");
+            assert!(
+                error.to_string().contains("could be intercepted"),
+                "{error}"
+            );
         }
         for wrong in ["robot", "http://robot", "https://robot:x", "http://a/b:1"] {
             assert!(Url::parse(wrong).is_err(), "{wrong}");

@@ -26,6 +26,9 @@ const BRIDGE_COUNTS: u16 = 100;
 
 type Valves = FourValves<PwmChannel, PwmChannel, PwmChannel, PwmChannel>;
 type Feet = FootSwitches<Line, Line, Line, Line>;
+type Bridge = HBridge<PwmChannel, Line>;
+type Supply = Fitted<SupplySwitch<Line>>;
+type Dump = Fitted<DumpPin<Line>>;
 
 /// Hardware that not every board of a kind has.
 #[derive(Clone)]
@@ -228,12 +231,7 @@ impl JointBoard {
 
 /// One wheel board; the first one has the supply switch and the dump valve.
 pub(crate) struct WheelBoard {
-    pub(super) node: WheelNode<
-        HBridge<PwmChannel, Line>,
-        CounterInput,
-        Fitted<SupplySwitch<Line>>,
-        Fitted<DumpPin<Line>>,
-    >,
+    pub(super) node: WheelNode<Bridge, CounterInput, Supply, Dump>,
     encoder: CounterInput,
     /// Quadrature edges at which the counter stood at 0.
     count_zero: i64,
