@@ -12,7 +12,7 @@ use wheeleg_config::{RobotConfig, Scenario, builtin};
 use wheeleg_master::behaviour::Behaviour;
 use wheeleg_report::stats::mcnemar;
 use wheeleg_studies::analysis::analyse;
-use wheeleg_telemetry::{Recording, Row};
+use wheeleg_telemetry::{EventCode, Recording, Row};
 
 /// Variable for the number of seeds of every pair.
 const SEEDS: &str = "WHEELEG_BEHAVIOUR_SEEDS";
@@ -189,13 +189,13 @@ fn a_walk_without_layer_1_comes_to_a_stand_and_its_behaviours_go_on() {
             .map(|t| (t.id, t.value))
             .collect();
         assert!(missed.is_empty(), "seed {seed}: {missed:?}\n{story}");
-        let told = |code: &str, from_s: f64| {
+        let told = |code: EventCode, from_s: f64| {
             let all = recording.events.iter();
             let at =
                 |e: &&Row<wheeleg_telemetry::Event>| e.t_s() >= from_s && e.v.cause.code() == code;
             all.filter(at).map(Row::t_s).next()
         };
-        let hold = told("hold", 0.0).expect("it is told");
+        let hold = told(EventCode::Hold, 0.0).expect("it is told");
         assert!((5.08..=5.14).contains(&hold), "{hold}\n{story}");
         // It stands 0.6 s after the freeze, on both feet, and no board has latched a fault.
         let stands = sil::window(&recording.body, 5.7, 6.9);
@@ -210,15 +210,15 @@ fn a_walk_without_layer_1_comes_to_a_stand_and_its_behaviours_go_on() {
             let (least, _) = sil::range(loads, |v| v.normal_force_n);
             assert!(least > 1.0, "seed {seed}: {least} N\n{story}");
         }
-        assert!(told("fault_latched", 0.0).is_none(), "{story}");
+        assert!(told(EventCode::FaultLatched, 0.0).is_none(), "{story}");
         // The ground sinks: within two cycles of the 50 ms that make it lost, a leg follows.
         let open = recording.feet.iter().map(|foot| {
             let rows = sil::window(foot, 7.0, 7.5).iter();
             rows.clone().find(|r| r.v.switches == 0).map(Row::t_s)
         });
         let opens = open.flatten().fold(f64::INFINITY, f64::min);
-        let lost = told("lost_ground", 7.0).unwrap_or(f64::INFINITY);
-        let tips = told("tip_guard", 7.0).unwrap_or(f64::INFINITY);
+        let lost = told(EventCode::LostGround, 7.0).unwrap_or(f64::INFINITY);
+        let tips = told(EventCode::TipGuard, 7.0).unwrap_or(f64::INFINITY);
         println!("frozen seed {seed}: opens {opens:.3}, followed {lost:.3}, tip guard {tips:.3}");
         // 50 ms and two cycles after it opens; one more to sense and one to log.
         assert!(
@@ -257,7 +257,7 @@ fn a_pit_below_a_foothold_is_searched_and_passed() {
         let deep = recording.events.iter().filter(|e| {
             matches!(
                 e.v.cause.code(),
-                "late_ground" | "lost_ground" | "no_ground"
+                EventCode::LateGround | EventCode::LostGround | EventCode::NoGround
             )
         });
         assert!(deep.count() > 0, "the foot found the pit");

@@ -396,7 +396,7 @@ fn the_start_from_home_and_what_a_preview_does() {
         assert!(m.early_mm <= 1.0, "{m:?}");
     }
     let (without, _) = home(&pushing, 0.0);
-    // It is the notice that does it: the air of a full chamber needs its time.
+    // It is the preview that does it: the air of a full chamber needs its time.
     assert!(without.start_delay_s.expect("moves") > 0.09, "{without:?}");
 }
 

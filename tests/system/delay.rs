@@ -10,7 +10,7 @@ use wheeleg_config::builtin;
 use wheeleg_plant::testing::wheeleg_2003_axis;
 use wheeleg_studies::delay::trial::{Law, Start};
 use wheeleg_studies::delay::{
-    EARLY_LIMIT_MM, NOTICED_LIMIT_S, Options, PAPER_BAND_S, PAPER_DELAY_S, Study, axis_of, study,
+    EARLY_LIMIT_MM, Options, PAPER_BAND_S, PAPER_DELAY_S, PREVIEW_LIMIT_S, Study, axis_of, study,
 };
 
 /// One study for all tests: few seeds, the shipped robot.
@@ -80,11 +80,11 @@ fn an_announced_move_starts_at_once_and_not_before() {
     for row in preview.of(Law::Default, Start::HomeHeld) {
         let delay_s = row.delay_s.expect("moves");
         if row.preview_s >= 0.4 {
-            assert!(delay_s <= NOTICED_LIMIT_S, "{row:?}");
+            assert!(delay_s <= PREVIEW_LIMIT_S, "{row:?}");
             // A tick, t_on and the wave are 9 ms; nothing starts before the command.
             assert!(delay_s > 0.009, "{row:?}");
         } else if row.preview_s == 0.0 {
-            // It is the notice that does it.
+            // It is the preview that does it.
             assert!(row.median_s.is_some_and(|m| m > 0.1), "{row:?}");
         }
         assert!(row.early_mm <= EARLY_LIMIT_MM, "{row:?}");
@@ -92,13 +92,13 @@ fn an_announced_move_starts_at_once_and_not_before() {
     // Measured 0.2 s; the air of a full chamber cannot leave in less than 0.1 s.
     let enough = preview.enough_s(Start::HomeHeld).expect("some is enough");
     assert!((0.1..=0.3).contains(&enough), "{enough}");
-    // From a settled rest no notice is needed.
+    // From a settled rest no preview is needed.
     assert_eq!(preview.enough_s(Start::HomeRest), Some(0.0));
     // Under loads of 30 N either way 0.4 s are enough too.
     for row in preview.rows.iter().filter(|r| r.law == Law::Default) {
         assert!(row.preview_s < 0.4 || row.meets(), "{row:?}");
     }
-    // The paper's law does not look ahead: notice changes nothing.
+    // The paper's law does not look ahead: preview changes nothing.
     let paper: Vec<_> = preview.of(Law::Paper, Start::HomeHeld).collect();
     assert_eq!(paper.len(), 2);
     assert_eq!(paper[0].delay_s, paper[1].delay_s);
@@ -266,7 +266,7 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
     for forbidden in ["http:", "https:", "src=", "@import", "url("] {
         assert!(!links.contains(forbidden), "{forbidden}");
     }
-    for id in ["starts", "home", "ablation", "scaling", "notice"] {
+    for id in ["starts", "home", "ablation", "scaling", "preview"] {
         assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
         let svg = fs::read_to_string(out.join(format!("figures/{id}.svg"))).expect("SVG");
         assert!(svg.starts_with("<svg") && svg.len() > 3_000, "{id}");
@@ -278,7 +278,7 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
         "predictions",
         "scaling",
         "bores",
-        "notice",
+        "preview",
     ] {
         let text = fs::read_to_string(out.join(format!("csv/{table}.csv"))).expect("CSV");
         assert!(text.lines().count() > 2, "{table}");

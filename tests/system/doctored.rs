@@ -466,7 +466,7 @@ fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
     for answer in [&b"\x00\xff\x00\xff\r\n\r\n"[..], page] {
         let address = server(answer, none);
         let ctl = ["ctl", "--url", &address, "--key", "key", "pause"];
-        place.refusal(&ctl, 2, &[&address, "no console of Wheeleg"]);
+        place.refusal(&ctl, 2, &[&address, "not a Wheeleg console"]);
     }
     let silent = server(b"", none);
     let ctl = ["ctl", "--url", &silent, "--key", "key", "pause"];

@@ -168,14 +168,18 @@ fn loaded(number: u64, which: u64) -> Scenario {
 }
 
 /// Every scenario in which nothing goes wrong.
-fn sound() -> Vec<Scenario> {
+fn fault_free() -> Vec<Scenario> {
     let all = builtin::SCENARIOS.iter().map(|(name, ..)| scenario(name));
-    let sound = all.filter(|s| s.events.is_empty() && s.faults.is_empty());
+    let fault_free = all.filter(|s| s.events.is_empty() && s.faults.is_empty());
     // Walks of such robots still trip "no motion" now and then: docs/records/known-shortfalls.md.
-    let sound = sound.filter(|s| !matches!(s.motion, Motion::Walk(_)));
-    let sound: Vec<_> = sound.collect();
-    assert!(sound.len() >= 7, "{} scenarios without faults", sound.len());
-    sound
+    let fault_free = fault_free.filter(|s| !matches!(s.motion, Motion::Walk(_)));
+    let fault_free: Vec<_> = fault_free.collect();
+    assert!(
+        fault_free.len() >= 7,
+        "{} scenarios without faults",
+        fault_free.len()
+    );
+    fault_free
 }
 
 fn number(variable: &str, default: u64) -> u64 {
@@ -186,14 +190,14 @@ fn number(variable: &str, default: u64) -> u64 {
 #[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_on_a_robot_off_its_data() {
     let (first, robots) = (number(FIRST_VARIABLE, 1), number(ROBOTS_VARIABLE, 3));
-    let sound = sound();
+    let fault_free = fault_free();
     let mut runs = 0;
     let mut alarms = Vec::new();
     let mut most: Option<(String, Seen)> = None;
     for drawn in first..first + robots {
         let robot = off_its_data(drawn);
         let loads = (0..LOADS).map(|which| loaded(drawn, which));
-        for scenario in sound.iter().cloned().chain(loads) {
+        for scenario in fault_free.iter().cloned().chain(loads) {
             runs += 1;
             let what = format!("robot {drawn}, {}", scenario.name);
             let walk = walk(&scenario, &robot, drawn);

@@ -28,7 +28,7 @@ const START_MS: u64 = 40;
 const SAVE_MS: u64 = 35;
 const PARAMETER: JointParam = JointParam::FollowingError;
 
-/// An emulated joint board and its partner on the bus.
+/// An emulated joint board and the master on its bus.
 struct BoardBench {
     board: Board,
     now_ns: u64,

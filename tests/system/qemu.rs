@@ -38,10 +38,10 @@ fn image(name: &str) -> PathBuf {
 }
 
 fn board(name: &str) -> Transport<Qemu> {
-    let mut partner = Qemu::transport(&QemuOptions::new(image(name))).expect("QEMU starts");
-    let hello = partner.hello().expect("the image answers");
+    let mut board = Qemu::transport(&QemuOptions::new(image(name))).expect("QEMU starts");
+    let hello = board.hello().expect("the image answers");
     assert_eq!(format!("qemu-{}", hello.image.name), name);
-    partner
+    board
 }
 
 fn said(error: &RemoteError) -> String {
@@ -51,17 +51,17 @@ fn said(error: &RemoteError) -> String {
 
 #[test]
 fn the_loop_closed_by_the_emulated_board_is_that_of_the_host_bit_for_bit() {
-    let mut partner = board("qemu-joint");
-    closed_loop_as_the_host(|request| partner.ask(request).expect("the image answers"));
+    let mut board = board("qemu-joint");
+    closed_loop_as_the_host(|request| board.ask(request).expect("the image answers"));
 }
 
 #[test]
 fn two_runs_are_equal_down_to_the_stack() {
     let run = || {
-        let mut partner = board("qemu-joint");
+        let mut board = board("qemu-joint");
         let mut replies = Vec::new();
         let _ = closed_loop(1_100, |request| {
-            let reply = partner.ask(request).expect("the image answers");
+            let reply = board.ask(request).expect("the image answers");
             replies.push(reply.clone());
             reply
         });
@@ -122,8 +122,8 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
         assert_eq!(ask(&predictive()), Reply::Done);
         script(&SCRIPT, 3_000, ask)
     };
-    let mut partner = board("qemu-joint");
-    let there = run(&mut |request| partner.ask(request).expect("the image answers"));
+    let mut board = board("qemu-joint");
+    let there = run(&mut |request| board.ask(request).expect("the image answers"));
     let pins = JointPins::default();
     let mut session = Session::<RemoteJoint<'_>>::new(&pins, "this process", 0);
     let here = run(&mut |request| session.answer(request, &mut NoTime));
@@ -135,9 +135,9 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
 
     let mut life = eventful_life(3, 4_000, 99);
     life.insert(0, predictive());
-    let mut partner = board("qemu-joint");
+    let mut board = board("qemu-joint");
     for (i, (request, here)) in life.iter().zip(answers_here(3, &life)).enumerate() {
-        let there = without_figures(partner.ask(request).expect("the image answers"));
+        let there = without_figures(board.ask(request).expect("the image answers"));
         assert!(
             there == here,
             "request {i}: here  {here:?}\nthere {there:?}"
@@ -429,7 +429,7 @@ fn a_wheel_that_lost_its_supply_counts_from_zero_again() {
 
 #[test]
 fn parameters_reach_the_image_and_impossible_ones_are_refused() {
-    let mut partner = board("qemu-joint");
+    let mut board = board("qemu-joint");
     let store = |bytes: &[u8]| {
         Request::Store(Nonvolatile {
             offset: 0,
@@ -445,15 +445,13 @@ fn parameters_reach_the_image_and_impossible_ones_are_refused() {
         bytes
     };
     let row = &wheeleg_protocol::param::JOINT_PARAMS[0];
-    let reply = partner
-        .ask(&store(&record(row.id, row.max)))
-        .expect("answer");
+    let reply = board.ask(&store(&record(row.id, row.max))).expect("answer");
     assert_eq!(reply, Reply::Done);
     for wrong in [record(row.id, row.max + 1), record(0xEEEE, 0), vec![1; 16]] {
-        let reply = partner.ask(&store(&wrong)).expect("answer");
+        let reply = board.ask(&store(&wrong)).expect("answer");
         assert!(matches!(reply, Reply::Refused(_)), "{reply:?}");
     }
-    let wheel = partner.ask(&power_up(7)).expect("answer");
+    let wheel = board.ask(&power_up(7)).expect("answer");
     assert!(matches!(wheel, Reply::Refused(_)), "{wheel:?}");
 }
 
@@ -472,13 +470,13 @@ fn a_missing_emulator_or_image_is_named_with_the_command_that_brings_it() {
 #[test]
 fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
     // Killed from outside.
-    let mut partner = board("qemu-joint");
-    partner.ask(&power_up(1)).expect("answer");
-    let id = partner.stream().id();
+    let mut board = board("qemu-joint");
+    board.ask(&power_up(1)).expect("answer");
+    let id = board.stream().id();
     let killed = Command::new("kill").args(["-9", &id.to_string()]).status();
     assert!(killed.expect("kill").success());
     let error = loop {
-        if let Err(error) = partner.ask(&power_up(1)) {
+        if let Err(error) = board.ask(&power_up(1)) {
             break said(&error);
         }
     };
@@ -491,18 +489,18 @@ fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
     // An image that never answers here: it listens to its UART.
     let mut options = QemuOptions::new(image("qemu-hil-joint"));
     options.patience = Duration::from_millis(600);
-    let mut partner = Qemu::transport(&options).expect("starts");
-    let id = partner.stream().id();
-    let error = said(&partner.hello().expect_err("silence"));
+    let mut board = Qemu::transport(&options).expect("starts");
+    let id = board.stream().id();
+    let error = said(&board.hello().expect_err("silence"));
     assert!(error.contains("did not answer"), "{error}");
-    drop(partner);
+    drop(board);
     assert!(!Path::new(&format!("/proc/{id}")).exists(), "still there");
 
     // Dropped in mid-session.
-    let partner = board("qemu-wheel");
-    let id = partner.stream().id();
+    let board = board("qemu-wheel");
+    let id = board.stream().id();
     assert!(Path::new(&format!("/proc/{id}")).exists());
-    drop(partner);
+    drop(board);
     assert!(!Path::new(&format!("/proc/{id}")).exists(), "still there");
 }
 
@@ -540,9 +538,9 @@ fn a_bench_board_on_the_emulated_uart_closes_the_loop_over_its_port() {
         .find(|word| word.starts_with("/dev/"))
         .unwrap_or_else(|| panic!("no port in `{line}`"));
     let options = HilOptions::parse(port).expect("a port");
-    let (mut partner, hello) = connect(&options, "joint").expect("a joint board");
+    let (mut board, hello) = connect(&options, "joint").expect("a joint board");
     assert!(hello.host.contains("HIL"), "{hello:?}");
-    let trace = closed_loop(300, |request| partner.ask(request).expect("an answer"));
+    let trace = closed_loop(300, |request| board.ask(request).expect("an answer"));
     let pins = JointPins::default();
     let mut here = Session::<RemoteJoint<'_>>::new(&pins, "", 0);
     let expected = closed_loop(300, |request| here.answer(request, &mut NoTime));
@@ -553,7 +551,7 @@ fn a_bench_board_on_the_emulated_uart_closes_the_loop_over_its_port() {
     // The emulator dies in mid-run.
     drop(emulator);
     let error = loop {
-        if let Err(error) = partner.ask(&power_up(1)) {
+        if let Err(error) = board.ask(&power_up(1)) {
             break said(&error);
         }
     };

@@ -89,7 +89,7 @@ fn faults_page() {
     for (name, why) in NOT_IMPLEMENTED {
         row(&mut body, &[&format!("`{name}`"), why]);
     }
-    let intro = "Faults that can be put into any run: `--fault NAME[:TARGET][=VALUE]@TIME[..TIME]`. \
+    let intro = "Faults that can be injected into any run: `--fault NAME[:TARGET][=VALUE]@TIME[..TIME]`. \
                  `wheeleg faults list` prints the same.";
     page("faults.md", "Faults", intro, &body);
 }

@@ -175,6 +175,7 @@ const ARROWS: [(&str, &[&str]); 31] = [
         &[
             "wheeleg-console",
             "wheeleg-control",
+            "wheeleg-kinematics",
             "wheeleg-plant",
             "wheeleg-protocol",
             "wheeleg-units",

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-use crate::process::{cargo, command, output, root, run, target_dir};
+use crate::process::{cargo, command, output, root, run, step_folder, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::tools::have;
 use crate::{rust, tools};
@@ -85,15 +85,15 @@ struct Program {
 pub(crate) fn steps(report: &mut Report, options: &Options) {
     if let Some(Of::Console) = options.of {
         report.step("bench: console", || {
-            rust::build(&["--bin", "wheeleg"])?;
+            let wheeleg = rust::build_wheeleg()?;
             run(command(tools::python()?)
                 .arg("tests/python/bench_console.py")
-                .arg(target_dir().join("release").join("wheeleg")))?;
+                .arg(wheeleg))?;
             Ok(())
         });
         return;
     }
-    let folder = target_dir().join("xtask").join("peers");
+    let folder = step_folder("peers");
     let references = report.step("bench: compile the C references", || {
         compile(&folder, &["-O3", "-march=native"])
     });
@@ -196,7 +196,7 @@ fn build(target_cpu: Option<&str>) -> Result<(PathBuf, &'static str)> {
     let (folder, label) = match target_cpu {
         None => (target_dir(), "wheeleg"),
         Some(cpu) => {
-            let folder = target_dir().join("xtask").join("native");
+            let folder = step_folder("native");
             build
                 .env("RUSTFLAGS", format!("-C target-cpu={cpu}"))
                 .arg("--target-dir")

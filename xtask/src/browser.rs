@@ -22,10 +22,7 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
     });
     report.step("report in a browser", || {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
-        if !tools::have(CHROMIUM) {
-            let install = format!("apt-get install -y {CHROMIUM}");
-            return Err(StepError::missing(CHROMIUM, install));
-        }
+        ensure_chromium()?;
         let python = tools::python()?;
         // A relative folder is meant from where the user stands, not from the root.
         run(command(python)
@@ -36,14 +33,11 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
     });
     report.step("log in a browser", || {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no log to open"))?;
-        if !tools::have(CHROMIUM) {
-            let install = format!("apt-get install -y {CHROMIUM}");
-            return Err(StepError::missing(CHROMIUM, install));
-        }
-        rust::build(&["--bin", "wheeleg"])?;
+        ensure_chromium()?;
+        let wheeleg = rust::build_wheeleg()?;
         run(command(tools::python()?)
             .arg("tests/python/check_view.py")
-            .arg(target_dir().join("release").join("wheeleg"))
+            .arg(wheeleg)
             .arg(std::path::absolute(run_dir)?.join("log.mcap"))
             .arg(target_dir().join("view-shots"))
             .arg(axe()?))?;
@@ -55,12 +49,17 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
     });
 }
 
+fn ensure_chromium() -> StepResult {
+    if tools::have(CHROMIUM) {
+        return Ok(());
+    }
+    let install = format!("apt-get install -y {CHROMIUM}");
+    Err(StepError::missing(CHROMIUM, install))
+}
+
 /// One of the checks of the console's page.
 fn console(check: &str) -> StepResult<Command> {
-    if !tools::have(CHROMIUM) {
-        let install = format!("apt-get install -y {CHROMIUM}");
-        return Err(StepError::missing(CHROMIUM, install));
-    }
+    ensure_chromium()?;
     let mut python = of_program(check)?;
     python.arg(target_dir().join("console-shots")).arg(axe()?);
     Ok(python)
@@ -68,11 +67,9 @@ fn console(check: &str) -> StepResult<Command> {
 
 /// A check in Python of the program, which is built for it.
 fn of_program(check: &str) -> StepResult<Command> {
-    rust::build(&["--bin", "wheeleg"])?;
+    let wheeleg = rust::build_wheeleg()?;
     let mut python = command(tools::python()?);
-    python
-        .arg(check)
-        .arg(target_dir().join("release").join("wheeleg"));
+    python.arg(check).arg(wheeleg);
     Ok(python)
 }
 

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 
-use crate::process::{cargo, command, figures, root, run, target_dir};
+use crate::process::{command, empty_folder, root, run, step_folder, wheeleg};
 use crate::report::{Report, StepResult};
+use crate::rust::measured;
 use crate::{rust, tools};
 
 /// A shipped plan, with its questions in SQL beside it: how it is cut short for the suite, and the rows that are left.
@@ -62,12 +63,9 @@ const SHIPPED: [Shipped; 3] = [
 /// The shipped plans, cut short, their tables and their SQL in DuckDB.
 pub(crate) fn steps(report: &mut Report) {
     report.step("campaign: the shipped SQL in DuckDB", || {
-        let folder = target_dir().join("xtask").join("campaign");
-        if folder.exists() {
-            fs::remove_dir_all(&folder)?;
-        }
-        fs::create_dir_all(&folder)?;
-        rust::build(&["--bin", "wheeleg"])?;
+        let folder = step_folder("campaign");
+        empty_folder(&folder)?;
+        rust::build_wheeleg()?;
         for shipped in &SHIPPED {
             ask(shipped, &folder)?;
         }
@@ -76,7 +74,7 @@ pub(crate) fn steps(report: &mut Report) {
 }
 
 fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
-    let wheeleg = target_dir().join("release").join("wheeleg");
+    let wheeleg = wheeleg();
     let campaigns = root().join("host-sim/campaigns");
     let mut plan = fs::read_to_string(campaigns.join(format!("{}.toml", shipped.plan)))
         .context("the shipped plan")?;
@@ -111,16 +109,11 @@ fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
 /// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash. Then
 /// Slurm.
 pub(crate) fn deep() -> StepResult<String> {
-    let found = figures(
-        cargo()
-            .args(["test", "--locked", "--release", "--package", "wheeleg"])
-            .args(["--test", "campaign", "--", "--exact", "--nocapture"])
-            .arg("however_it_is_run_the_table_is_the_same")
-            .env("WHEELEG_CAMPAIGN_SAMPLES", "100")
-            .env("WHEELEG_CAMPAIGN_KILLS", "20"),
-        |line| line.contains("campaign: "),
-    )?;
-    let first = found.into_iter().next();
-    let shared = first.context("no line with `campaign: `")?;
+    let test = "however_it_is_run_the_table_is_the_same";
+    let amounts = [
+        ("WHEELEG_CAMPAIGN_SAMPLES", 100),
+        ("WHEELEG_CAMPAIGN_KILLS", 20),
+    ];
+    let shared = measured(["campaign", test], &amounts, "campaign: ")?;
     Ok(format!("{shared}; {}", slurm::check()?))
 }

@@ -4,8 +4,9 @@
 use anyhow::Context;
 use clap::Args;
 
-use crate::process::{cargo, figures, output, run, target_dir};
+use crate::process::{cargo, command, output, run, target_dir};
 use crate::report::{Report, StepResult};
+use crate::rust::measured;
 use crate::{browser, campaign, fuzz, mutants, pil, record, rust, tools};
 
 /// Seconds per target when fuzzing.
@@ -193,67 +194,30 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     }
 }
 
-/// The line of a test program's output that has `marker`, with one of its tests run by
-/// name in the build of the suite, as often as `variable` says. It is told of a test that
-/// fails, too.
-fn measured(
-    [program, test]: [&str; 2],
-    (variable, amount): (&str, u32),
-    marker: &str,
-) -> StepResult<String> {
-    let found = figures(
-        cargo()
-            .args(["test", "--locked", "--release"])
-            .args(rust::HOST)
-            .args([
-                "--test",
-                program,
-                "--",
-                "--exact",
-                "--include-ignored",
-                "--nocapture",
-                test,
-            ])
-            .env(variable, amount.to_string()),
-        |line| line.contains(marker),
-    )?;
-    let first = found.into_iter().next();
-    Ok(first.with_context(|| format!("no line with `{marker}`"))?)
-}
-
 fn flips() -> StepResult<String> {
     let test = "no_one_or_two_bit_flip_makes_another_frame";
     let amount = ("WHEELEG_FLIP_FRAMES_PER_TYPE", 1_000);
-    measured(["robustness", test], amount, " flips: ")
+    measured(["robustness", test], &[amount], " flips: ")
 }
 
 fn streams() -> StepResult<String> {
     let test = "a_million_random_streams_give_no_wrong_frame";
     let amount = ("WHEELEG_RANDOM_STREAMS", 10_000_000);
-    measured(["robustness", test], amount, " streams: ")
+    measured(["robustness", test], &[amount], " streams: ")
 }
 
 fn off_data() -> StepResult<String> {
     let test = "off_data::nothing_trips_on_a_robot_off_its_data";
     let amount = ("WHEELEG_OFF_ROBOTS", 200);
-    measured(["system", test], amount, " false alarms; ")
+    measured(["system", test], &[amount], " false alarms; ")
 }
 
 /// The scenarios that the paper's claims rest on.
 fn field() -> StepResult<String> {
     let claims = ["sand-flat", "sand-slope-20", "rocks-30"];
     let printed = output(
-        cargo()
-            .args([
-                "run",
-                "--locked",
-                "--release",
-                "--quiet",
-                "-p",
-                "wheeleg",
-                "--",
-                "field",
-            ])
+        command(rust::build_wheeleg()?)
+            .arg("field")
             .args(claims)
             .args(["--seeds", "100", "--out", "target/deep/field"]),
     )?;
@@ -289,7 +253,7 @@ fn cylinders() -> StepResult<String> {
     let test = "cylinders::few_combinations_miss_on_cylinders_drawn_at_random";
     measured(
         ["system", test],
-        ("WHEELEG_CYLINDERS", 2_600),
+        &[("WHEELEG_CYLINDERS", 2_600)],
         " cylinders from number ",
     )
 }
@@ -298,7 +262,7 @@ fn combinations() -> StepResult<String> {
     let test = "combinations::few_combinations_miss_on_the_four_axes";
     measured(
         ["system", test],
-        ("WHEELEG_COMBINATIONS", 5_000),
+        &[("WHEELEG_COMBINATIONS", 5_000)],
         "combinations from number ",
     )
 }
@@ -307,35 +271,22 @@ fn behaviours() -> StepResult<String> {
     let test = "behaviours::each_behaviour_does_what_it_is_there_for";
     measured(
         ["system", test],
-        ("WHEELEG_BEHAVIOUR_SEEDS", 20),
+        &[("WHEELEG_BEHAVIOUR_SEEDS", 20)],
         " behaviours with and without: ",
     )
 }
 
 fn identification() -> StepResult<String> {
-    let found = figures(
-        cargo()
-            .args([
-                "test",
-                "--locked",
-                "--release",
-                "--package",
-                "wheeleg-studies",
-            ])
-            .args(["--test", "identify", "--", "--exact", "--nocapture"])
-            .arg("intervals_have_the_truth_about_as_often_as_they_say")
-            .env("WHEELEG_IDENTIFY_CYLINDERS", "100"),
-        |line| line.contains("identify: "),
-    )?;
-    let first = found.into_iter().next();
-    Ok(first.context("no line with `identify: `")?)
+    let test = "intervals_have_the_truth_about_as_often_as_they_say";
+    let amount = ("WHEELEG_IDENTIFY_CYLINDERS", 100);
+    measured(["identify", test], &[amount], "identify: ")
 }
 
 fn long_run() -> StepResult<String> {
     let test = "long_runs::memory_does_not_grow_with_simulated_time";
     measured(
         ["system", test],
-        ("WHEELEG_LONG_RUN_S", 7_200),
+        &[("WHEELEG_LONG_RUN_S", 7_200)],
         " s simulated in ",
     )
 }
@@ -343,18 +294,18 @@ fn long_run() -> StepResult<String> {
 fn live_hour() -> StepResult<String> {
     let test = "memory_does_not_grow_while_a_robot_lives_is_recorded_and_is_looked_at";
     let amount = ("WHEELEG_CONSOLE_S", 3_600);
-    measured(["hours", test], amount, " s lived in ")
+    measured(["hours", test], &[amount], " s lived in ")
 }
 
 fn practice() -> StepResult<String> {
     let test = "mutated_files::each_is_run_or_refused_in_words";
     let amount = ("WHEELEG_MUTATED_FILES", 400);
-    let mutated = measured(["system", test], amount, " mutated files from number ")?;
+    let mutated = measured(["system", test], &[amount], " mutated files from number ")?;
     let tries = ("WHEELEG_PRACTICE_TRIES", 20);
     let test = "stop::every_long_command_can_be_stopped_at_any_time";
-    let signals = measured(["system", test], tries, " were stopped on their way")?;
+    let signals = measured(["system", test], &[tries], " were stopped on their way")?;
     let test = "disks::a_disk_that_fills_under_any_command_is_told";
-    let disks = measured(["system", test], tries, " filled their disk")?;
+    let disks = measured(["system", test], &[tries], " filled their disk")?;
     Ok([mutated, signals, disks].join("; "))
 }
 

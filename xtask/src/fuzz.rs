@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 
-use crate::process::{cargo, command, root, run, target_dir};
+use crate::process::{cargo, command, empty_folder, remove_folder, root, run, target_dir};
 use crate::record;
 use crate::report::{Report, StepResult};
 
@@ -253,9 +253,7 @@ fn patches() -> Result<Vec<Patch>> {
 fn seeded(report: &mut Report) {
     let copy = report.step("a copy of the commit", || {
         let copy = work_folder().join("seeded");
-        if copy.exists() {
-            fs::remove_dir_all(&copy)?;
-        }
+        remove_folder(&copy)?;
         run(command("git")
             .args(["clone", "--quiet"])
             .arg(root())
@@ -288,12 +286,8 @@ fn seeded(report: &mut Report) {
 fn find(copy: &Path, target: &str) -> Result<()> {
     let artifacts = copy.join(FOLDER).join("artifacts").join(target);
     let empty = work_folder().join("seeded-corpus");
-    for folder in [&artifacts, &empty] {
-        if folder.exists() {
-            fs::remove_dir_all(folder)?;
-        }
-    }
-    fs::create_dir_all(&empty)?;
+    remove_folder(&artifacts)?;
+    empty_folder(&empty)?;
     let limit = [
         format!("-max_total_time={SEEDED_SECONDS}"),
         "-seed=1".to_owned(),

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use serde_json::Value;
 
-use crate::process::{command, output, target_dir};
+use crate::process::{command, output, remove_folder, step_folder, wheeleg};
 use crate::report::Report;
 use crate::rust;
 
@@ -26,7 +26,7 @@ pub(crate) struct Options {
 
 /// `cargo xtask hashes`.
 pub(crate) fn steps(report: &mut Report, options: &Options) {
-    report.step("release build", || Ok(rust::build(&["--bin", "wheeleg"])?));
+    report.step("release build", || Ok(rust::build_wheeleg()?));
     report.step("hashes of all built-in scenarios", || {
         let hashes = hashes()?;
         println!("| scenario | hash |\n|---|---|");
@@ -45,7 +45,7 @@ fn hashes() -> Result<Vec<(String, String)>> {
     let list = json(&["list", "--json"])?;
     let scenarios = list["scenarios"].as_array().context("no scenarios")?;
     let names = scenarios.iter().filter_map(|s| s["name"].as_str());
-    let folder = target_dir().join("xtask").join("hashes");
+    let folder = step_folder("hashes");
     let folder = folder.to_str().context("path of the target folder")?;
     let hash = |name: &str| -> Result<(String, String)> {
         let summary = json(&["run", name, "--json", "--out", folder])?;
@@ -53,13 +53,12 @@ fn hashes() -> Result<Vec<(String, String)>> {
         Ok((name.to_owned(), hash.context("no hash")?.to_owned()))
     };
     let all = names.map(hash).collect();
-    let _ = fs::remove_dir_all(folder);
+    remove_folder(folder.as_ref())?;
     all
 }
 
 fn json(arguments: &[&str]) -> Result<Value> {
-    let program = target_dir().join("release").join("wheeleg");
-    let text = output(command(program).args(arguments))?;
+    let text = output(command(wheeleg()).args(arguments))?;
     serde_json::from_str(&text).context("--json: not one JSON object")
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
-use crate::process::{command, output, target_dir};
+use crate::process::{command, output, remove_folder, step_folder, wheeleg};
 use crate::report::Report;
 use crate::rust;
 
@@ -14,7 +14,7 @@ const SEED: &str = "1";
 
 /// Builds, runs twice, compares. Returns the folder of the first run.
 pub(crate) fn steps(report: &mut Report) -> Option<PathBuf> {
-    report.step("release build", || Ok(rust::build(&["--bin", "wheeleg"])?))?;
+    report.step("release build", || Ok(rust::build_wheeleg()?))?;
     let first = report.step("main job: wheeleg run three-step", || {
         let summary = simulate("main-job-a")?;
         check_targets(&summary.json)?;
@@ -38,13 +38,10 @@ struct Summary {
 }
 
 fn simulate(name: &str) -> Result<Summary> {
-    let folder = target_dir().join("xtask").join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
-    let program = target_dir().join("release").join("wheeleg");
+    let folder = step_folder(name);
+    remove_folder(&folder)?;
     let stdout = output(
-        command(program)
+        command(wheeleg())
             .args(["run", "three-step", "--json", "--seed", SEED, "--out"])
             .arg(&folder),
     )?;

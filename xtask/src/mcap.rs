@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::anyhow;
 
-use crate::process::{command, run, target_dir};
+use crate::process::{command, empty_folder, run, step_folder};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -37,17 +37,13 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         "MCAP log that was cut off, recovered, in the Python reader",
         || {
             let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
-            let folder = target_dir().join("xtask").join("recovered");
+            let folder = step_folder("recovered");
             // The checker wants one log in a folder.
             let cut = folder.with_extension("cut.mcap");
-            if folder.exists() {
-                fs::remove_dir_all(&folder)?;
-            }
-            fs::create_dir_all(&folder)?;
+            empty_folder(&folder)?;
             let log = fs::read(std::path::absolute(run_dir)?.join("log.mcap"))?;
             fs::write(&cut, &log[..log.len() * 3 / 5])?;
-            rust::build(&["--bin", "wheeleg"])?;
-            run(command(target_dir().join("release").join("wheeleg"))
+            run(command(rust::build_wheeleg()?)
                 .args(["log", "recover"])
                 .arg(&cut)
                 .arg("--out")
@@ -62,13 +58,9 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
 
 /// Frames, joints, scene, tables and bag of a run, by the readers of those who made the formats.
 fn viewers(run_dir: &Path) -> StepResult<()> {
-    let folder = target_dir().join("xtask").join("exports");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
-    fs::create_dir_all(&folder)?;
-    rust::build(&["--bin", "wheeleg"])?;
-    let wheeleg = target_dir().join("release").join("wheeleg");
+    let folder = step_folder("exports");
+    empty_folder(&folder)?;
+    let wheeleg = rust::build_wheeleg()?;
     let summary: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(run_dir.join("summary.json"))?)?;
     let robot = summary["robot"].as_str().unwrap_or("wheeleg-2003");

@@ -7,7 +7,7 @@ use std::fs;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 
-use crate::process::{cargo, root, run, succeeds, target_dir};
+use crate::process::{cargo, empty_folder, root, run, succeeds, target_dir};
 use crate::report::{Report, StepError, StepResult};
 
 /// Pinned, because another version makes other mutations.
@@ -131,10 +131,7 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
     install()?;
     let folder = target_dir().join("mutants");
     let out = folder.join(index.to_string());
-    if out.exists() {
-        fs::remove_dir_all(&out)?;
-    }
-    fs::create_dir_all(&out)?;
+    empty_folder(&out)?;
     let log = fs::File::create(out.join("log.txt"))?;
     let status = cargo()
         .args(["mutants", "--no-shuffle", "--jobs=1", "--colors=never"])

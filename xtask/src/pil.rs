@@ -5,14 +5,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use clap::Args;
 use serde_json::{Value, json};
 
 use crate::firmware;
 use crate::machine::Machine;
 use crate::no_std::{self, Way, way};
-use crate::process::{self, cargo, run, target_dir};
+use crate::process::{self, cargo, empty_folder, run, target_dir};
 use crate::qemu;
 use crate::report::{Report, StepError, StepResult};
 use crate::runs::{ensure_equal, most, put_most, three_steps};
@@ -371,8 +371,7 @@ pub(crate) fn speed() -> StepResult<String> {
 /// Runs the paper's test on emulated boards and prints the profiles of their worst ticks.
 fn profile(emulator: &Path, images: &Path) -> StepResult {
     let folder = target_dir().join("pil-run").join("profile");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    empty_folder(&folder)?;
     let environment = [
         ("WHEELEG_PIL", emulator),
         ("WHEELEG_IMAGES", images),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::process::{command, run, target_dir};
+use crate::process::{command, run, step_folder};
 use crate::report::Report;
 use crate::rust;
 use crate::tools;
@@ -16,7 +16,7 @@ const AXES: [&str; 2] = ["bench-vq110u", "heavy-40x250"];
 /// Exports valve sequences with the plant's trajectories, and lets scipy
 /// integrate the same equations with tight tolerances.
 pub(crate) fn steps(report: &mut Report) {
-    let folder = target_dir().join("xtask").join("plant");
+    let folder = step_folder("plant");
     let made = report.step("plant: export of valve sequences", || Ok(export(&folder)?));
     if made.is_none() {
         return;
@@ -41,8 +41,7 @@ pub(crate) fn steps(report: &mut Report) {
 
 fn export(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)?;
-    rust::build(&["--bin", "wheeleg"])?;
-    let wheeleg = target_dir().join("release").join("wheeleg");
+    let wheeleg = rust::build_wheeleg()?;
     for axis in AXES {
         run(command(&wheeleg).args(["plant", "check", axis]))?;
         run(command(&wheeleg)

@@ -1,8 +1,9 @@
 //! Running other programs: where the repository is, what is installed.
 
-use std::env;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
+use std::{env, fs};
 
 use anyhow::{Context, Result, bail};
 
@@ -18,6 +19,32 @@ pub(crate) fn target_dir() -> PathBuf {
         Some(dir) => root().join(dir),
         None => root().join("target"),
     }
+}
+
+/// Removes a folder with all that is in it, if it is there.
+pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", folder.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Makes an empty folder, in place of what was there.
+pub(crate) fn empty_folder(folder: &Path) -> Result<()> {
+    remove_folder(folder)?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
+}
+
+/// Our program's release build.
+pub(crate) fn wheeleg() -> PathBuf {
+    target_dir().join("release").join("wheeleg")
+}
+
+/// The folder of a step's own files.
+pub(crate) fn step_folder(step: &str) -> PathBuf {
+    target_dir().join("xtask").join(step)
 }
 
 /// The cargo that runs us, so that one toolchain does everything.

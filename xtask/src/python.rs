@@ -8,7 +8,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::process::{command, figures, root, run, target_dir};
+use crate::process::{
+    command, empty_folder, figures, remove_folder, root, run, step_folder, target_dir, wheeleg,
+};
 use crate::report::{Report, StepResult};
 use crate::{rust, tools};
 
@@ -20,9 +22,9 @@ pub(crate) fn steps(report: &mut Report) {
     let Some(python) = report.step("python: a wheel in a fresh environment", installed) else {
         return;
     };
-    let wheeleg = target_dir().join("release").join("wheeleg");
+    let wheeleg = wheeleg();
     report.step("python: tests of the package", || {
-        rust::build(&["--bin", "wheeleg"])?;
+        rust::build_wheeleg()?;
         print_figures(
             command(&python)
                 .args(["-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider"])
@@ -45,12 +47,9 @@ pub(crate) fn steps(report: &mut Report) {
     report.step("fmu: units in FMPy, equal to the package", || {
         // The program links this crate, and cargo builds all its kinds for that. To build it alone would
         // build what it needs a second time, with other features.
-        rust::build(&["--bin", "wheeleg"])?;
-        let folder = target_dir().join("xtask").join("fmu");
-        if folder.exists() {
-            fs::remove_dir_all(&folder)?;
-        }
-        fs::create_dir_all(&folder)?;
+        rust::build_wheeleg()?;
+        let folder = step_folder("fmu");
+        empty_folder(&folder)?;
         print_figures(
             command(&python)
                 .arg("tests/python/check_fmu.py")
@@ -64,10 +63,8 @@ pub(crate) fn steps(report: &mut Report) {
 
 /// `wheeleg identify` comes to the cost that SciPy's least squares finds over the package's plant.
 fn identification(python: &Path, wheeleg: &Path) -> StepResult {
-    let folder = target_dir().join("xtask").join("identify");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
+    let folder = step_folder("identify");
+    remove_folder(&folder)?;
     print_figures(
         command(python)
             .arg("tests/python/check_identify.py")
@@ -88,10 +85,8 @@ fn print_figures(check: &mut Command, name: &str) -> StepResult {
 /// The interpreter of an environment that has the wheel, and beside it the suite's packages.
 fn installed() -> StepResult<PathBuf> {
     let suite = tools::python()?;
-    let folder = target_dir().join("xtask").join("python");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)?;
-    }
+    let folder = step_folder("python");
+    remove_folder(&folder)?;
     let wheels = folder.join("wheels");
     fs::create_dir_all(&wheels)?;
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::firmware;
 use crate::no_std::{Way, cargo_for, way};
-use crate::process::{ask, cargo, command, run, target_dir};
+use crate::process::{ask, cargo, command, empty_folder, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::runs;
 use crate::rust;
@@ -157,8 +157,7 @@ fn count(images: &Path) -> StepResult<Value> {
         std::env::consts::DLL_SUFFIX
     ));
     let folder = target_dir().join("qemu-counts");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    empty_folder(&folder)?;
     let mut argument = format!("{},out={}/{{n}}.txt", plugin.display(), folder.display());
     for (name, begin, end) in REGIONS {
         argument.push_str(&format!(",region={name}:{begin}:{end}"));

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::process::{command, output, run, target_dir};
+use crate::process::{command, empty_folder, output, run, step_folder, target_dir, wheeleg};
 use crate::report::Report;
 use crate::rust;
 use crate::tools;
@@ -18,7 +18,7 @@ const STATES: &str = "200";
 /// Exports the robot, lets our dynamics and Pinocchio compute the same states, compares; then
 /// falsifies the export in many places, each of which must be noticed.
 pub(crate) fn steps(report: &mut Report) {
-    let folder = target_dir().join("xtask").join("rigid-body");
+    let folder = step_folder("rigid-body");
     let (urdf, states) = (folder.join("robot.urdf"), folder.join("states.json"));
     let made = report.step("rigid body: export of robot and states", || {
         Ok(export(&folder, &urdf, &states)?)
@@ -52,17 +52,13 @@ pub(crate) fn steps(report: &mut Report) {
 }
 
 fn export(folder: &Path, urdf: &Path, states: &Path) -> Result<()> {
-    if folder.exists() {
-        fs::remove_dir_all(folder)?;
-    }
-    fs::create_dir_all(folder)?;
+    empty_folder(folder)?;
     rust::build(&["--bin", "wheeleg", "--example", "floating_states"])?;
-    let release = target_dir().join("release");
-    run(command(release.join("wheeleg"))
+    run(command(wheeleg())
         .args(["export", "urdf", ROBOT, "--out"])
         .arg(urdf))?;
     let text = output(
-        command(release.join("examples").join("floating_states")).args([ROBOT, SEED, STATES]),
+        command(target_dir().join("release/examples/floating_states")).args([ROBOT, SEED, STATES]),
     )?;
     fs::write(states, text)?;
     Ok(())

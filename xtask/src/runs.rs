@@ -35,11 +35,6 @@ pub(crate) fn three_steps(
     )
 }
 
-/// Builds the program.
-pub(crate) fn build_wheeleg() -> anyhow::Result<()> {
-    rust::build(&["--bin", "wheeleg"])
-}
-
 /// Builds the program and runs a scenario with it; gives its summary. `nodes` says which
 /// node runs where.
 pub(crate) fn run_nodes(
@@ -49,8 +44,7 @@ pub(crate) fn run_nodes(
     environment: &[(&str, &Path)],
     further: &[&str],
 ) -> anyhow::Result<Value> {
-    build_wheeleg()?;
-    let mut wheeleg = command(target_dir().join("release").join("wheeleg"));
+    let mut wheeleg = command(rust::build_wheeleg()?);
     wheeleg
         .arg("run")
         .arg(scenario)

@@ -1,6 +1,10 @@
 //! Format, lints and host tests.
 
-use crate::process::{cargo, run};
+use std::path::PathBuf;
+
+use anyhow::Context;
+
+use crate::process::{cargo, figures, run, wheeleg};
 use crate::report::StepResult;
 
 /// All that needs neither boards nor an emulator's build tools: what `cargo xtask pil` builds is
@@ -18,6 +22,12 @@ pub(crate) fn build(targets: &[&str]) -> anyhow::Result<()> {
         .args(["build", "--locked", "--release", "--test", "determinism"])
         .args(HOST)
         .args(targets))
+}
+
+/// Builds our program; its path.
+pub(crate) fn build_wheeleg() -> anyhow::Result<PathBuf> {
+    build(&["--bin", "wheeleg"])?;
+    Ok(wheeleg())
 }
 
 /// The format of every crate.
@@ -53,4 +63,26 @@ pub(crate) fn test() -> StepResult {
         .args(["--", "--include-ignored"])
         .env("PROPTEST_RNG_SEED", PROPTEST_SEED))?;
     Ok(())
+}
+
+/// The line of a test program's output that has `marker`, with one of its tests run by
+/// name in the build of the suite, as often as these variables say. It is printed if the test
+/// fails, too.
+pub(crate) fn measured(
+    [program, test]: [&str; 2],
+    amounts: &[(&str, u32)],
+    marker: &str,
+) -> StepResult<String> {
+    let mut test_run = cargo();
+    test_run
+        .args(["test", "--locked", "--release"])
+        .args(HOST)
+        .args(["--test", program, "--", "--exact"])
+        .args(["--include-ignored", "--nocapture", test]);
+    for (variable, amount) in amounts {
+        test_run.env(variable, amount.to_string());
+    }
+    let found = figures(&mut test_run, |line| line.contains(marker))?;
+    let first = found.into_iter().next();
+    Ok(first.with_context(|| format!("no line with `{marker}`"))?)
 }

@@ -8,7 +8,7 @@ use std::fs;
 
 use anyhow::Context;
 
-use crate::process::{ask, cargo, command, root, run, succeeds};
+use crate::process::{ask, cargo, command, empty_folder, remove_folder, root, run, succeeds};
 use crate::report::{Report, StepError, StepResult};
 use crate::tools::{
     NODE_LOCK, NODE_PACKAGES, REQUIREMENTS, have, node_folder, node_modules, python, python_path,
@@ -178,9 +178,7 @@ fn cargo_has(sub: &str) -> bool {
 fn install_python() -> StepResult {
     let system = system_python().context("no Python for a virtual environment")?;
     let venv = virtual_environment();
-    if venv.exists() {
-        fs::remove_dir_all(&venv).with_context(|| format!("cannot remove {}", venv.display()))?;
-    }
+    remove_folder(&venv)?;
     run(command(system).args(["-m", "venv"]).arg(&venv))?;
     run(command(python_path())
         .args(["-m", "pip", "install", "--quiet"])
@@ -193,11 +191,7 @@ fn install_python() -> StepResult {
 /// Makes the folder of the Node packages anew, exactly as they are pinned.
 fn install_node() -> StepResult {
     let folder = node_folder();
-    if folder.exists() {
-        fs::remove_dir_all(&folder)
-            .with_context(|| format!("cannot remove {}", folder.display()))?;
-    }
-    fs::create_dir_all(&folder)?;
+    empty_folder(&folder)?;
     fs::copy(root().join(NODE_PACKAGES), folder.join("package.json"))?;
     fs::copy(root().join(NODE_LOCK), folder.join("package-lock.json"))?;
     run(command("npm").current_dir(&folder).args([

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::process::{command, output, root, run, target_dir};
+use crate::process::{command, empty_folder, output, root, run, step_folder};
 use crate::report::{Report, StepResult};
 use crate::tools;
 
@@ -77,14 +77,11 @@ fn folders(root: &Path) -> Result<Vec<PathBuf>> {
 
 fn check(folder: &Path) -> StepResult {
     let checked_in = data_files(folder)?;
-    let scratch = target_dir().join("xtask").join("vectors");
+    let scratch = step_folder("vectors");
     let mut regenerated = Files::new();
     for script in scripts(folder)? {
         let python = tools::python()?;
-        if scratch.exists() {
-            fs::remove_dir_all(&scratch)?;
-        }
-        fs::create_dir_all(&scratch)?;
+        empty_folder(&scratch)?;
         copy_sources(folder, &scratch)?;
         let mut call = command(python);
         call.arg("-B").arg(&script).current_dir(&scratch);

@@ -1,4 +1,4 @@
-//! What an image says of itself.
+//! What an image reports about itself.
 
 use wheeleg_identity::{Digest, Identity};
 pub use wheeleg_identity::{Kind, Record};

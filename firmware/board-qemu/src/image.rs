@@ -10,7 +10,7 @@ const HOST: &str = "QEMU mps2-an386 (Cortex-M4)";
 const HOST_HIL: &str = "QEMU mps2-an386, HIL over UART";
 
 /// Runs a board whose messages go through semihosting; ends the emulator when
-/// the partner has gone.
+/// the simulator has gone.
 pub fn run_on_semihosting<'p, B: Board<'p>>(pins: &'p B::Pins) -> ! {
     let Some(mut pipes) = HostPipes::open() else {
         semihosting::fail();
@@ -21,7 +21,7 @@ pub fn run_on_semihosting<'p, B: Board<'p>>(pins: &'p B::Pins) -> ! {
     semihosting::exit()
 }
 
-/// Runs a board whose messages go over the UART, for ever: the next partner
+/// Runs a board whose messages go over the UART, for ever: the next simulator
 /// may open a new session.
 pub fn run_on_uart<'p, B: Board<'p>>(pins: &'p B::Pins) -> ! {
     let mut uart = Uart::new();

@@ -18,7 +18,7 @@
 //!
 //! * **semihosting**: an instruction by which a program on an emulator calls the host
 //! * **hil**: hardware in the loop: an image on a bench board, with sensors and valves simulated
-//! * **partner**: the simulator that sends requests and gets one reply each
+//! * **simulator**: the program that sends requests and gets one reply each
 #![no_std]
 #![allow(
     unsafe_code,

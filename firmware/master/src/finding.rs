@@ -1,6 +1,5 @@
-//! What the master finds out about the boards and the line by itself, with the
-//! sentence and the remedy of each. (Faults that a board latches have theirs in the
-//! protocol's table.)
+//! Findings: what the master detects about the boards and the line by itself, with the sentence and
+//! the remedy of each. (Faults that a board latches have theirs in the protocol's table.)
 
 macro_rules! findings {
     ($( $name:ident: $sentence:literal, $remedy:literal; )*) => {

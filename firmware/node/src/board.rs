@@ -133,7 +133,7 @@ impl BoardCore {
     }
 
     /// Stores parameters, unless the board has been armed since it was asked. The
-    /// processor may stand still meanwhile: the next tick is measured anew.
+    /// processor may stand still meanwhile: the next tick is measured again.
     pub(crate) fn save(
         &mut self,
         records: impl Iterator<Item = (u16, i32)>,

@@ -1,15 +1,13 @@
 //! From potentiometer code to stroke, with range and rate check.
 //!
-//! stroke = (code − zero) · full scale / 2^16. An open or shorted
-//! potentiometer pulls the converter input to a rail, outside the valid codes;
-//! a loose wiper makes jumps that no piston can. A rejected reading is replaced
-//! by the last good one, for as long as the sensor is faulty. Two rejections in a row are a fault, so a dead sensor is
-//! acted upon in its second tick; so is a wiper that loses contact every other
-//! tick, in its third rejection (a leaky count: +2 bad, −1 good, fault at 4).
-//! After a fault the wiper may have come back anywhere: the first good reading is compared
-//! with nothing, and it says that what holds a history of strokes must begin anew.
-//! A sensor that is stuck inside its range is not seen here: following error
-//! sees it.
+//! stroke = (code − zero) · full scale / 2^16. An open or shorted potentiometer pulls the converter
+//! input to a rail, outside the valid codes; a loose wiper causes jumps that no piston can make. A
+//! rejected reading is replaced by the last good one, for as long as the sensor is faulty. Two
+//! rejections in a row are a fault, so a dead sensor is acted upon in its second tick. So is a wiper
+//! that loses contact every other tick, at its third rejection (a leaky count: +2 bad, −1 good,
+//! fault at 4). After a fault the wiper may have come back anywhere: the first good reading is
+//! compared with nothing, and anything that keeps a history of strokes must restart there. A sensor
+//! that is stuck inside its range is not detected here, but by the following error.
 
 use crate::hardware::SensorError;
 use core::hash::{Hash, Hasher};
@@ -153,7 +151,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Another calibration: the sensor has to prove itself anew. Until it does, the last good
+    /// Another calibration: the sensor has to prove itself again. Until it does, the last good
     /// position stands.
     pub fn restart(&mut self) {
         *self = Self {

@@ -11,8 +11,8 @@
 //!
 //! The messages are those of `wheeleg-remote-link`, one reply to every request.
 //! Simulated time is an argument of the request: a board waits for as long as
-//! its partner likes, and the partner decides how fast time runs. A board whose
-//! partner falls silent stands still, and it has no output that could move
+//! the simulator likes, which decides how fast time runs. A board whose
+//! simulator falls silent stands still, and it has no output that could move
 //! anything.
 //!
 //! No floating point, no heap, and no panic for any input.
@@ -20,7 +20,7 @@
 //! # Glossary
 //!
 //! * **remote board**: a node whose sensors and outputs travel in messages
-//! * **partner**: the simulator at the other end
+//! * **simulator**: the program at the other end, which sends the requests
 //! * **edge**: the instant at which a tick begins: outputs take effect, inputs are latched
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(

@@ -7,16 +7,16 @@ use crate::board::Board;
 use crate::frame::{Deframer, encode};
 use crate::session::{Session, Stopwatch};
 
-/// A stream of bytes to the partner.
+/// A stream of bytes to the simulator.
 pub trait Stream {
-    /// Waits for bytes and gives how many came; 0 when the partner has gone.
+    /// Waits for bytes and gives how many came; 0 when the simulator has gone.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
 
-    /// Sends all bytes; false when the partner has gone.
+    /// Sends all bytes; false when the simulator has gone.
     fn write(&mut self, bytes: &[u8]) -> bool;
 }
 
-/// Answers requests until the partner says goodbye or goes.
+/// Answers requests until the simulator says goodbye or goes.
 pub fn serve<'p, B: Board<'p>>(
     session: &mut Session<'p, B>,
     stream: &mut impl Stream,

@@ -57,7 +57,7 @@ pub struct Session<'p, B: Board<'p>> {
     edge_ns: u64,
     /// First tick edge after the newest start, at which the board's clock stands at 0.
     zero_ns: u64,
-    /// The counter stood here, in the partner's edges, when it was started.
+    /// The counter stood here, in the simulator's edges, when it was started.
     count_zero: i32,
     /// Encoder at the newest edge, with or without supply.
     count: i32,
@@ -87,7 +87,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         }
     }
 
-    /// Whether the partner has said goodbye.
+    /// Whether the simulator has said goodbye.
     pub const fn is_over(&self) -> bool {
         self.over
     }
@@ -95,7 +95,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
     /// Carries out a request.
     pub fn answer(&mut self, request: &Request, stopwatch: &mut impl Stopwatch) -> Reply {
         let result = match request {
-            // A new partner, or the old one once more: the board starts afresh.
+            // A new simulator, or the old one once more: the board starts afresh.
             Request::Hello { .. } => {
                 self.forget();
                 self.over = false;

@@ -113,7 +113,7 @@ impl Causes {
 
     /// A cause in words, with what a target asks.
     #[must_use]
-    pub fn told(&self, cause: &Cause) -> String {
+    pub fn message(&self, cause: &Cause) -> String {
         match cause {
             Cause::NoResult { status, message } => format!("{}: {message}", status.name()),
             Cause::Missed { target } => format!("{target} missed{}", self.asked(target)),

@@ -168,7 +168,7 @@ impl Holes {
     }
 
     /// What to do about them.
-    fn told(&self, of: &Store) -> CampaignError {
+    fn error(&self, of: &Store) -> CampaignError {
         let named = self
             .blocks
             .iter()
@@ -259,7 +259,7 @@ fn write(
         group.append(table);
     }
     if !holes.blocks.is_empty() && (!partial || rows == 0) {
-        return Err(holes.told(&stores[0]));
+        return Err(holes.error(&stores[0]));
     }
     writer.write(&group).map_err(full)?;
     let file = writer.finish().map_err(full)?;

@@ -19,6 +19,7 @@ mod board_value;
 pub mod builtin;
 mod command;
 mod commissioned;
+pub mod derived;
 mod drawing;
 mod error;
 pub mod faults;
@@ -40,7 +41,6 @@ mod scenario;
 mod suggest;
 pub mod terrain;
 pub mod timing;
-pub mod told;
 
 pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{assert_all, report};
-use wheeleg_config::told::{TOLD, limits};
+use wheeleg_config::derived::{DERIVED, limits};
 use wheeleg_config::{
     AxisConfig, ConfigError, Dimension, ParameterInfo, RobotConfig, axis, builtin, in_unit, pretty,
 };
@@ -150,16 +150,16 @@ fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
     assert!(tried > 700, "{tried}");
 }
 
-/// What a board is told of its axis: a quantity that is one field of the file has the limits of the
+/// What a board's parameters hold of its axis: a quantity that is one field of the file has the limits of the
 /// board's parameter, one that is made of several is a relation between these.
 #[test]
-fn a_file_says_what_a_board_can_be_told() {
+fn a_file_says_what_a_board_can_hold() {
     let (_, file, text) = axis::AXES[0];
     let listed = AxisConfig::parse(file, text).expect("built in").parameters;
-    for told in TOLD {
-        let row = told.parameter.info();
-        let [low, high] = limits(told.parameter);
-        // Each of these may say as much as their board can be told, or less.
+    for derived in DERIVED {
+        let row = derived.parameter.info();
+        let [low, high] = limits(derived.parameter);
+        // Each of these may say as much as their board can hold, or less.
         let alone = |path: &&str| {
             let field = listed.iter().find(|p| p.path == *path).expect("listed");
             let unit = field
@@ -179,12 +179,12 @@ fn a_file_says_what_a_board_can_be_told() {
         };
         let related = wheeleg_config::RELATIONS
             .iter()
-            .any(|relation| relation.fields == told.fields);
+            .any(|relation| relation.fields == derived.fields);
         assert!(
-            related || told.fields.iter().all(alone),
+            related || derived.fields.iter().all(alone),
             "{}: {:?}",
             row.name,
-            told.fields
+            derived.fields
         );
     }
 }

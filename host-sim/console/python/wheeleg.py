@@ -70,7 +70,7 @@ class Robot:
         self.host = host.removeprefix("http://").removeprefix("ws://").rstrip("/")
         own = self.host.rsplit(":", 1)[0].strip("[]")
         if own not in ("localhost", "::1") and not own.startswith("127."):
-            raise ValueError("over plain HTTP a key could be read on its way: reach the server through ssh -L")
+            raise ValueError("over plain HTTP a key could be intercepted: reach the server through ssh -L")
         self.name, self.role = name, role
         self._digits = key.strip()
         self._key = bytes.fromhex(self._digits)

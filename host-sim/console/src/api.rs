@@ -132,8 +132,8 @@ async fn wrong_method() -> Response {
     let status = StatusCode::METHOD_NOT_ALLOWED;
     problem(
         status,
-        "this path is not asked so",
-        "GET; stop is asked with POST",
+        "this path does not take this method",
+        "use GET; for `stop`, POST",
     )
 }
 
@@ -173,7 +173,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
         }
         None => problem(
             StatusCode::FORBIDDEN,
-            "the request comes by a foreign name or from a foreign page",
+            "the request was sent to another host name, or from a page of another origin",
             "open the address that the server prints",
         ),
     };
@@ -230,7 +230,7 @@ async fn key(
 fn plain() -> Response {
     problem(
         StatusCode::FORBIDDEN,
-        "over plain HTTP a key could be read on its way",
+        "over plain HTTP a key could be intercepted",
         "serve with TLS; with the view key the socket of PROTOCOL.md lets you look and stop",
     )
 }
@@ -265,7 +265,7 @@ async fn socket(
     if !server.context.hub.has_place() {
         return problem(
             StatusCode::SERVICE_UNAVAILABLE,
-            "all places are taken",
+            "all client slots are taken",
             "close another client",
         );
     }
@@ -328,7 +328,7 @@ async fn viewer(
     if !context.hub.has_place() {
         return problem(
             StatusCode::SERVICE_UNAVAILABLE,
-            "all places are taken",
+            "all client slots are taken",
             "close another client",
         );
     }
@@ -398,7 +398,7 @@ async fn samples(
     let wrong = |detail: &str, remedy: &str| problem(StatusCode::BAD_REQUEST, detail, remedy);
     let Ok(Query(Seconds { channel, seconds })) = query else {
         let detail =
-            format!("allowed are `channel`, which is needed, and `seconds`, 1 to {LONGEST_S}");
+            format!("allowed are `channel`, which is required, and `seconds`, 1 to {LONGEST_S}");
         return wrong(
             &detail,
             "ask for /api/v1/samples?channel=/joint/3&seconds=10",

@@ -14,7 +14,7 @@ pub struct HostArgument {
     pub name: &'static str,
     /// Kind: `number`, `whole number` or `text`.
     pub kind: &'static str,
-    /// Unit; `1` for what has none.
+    /// Unit; `1` if it has none.
     pub unit: &'static str,
     /// Smallest and largest value of a number.
     pub limits: Option<(f64, f64)>,
@@ -87,7 +87,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
         code: HostCode::Resume,
         name: "Resume",
         arguments: &[],
-        effect: "Lets the clock go on.",
+        effect: "Resumes the clock of the simulation.",
     },
     HostInfo {
         code: HostCode::Step,
@@ -109,7 +109,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
             kind: "number",
             unit: "1",
             limits: Some(SPEED),
-            doc: "Simulated time over time of the clock on the wall; above 2 only while nobody is in control.",
+            doc: "Ratio of simulated to wall time; above 2 only while nobody is in control.",
         }],
         effect: "Sets the pace of the simulation.",
     },
@@ -117,7 +117,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
         code: HostCode::Inject,
         name: "Inject",
         arguments: &[FAULT],
-        effect: "Begins a fault, which lasts until it is ended, or is over by itself.",
+        effect: "Injects a fault, which lasts until it is ended or ends by itself.",
     },
     HostInfo {
         code: HostCode::EndFault,
@@ -129,7 +129,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
         code: HostCode::RecordStart,
         name: "RecordStart",
         arguments: &[],
-        effect: "Begins a recording: log, and every command with its time, so that it can be repeated.",
+        effect: "Starts a recording: the log, and every command with its time, so that the run can be replayed.",
     },
     HostInfo {
         code: HostCode::RecordStop,
@@ -145,15 +145,15 @@ pub const HOST_TABLE: &[HostInfo] = &[
             kind: "text",
             unit: "1",
             limits: None,
-            doc: "Session of the client, as it was told when that client asked for the control.",
+            doc: "Session of the client, as reported when that client asked for control.",
         }],
-        effect: "Releases the control, and keeps it for one other client: for 2 s it alone may take it. Refused as ReleaseControl is.",
+        effect: "Releases control, and reserves it for another client for 2 s. Refused in the same cases as ReleaseControl.",
     },
     HostInfo {
         code: HostCode::Revoke,
         name: "Revoke",
         arguments: &[],
-        effect: "Takes the control away from who holds it, as if they had been lost: an armed robot holds. At the robot's own computer alone.",
+        effect: "Revokes control from its holder, as if the operator were lost: an armed robot holds. Only on the robot's own computer.",
     },
 ];
 

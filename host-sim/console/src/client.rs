@@ -22,7 +22,7 @@ use crate::mac::{Key, Transcript};
 /// Largest answer over HTTP, bytes.
 const LARGEST_ANSWER: usize = 1 << 20;
 /// What is said of another server.
-const NO_CONSOLE: &str = "this is no console of Wheeleg";
+const NO_CONSOLE: &str = "this is not a Wheeleg console";
 /// How often the control is kept by a beat.
 const BEAT: Duration = Duration::from_millis(50);
 /// How long a look for a message lasts.
@@ -34,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// [`ConsoleError::Link`] if there is no answer, or if others could read the key on its way.
 pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Value), ConsoleError> {
     if url.is_exposed() {
-        return Err(url.error("over plain HTTP a key could be read on its way: `ctl watch` and `ctl stop` alone need none"));
+        return Err(url.error("over plain HTTP a key could be intercepted: only `ctl watch` and `ctl stop` work without one"));
     }
     let mut stream = url.stream()?;
     // In this version an answer of unknown length comes in one piece.
@@ -366,7 +366,7 @@ fn text(url: &Url, socket: &mut WebSocket<Stream>) -> Result<Value, ConsoleError
                 let odd = |_| url.error(NO_CONSOLE);
                 return serde_json::from_str(&text).map_err(odd);
             }
-            Message::Close(_) => return Err(url.error("the server closes")),
+            Message::Close(_) => return Err(url.error("the server closed the connection")),
             _ => {}
         }
     }
@@ -396,7 +396,10 @@ mod tests {
             let url = url(exposed);
             assert!(url.is_exposed(), "{exposed}");
             let error = http(&url, "GET", "state", &Key::new([7; 32])).expect_err("refused");
-            assert!(error.to_string().contains("could be read"), "{error}");
+            assert!(
+                error.to_string().contains("could be intercepted"),
+                "{error}"
+            );
         }
         for wrong in ["robot", "http://robot", "https://robot:x", "http://a/b:1"] {
             assert!(Url::parse(wrong).is_err(), "{wrong}");

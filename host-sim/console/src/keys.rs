@@ -41,7 +41,7 @@ impl Keys {
             match make(&path) {
                 Ok(()) => {}
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(wrong(&path, format!("cannot be made: {e}"))),
+                Err(e) => return Err(wrong(&path, format!("cannot be created: {e}"))),
             }
             read(&path)
         });
@@ -101,9 +101,11 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
     match key {
         None => Err(wrong(
             path,
-            format!("is no key: a key is {DIGITS} hexadecimal digits"),
+            format!("is not a key: a key is {DIGITS} hexadecimal digits"),
         )),
-        Some(bytes) if bytes == [0; 32] => Err(wrong(path, "is no key: it is all zero".to_owned())),
+        Some(bytes) if bytes == [0; 32] => {
+            Err(wrong(path, "is not a key: it is all zeros".to_owned()))
+        }
         Some(bytes) => Ok(Key::new(bytes)),
     }
 }
@@ -144,7 +146,7 @@ fn make_folder(folder: &Path) -> Result<(), ConsoleError> {
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder
         .create(folder)
-        .map_err(|e| wrong(folder, format!("cannot be made: {e}")))
+        .map_err(|e| wrong(folder, format!("cannot be created: {e}")))
 }
 
 fn make(path: &Path) -> std::io::Result<()> {
@@ -196,11 +198,11 @@ mod tests {
         let home = tempfile::tempdir().expect("a folder");
         let path = home.path().join(CONTROL_FILE);
         for (text, word) in [
-            ("", "no key"),
-            ("12", "no key"),
+            ("", "not a key"),
+            ("12", "not a key"),
             (&"0".repeat(64), "zero"),
-            (&"a".repeat(63), "no key"),
-            (&"a".repeat(66), "no key"),
+            (&"a".repeat(63), "not a key"),
+            (&"a".repeat(66), "not a key"),
         ] {
             fs::write(&path, text).expect("written");
             fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("set");

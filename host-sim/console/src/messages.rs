@@ -13,8 +13,8 @@ pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
     json!({
         "op": "event",
         "t_ns": t_ns,
-        "kind": event.kind,
-        "code": event.code,
+        "kind": event.kind.name(),
+        "code": event.code.name(),
         "detail": event.detail,
         "board": event.board,
         "fault": event.fault,
@@ -37,7 +37,11 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
         Answer::Accepted | Answer::Done => done(n, time_us),
         Answer::Rejected(why) => rejected(why),
         Answer::Refused(why) => rejected(&Reject::Refused(*why)),
-        Answer::Paused => refused(n, Reason::Paused, "the clock stands: resume first"),
+        Answer::Paused => refused(
+            n,
+            Reason::Paused,
+            "the simulation is paused: resume it first",
+        ),
         Answer::SeenInFuture => refused(
             n,
             Reason::SeenInFuture,
@@ -46,18 +50,18 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
         Answer::Suspended => refused(
             n,
             Reason::Master("expired"),
-            "the computer stood still since: look at the robot, take the control, then give it again",
+            "the computer was suspended since: check the robot, take control, then repeat the command",
         ),
         Answer::Revoked => refused(
             n,
             Reason::Revoked,
-            "the control was taken away at the robot's computer: look at the robot, then take it anew",
+            "control was revoked on the robot's computer: check the robot, then take control again",
         ),
         Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(
             n,
             Reason::TooFast,
-            "above twice real time nobody can be in control: slow down, or release the control",
+            "control is not possible above twice real time: slow down, or release control",
         ),
         Answer::Simulation(why) => refused(n, Reason::Simulation, &why.to_string()),
         Answer::NotRecorded(why) => refused(n, Reason::Recording, why),

@@ -81,7 +81,7 @@ pub fn recorded(folder: &Path) -> Result<Recorded, ConsoleError> {
     let summary = summary(&folder).map_err(unusable)?;
     if !summary.repeatable {
         let what = format!(
-            "{}: its inputs are not all there: the robot had run too long, the disk was too slow, or its boards were real",
+            "{}: its inputs are incomplete: the robot had run too long, the disk was too slow, or its boards were real",
             folder.display()
         );
         return Err(ConsoleError::other(what, "open its log instead"));
@@ -259,7 +259,10 @@ impl Repeated {
             Input::Command(command) => {
                 let order = command.spoken.order().map_err(|bad| bad.text)?;
                 let Order::Robot(order) = order else {
-                    return Err(format!("{} is no command of the robot", command.spoken.cmd));
+                    return Err(format!(
+                        "{} is not a command of the robot",
+                        command.spoken.cmd
+                    ));
                 };
                 let request = Request {
                     client: OPERATOR_CLIENT,

@@ -133,7 +133,7 @@ impl Server {
         } = options;
         if let Some(page) = viewer_pages.iter().find(|page| !is_origin(page)) {
             return Err(ConsoleError::other(
-                format!("{page:?} is no origin of a page"),
+                format!("{page:?} is not the origin of a page"),
                 "give scheme, name and port alone, such as https://app.example.org",
             ));
         }
@@ -141,7 +141,7 @@ impl Server {
         if listen.ip().is_unspecified() && names.is_empty() {
             return Err(ConsoleError::Listen {
                 address: listen.to_string(),
-                what: "this listens at every address, and no name is given under which it answers"
+                what: "the server listens at every address, and has no name under which it answers"
                     .to_owned(),
                 help: "give the names that clients use with --name NAME, or listen at one address"
                     .to_owned(),
@@ -149,7 +149,7 @@ impl Server {
         }
         if let Some(name) = names.iter().find(|name| !is_host(name)) {
             return Err(ConsoleError::other(
-                format!("{name:?} is no name of a computer"),
+                format!("{name:?} is not a host name"),
                 "give names or addresses without scheme and port, such as robot.example",
             ));
         }
@@ -370,7 +370,7 @@ fn bind(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), ConsoleError> {
         help: match e.kind() {
             ErrorKind::AddrNotAvailable => "give an address of this computer with --listen",
             ErrorKind::PermissionDenied => {
-                "ports below 1024 are not for every user: give another with --listen ADDRESS:PORT"
+                "ports below 1024 need privileges: give another with --listen ADDRESS:PORT"
             }
             _ => {
                 "another server may run there: end it, or give another port with \

@@ -192,16 +192,16 @@ async fn refuse(socket: &mut WebSocket, why: Close) {
             "wait a minute, then open the address that the server prints",
         ),
         Close::LookOnly => (
-            "over plain HTTP nobody drives: others on the way could",
+            "control is refused over plain HTTP, which others on the network can read and change",
             "serve with TLS, or connect with the view key",
         ),
         Close::OtherHash => (
             "the server has other channels or commands than this client",
             "reload the page, or use the program of the same version",
         ),
-        Close::Timeout => ("no answer within 2 s", "connect anew"),
-        Close::TooSlow => ("all places are taken", "close another client"),
-        Close::BadFrame | Close::Ended => ("the connection ends", "connect anew"),
+        Close::Timeout => ("no answer within 2 s", "connect again"),
+        Close::TooSlow => ("all client slots are taken", "close another client"),
+        Close::BadFrame | Close::Ended => ("the connection is closed", "connect again"),
     };
     let error = json!({ "op": "error", "reason": why.reason(), "text": text, "remedy": remedy });
     let send = async {

@@ -88,7 +88,7 @@ impl Certificate {
     /// Makes one for these names, that nobody else vouches for.
     pub(crate) fn make(names: Vec<String>) -> Result<Self, ConsoleError> {
         let failed = |e: &dyn fmt::Display| {
-            let what = format!("no certificate can be made: {e}");
+            let what = format!("cannot make a certificate: {e}");
             ConsoleError::other(what, "give one with --tls-cert and --tls-key")
         };
         let made = rcgen::generate_simple_self_signed(names).map_err(|e| failed(&e))?;

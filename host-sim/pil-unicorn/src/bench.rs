@@ -34,7 +34,7 @@ struct Line {
     near: File,
     /// The PC's end by name.
     name: String,
-    /// The PC's end, held open so that partners may come and go.
+    /// The PC's end, held open so that simulators may come and go.
     _far: File,
 }
 

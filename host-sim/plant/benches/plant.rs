@@ -8,10 +8,6 @@ use std::hint::black_box;
 use criterion::Criterion;
 use nalgebra::Vector3;
 use wheeleg_plant::dynamics::RobotDynamicsParams;
-use wheeleg_plant::dynamics::chain::ChainLeg;
-use wheeleg_plant::dynamics::chain::reference::{
-    GRAVITY_M_S2, ROBOT14, RPP, RPR, leg_states, robot_state,
-};
 use wheeleg_plant::dynamics::floating::{Contacts, FloatingParams, FloatingRobot, FloatingState};
 use wheeleg_plant::dynamics::noc::Leg;
 use wheeleg_plant::soil::Soil;
@@ -23,61 +19,10 @@ use wheeleg_plant::{Inputs, Plant};
 
 const LENGTHS_M: [f64; 3] = [0.40, 0.10, 0.19];
 
-/// The reference legs, one state per call. Every argument is opaque, so that nothing that depends on
-/// some of them alone is computed once for all calls.
-fn reference_legs(c: &mut Criterion) {
-    let (rpp, rpr) = (
-        leg_states([true, false, false])[0],
-        leg_states([true, false, true])[0],
-    );
-    let g = GRAVITY_M_S2;
-    c.bench_function("leg_id_rpp", |b| {
-        b.iter(|| {
-            RPP.inverse(
-                black_box(&rpp.q),
-                black_box(&rpp.v),
-                black_box(&rpp.a),
-                black_box(&g),
-            )
-        });
-    });
-    c.bench_function("leg_id_rpr", |b| {
-        b.iter(|| {
-            RPR.inverse(
-                black_box(&rpr.q),
-                black_box(&rpr.v),
-                black_box(&rpr.a),
-                black_box(&g),
-            )
-        });
-    });
-    c.bench_function("leg_fd_rpp", |b| {
-        b.iter(|| {
-            RPP.forward(
-                black_box(&rpp.q),
-                black_box(&rpp.v),
-                black_box(&rpp.a),
-                black_box(&g),
-            )
-        });
-    });
-    c.bench_function("leg_fd_rpr", |b| {
-        b.iter(|| {
-            RPR.forward(
-                black_box(&rpr.q),
-                black_box(&rpr.v),
-                black_box(&rpr.a),
-                black_box(&g),
-            )
-        });
-    });
-}
-
-/// The robot's own leg: chain engine, and the readable reference that it is tested against.
+/// The readable reference of the robot's leg.
 fn own_leg(c: &mut Criterion) {
     let p = RobotDynamicsParams::wheeleg_2003();
     let viscous = [20.0, 15.0, 15.0];
-    let chain = ChainLeg::new(p.leg_parameters(), &p.leg_bodies, viscous).expect("chain leg");
     let noc = Leg::new(p.leg_parameters(), &p.leg_bodies, viscous).expect("leg");
     let (q, v, a, f) = (
         LENGTHS_M,
@@ -85,29 +30,7 @@ fn own_leg(c: &mut Criterion) {
         [1.0, -2.0, 3.0],
         [1.0, 2.0, 60.0],
     );
-    let g = GRAVITY_M_S2;
-    c.bench_function("leg_id_own", |b| {
-        b.iter(|| {
-            chain.inverse(
-                black_box(&q),
-                black_box(&v),
-                black_box(&a),
-                black_box(&g),
-                black_box(&f),
-            )
-        });
-    });
-    c.bench_function("leg_fd_own", |b| {
-        b.iter(|| {
-            chain.forward(
-                black_box(&q),
-                black_box(&v),
-                black_box(&a),
-                black_box(&g),
-                black_box(&f),
-            )
-        });
-    });
+    let g = [0.0, 0.0, -9.81];
     let vectors = [q, v, a, g, f].map(Vector3::from);
     c.bench_function("leg_id_own_noc", |b| {
         let [q, v, a, g, f] = &vectors;
@@ -119,12 +42,8 @@ fn own_leg(c: &mut Criterion) {
     });
 }
 
-/// Whole robots: reference tree, and the engine that every run steps.
-fn robots(c: &mut Criterion) {
-    let (state, tau, down) = (robot_state(0.1), [1.0; 14], [0.0, 0.0, -9.81]);
-    c.bench_function("robot_fd_14dof", |b| {
-        b.iter(|| ROBOT14.forward(black_box(&state), black_box(&tau), black_box(&down)));
-    });
+/// The engine that every run steps.
+fn robot(c: &mut Criterion) {
     let floating = FloatingRobot::new(&FloatingParams::wheeleg_2003()).expect("floating robot");
     let state = FloatingState::at_rest([LENGTHS_M; 2]);
     let force = nalgebra::SVector::<f64, 14>::repeat(1.0);
@@ -206,9 +125,8 @@ fn soil(c: &mut Criterion) {
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    reference_legs(&mut criterion);
     own_leg(&mut criterion);
-    robots(&mut criterion);
+    robot(&mut criterion);
     plant_tick(&mut criterion);
     soil(&mut criterion);
     criterion.final_summary();

@@ -99,7 +99,7 @@ pub struct Qemu {
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Kills an emulator that keeps its partner waiting: a read from a pipe knows no
+/// Kills an emulator that keeps the simulator waiting: a read from a pipe knows no
 /// time limit of its own.
 #[derive(Debug)]
 struct Watch {
@@ -211,7 +211,7 @@ impl Qemu {
         })
     }
 
-    /// Starts an emulator as the partner of a session.
+    /// Starts an emulator as the board of a session.
     ///
     /// # Errors
     /// As [`Self::start`].

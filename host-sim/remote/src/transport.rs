@@ -90,7 +90,7 @@ impl<S: Stream> Transport<S> {
     /// # Errors
     /// [`RemoteError`]: no answer, another version, no such board.
     pub fn hello(&mut self) -> Result<Hello, RemoteError> {
-        // Ends whatever a former partner left half said.
+        // Ends whatever a former simulator left half sent.
         self.stream.send(&[0])?;
         let version = LINK_VERSION;
         match self.ask(&Request::Hello { version })? {

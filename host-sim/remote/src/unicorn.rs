@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use wheeleg_remote_link::frame::MAX_FRAME;
+use wheeleg_remote_link::image::Kind;
 #[cfg(unix)]
 use wheeleg_remote_link::wait::Watch;
 use wheeleg_remote_link::{Deframer, Reply, Request, encode};
@@ -81,7 +82,8 @@ pub fn image(name: &str) -> Result<PathBuf, RemoteError> {
         .into_iter()
         .find(|path| path.is_file())
         .ok_or_else(|| {
-            let build = if name.starts_with("qemu-") {
+            let on_qemu = [Kind::QemuJoint, Kind::QemuWheel, Kind::QemuHilJoint];
+            let build = if on_qemu.iter().any(|kind| kind.name() == name) {
                 "build the images with: cargo xtask qemu"
             } else {
                 BUILD

@@ -1,7 +1,7 @@
 //! `/tf`, `/joint_states`, `/log`.
 
 use wheeleg_protocol::Node;
-use wheeleg_telemetry::{EventSample, push_fixed};
+use wheeleg_telemetry::{EventCode, EventKind, EventSample, push_fixed};
 
 use super::frames::{Frames, Pose};
 use super::json::{put, put_quaternion, put_text, put_time, put_vector};
@@ -74,15 +74,26 @@ pub(super) enum Level {
 
 /// How much an event matters: a fault is an error, what was refused or begins to go wrong a warning.
 pub(super) fn level(event: &EventSample) -> Level {
-    match (event.kind.as_str(), event.code.as_str()) {
-        (_, "faults_cleared") => Level::Info,
-        ("fault", "foot_switch" | "finding" | "log") => Level::Warning,
-        ("fault", _) => Level::Error,
-        ("scenario", "e_stop_pressed" | "master_killed" | "fault_begins") => Level::Warning,
-        (_, code) if code.ends_with("refused") || code.ends_with("rejected") => Level::Warning,
-        (_, "command_unanswered" | "log_lost" | "stuck" | "tip_guard" | "line_errors") => {
-            Level::Warning
-        }
+    use EventCode as Code;
+    match (event.kind, event.code) {
+        (_, Code::FaultsCleared) => Level::Info,
+        (EventKind::Fault, Code::FootSwitch | Code::Finding | Code::Log)
+        | (
+            _,
+            Code::EStopPressed
+            | Code::MasterKilled
+            | Code::FaultBegins
+            | Code::CommandRefused
+            | Code::CommandRejected
+            | Code::CommandUnanswered
+            | Code::FloodRejected
+            | Code::ServiceRefused
+            | Code::LogLost
+            | Code::Stuck
+            | Code::TipGuard
+            | Code::LineErrors,
+        ) => Level::Warning,
+        (EventKind::Fault, _) => Level::Error,
         _ => Level::Info,
     }
 }
@@ -98,7 +109,7 @@ pub(super) fn log(out: &mut Vec<u8>, t_ns: u64, event: &EventSample) {
     put_text(out, &event.text);
     put(out, ",\"name\":");
     let board = Node::new(event.board).map(|node| node.address().to_string());
-    let name = board.unwrap_or_else(|| event.kind.clone());
+    let name = board.unwrap_or_else(|| event.kind.name().to_owned());
     put_text(out, &name);
     put(out, ",\"file\":\"\",\"line\":0}");
 }

@@ -8,8 +8,8 @@ use wheeleg_config::{RobotConfig, builtin};
 use wheeleg_plant::robot::{Inputs, Outputs, Plant};
 use wheeleg_scene::{Scene, urdf};
 use wheeleg_telemetry::{
-    BodySample, Contact, ContactBody, Derive, Derived, EventSample, JointSample, Taken,
-    WheelSample, channels,
+    BodySample, Contact, ContactBody, Derive, Derived, EventCode, EventKind, EventSample,
+    JointSample, Taken, WheelSample, channels,
 };
 
 fn robot() -> RobotConfig {
@@ -360,14 +360,29 @@ fn an_arrow_is_as_long_as_its_force_and_points_along_it() {
 fn an_event_has_the_level_of_what_it_means() {
     let (mut scene, mut heard) = (scene("stand"), Heard::default());
     for (kind, code, board, level, name) in [
-        ("fault", "fault_latched", 3, 4, "joint 3"),
-        ("fault", "faults_cleared", 3, 2, "joint 3"),
-        ("command", "command_refused", 0, 3, "command"),
-        ("info", "gait_done", 0, 2, "info"),
+        (EventKind::Fault, EventCode::FaultLatched, 3, 4, "joint 3"),
+        (EventKind::Fault, EventCode::FaultsCleared, 3, 2, "joint 3"),
+        (EventKind::Fault, EventCode::Finding, 0, 3, "fault"),
+        (
+            EventKind::Command,
+            EventCode::CommandRefused,
+            0,
+            3,
+            "command",
+        ),
+        (
+            EventKind::Command,
+            EventCode::ServiceRefused,
+            8,
+            3,
+            "wheel 8",
+        ),
+        (EventKind::Command, EventCode::CommandDone, 0, 2, "command"),
+        (EventKind::Info, EventCode::GaitDone, 0, 2, "info"),
     ] {
         let event = EventSample {
-            kind: kind.to_owned(),
-            code: code.to_owned(),
+            kind,
+            code,
             board,
             text: "a \"word\"\n".to_owned(),
             ..EventSample::default()

@@ -10,7 +10,7 @@ use wheeleg_units::Micros;
 use super::boards::{JointBoard, WheelBoard, identity};
 use super::clock::NS_PER_US;
 use super::down::Down;
-use super::memory::Memory;
+use super::memory::{Memory, Taken};
 use crate::SimError;
 use wheeleg_config::timing::JOINT_TICK_NS;
 
@@ -77,22 +77,26 @@ impl Application {
 
     /// Hands received bytes over; the last one ended at `t_end`.
     pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        either!(self, board => board.on_bus_bytes(bytes, t_end));
+        either!(self, board => board.node.on_bus_bytes(bytes, t_end));
     }
 
     /// What the application wants to send.
     pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
-        either!(self, board => board.take_transmission())
+        either!(self, board => board.node.take_transmission())
     }
 
     /// The driver-enable guard has cut a transmission off.
     pub(super) fn driver_cut_off(&mut self, at: Micros) {
-        either!(self, board => board.driver_cut_off(at));
+        either!(self, board => board.node.driver_cut_off(at));
     }
 
     /// What is to be stored now, if the board wants it: then it takes it as stored.
     pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
-        either!(self, board => board.take_save(now))
+        let mut taken = Taken::default();
+        either!(self, board => if board.node.save_is_due() {
+            board.node.save(&mut taken, now);
+        });
+        taken.0
     }
 
     /// The outputs that become active at this tick edge.
@@ -104,7 +108,7 @@ impl Application {
     pub(super) fn tick_ns(&self) -> u64 {
         match self {
             Self::Joint(_) => JOINT_TICK_NS,
-            Self::Wheel(board) => u64::from(board.period_us()) * NS_PER_US,
+            Self::Wheel(board) => u64::from(board.node.tick_period_us()) * NS_PER_US,
         }
     }
 }

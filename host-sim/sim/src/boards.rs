@@ -6,18 +6,17 @@
 //! acts on a valve one tick later, as on the board.
 
 use wheeleg_node::hardware::{
-    DumpPin, FootSwitches, FourValves, HBridge, NoDumpValve, NoSwitches, SupplySwitch,
+    DumpPin, DumpValve, FootSwitches, FourValves, HBridge, PinError, SupplySwitch, SwitchBank,
 };
 use wheeleg_node::joint::JointNode;
 use wheeleg_node::parameters::{JointParameters, WheelParameters};
-use wheeleg_node::snapshot::TickReport;
+use wheeleg_node::snapshot::{JointSnapshot, TickReport};
 use wheeleg_node::wheel::WheelNode;
 use wheeleg_node::{ConfigError, NodeIdentity, Transmission};
 use wheeleg_protocol::{Address, Fault, FaultBits, NackReason, Node, ResetCause};
 use wheeleg_units::Micros;
 
 use super::hal::{AdcInput, CounterInput, Line, PwmChannel};
-use super::memory::Taken;
 use crate::SimError;
 
 /// Counts of the valve timer in one tick: 1 µs each.
@@ -27,25 +26,31 @@ const BRIDGE_COUNTS: u16 = 100;
 
 type Valves = FourValves<PwmChannel, PwmChannel, PwmChannel, PwmChannel>;
 type Feet = FootSwitches<Line, Line, Line, Line>;
+type Bridge = HBridge<PwmChannel, Line>;
+type Supply = Fitted<SupplySwitch<Line>>;
+type Dump = Fitted<DumpPin<Line>>;
 
-/// The application of a joint board; vertical joints read the foot switches.
-enum JointApplication {
-    Plain(JointNode<Valves, AdcInput, NoSwitches>),
-    WithFoot(JointNode<Valves, AdcInput, Feet>),
+/// Hardware that not every board of a kind has.
+#[derive(Clone)]
+pub(super) struct Fitted<T>(Option<T>);
+
+impl<T: SwitchBank> SwitchBank for Fitted<T> {
+    fn read(&mut self) -> Result<u8, PinError> {
+        self.0.as_mut().map_or(Ok(0), T::read)
+    }
 }
 
-macro_rules! each {
-    ($self:expr, $node:ident => $call:expr) => {
-        match $self {
-            JointApplication::Plain($node) => $call,
-            JointApplication::WithFoot($node) => $call,
-        }
-    };
+impl<T: DumpValve> DumpValve for Fitted<T> {
+    fn set_open(&mut self, open: bool) -> Result<(), PinError> {
+        let valve = self.0.as_mut();
+        valve.map_or(Ok(()), |valve| valve.set_open(open))
+    }
 }
 
-/// One joint board.
+/// One joint board; vertical joints read the foot switches.
 pub struct JointBoard {
-    application: JointApplication,
+    pub(super) node: JointNode<Valves, AdcInput, Fitted<Feet>>,
+    address: Address,
     sensor: AdcInput,
     foot: [Line; 4],
     valves: [PwmChannel; 4],
@@ -62,10 +67,11 @@ fn bank(valves: &[PwmChannel; 4]) -> Valves {
     }
 }
 
-/// The four foot switches as the application owns them.
-fn feet(foot: &[Line; 4]) -> Feet {
+/// The four foot switches as the application of this board owns them.
+fn feet(address: Address, foot: &[Line; 4]) -> Fitted<Feet> {
+    let has_foot = address.node().is_some_and(Node::has_foot);
     let [front, left, rear, right] = foot.clone();
-    FootSwitches(front, left, rear, right)
+    Fitted(has_foot.then_some(FootSwitches(front, left, rear, right)))
 }
 
 /// A board of its own, in the same state: the two share no hardware.
@@ -74,19 +80,13 @@ impl Clone for JointBoard {
         let sensor = self.sensor.copy();
         let foot = self.foot.each_ref().map(Line::copy);
         let valves = self.valves.each_ref().map(PwmChannel::copy);
-        let application = match &self.application {
-            JointApplication::Plain(node) => JointApplication::Plain(node.clone().on_hardware(
-                bank(&valves),
-                sensor.clone(),
-                NoSwitches,
-            )),
-            JointApplication::WithFoot(node) => JointApplication::WithFoot(
-                node.clone()
-                    .on_hardware(bank(&valves), sensor.clone(), feet(&foot)),
-            ),
-        };
+        let node =
+            self.node
+                .clone()
+                .on_hardware(bank(&valves), sensor.clone(), feet(self.address, &foot));
         Self {
-            application,
+            node,
+            address: self.address,
             sensor,
             foot,
             valves,
@@ -171,21 +171,16 @@ impl JointBoard {
         let sensor = AdcInput::default();
         let valves: [PwmChannel; 4] = std::array::from_fn(|_| PwmChannel::new(VALVE_COUNTS));
         let foot: [Line; 4] = std::array::from_fn(|_| Line::default());
-        let valve_bank = bank(&valves);
-        let application = if address.node().is_some_and(Node::has_foot) {
-            JointNode::from_store(who, parameters, valve_bank, sensor.clone(), feet(&foot))
-                .map(JointApplication::WithFoot)
-        } else {
-            JointNode::from_store(who, parameters, valve_bank, sensor.clone(), NoSwitches)
-                .map(JointApplication::Plain)
-        };
-        let mut application = application.map_err(|e| rejected(address, e))?;
-        if stored.is_some() && each!(&application, node => is_refused(node.faults())) {
+        let (valve_bank, feet) = (bank(&valves), feet(address, &foot));
+        let mut node = JointNode::from_store(who, parameters, valve_bank, sensor.clone(), feet)
+            .map_err(|e| rejected(address, e))?;
+        if stored.is_some() && is_refused(node.faults()) {
             return Err(rejected(address, ConfigError::Parameters));
         }
-        each!(&mut application, node => node.started_by(cause));
+        node.started_by(cause);
         Ok(Self {
-            application,
+            node,
+            address,
             sensor,
             foot,
             valves,
@@ -212,70 +207,31 @@ impl JointBoard {
         for (line, closed) in self.foot.iter().zip(foot) {
             line.set_level(closed);
         }
-        each!(&mut self.application, node => {
-            let report = node.tick(now);
-            // Native code takes no simulated time; the emulated boards measure it.
-            node.tick_done(now);
-            report
-        })
+        let report = self.node.tick(now);
+        // Native code takes no simulated time; the emulated boards measure it.
+        self.node.tick_done(now);
+        report
     }
 
     /// Hands received bytes over; the last one ended at `t_end`.
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        each!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
-    }
-
-    /// What is to be stored now, if the board wants it: then it takes it as stored.
-    pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
-        let mut taken = Taken::default();
-        each!(&mut self.application, node => if node.save_is_due() {
-            node.save(&mut taken, now);
-        });
-        taken.0
-    }
-
-    /// The driver-enable guard has cut a transmission off.
-    pub(super) fn driver_cut_off(&mut self, at: Micros) {
-        each!(&mut self.application, node => node.driver_cut_off(at));
+        self.node.on_bus_bytes(bytes, t_end);
     }
 
     /// What the application wants to send.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
-        each!(&mut self.application, node => node.take_transmission())
+        self.node.take_transmission()
     }
 
     /// Internals after the last tick.
-    pub fn snapshot(&self) -> &wheeleg_node::snapshot::JointSnapshot {
-        each!(&self.application, node => node.snapshot())
-    }
-
-    /// What the board makes of its piston after the last tick.
-    pub(super) fn motion_account(&self) -> wheeleg_node::joint::MotionAccount {
-        each!(&self.application, node => node.motion_account())
+    pub fn snapshot(&self) -> &JointSnapshot {
+        self.node.snapshot()
     }
 }
 
-/// The application of a wheel board; the first one has the supply switch and
-/// the dump valve.
-enum WheelApplication {
-    Plain(WheelNode<HBridge<PwmChannel, Line>, CounterInput, NoSwitches, NoDumpValve>),
-    WithSupply(
-        WheelNode<HBridge<PwmChannel, Line>, CounterInput, SupplySwitch<Line>, DumpPin<Line>>,
-    ),
-}
-
-macro_rules! each_wheel {
-    ($self:expr, $node:ident => $call:expr) => {
-        match $self {
-            WheelApplication::Plain($node) => $call,
-            WheelApplication::WithSupply($node) => $call,
-        }
-    };
-}
-
-/// One wheel board.
+/// One wheel board; the first one has the supply switch and the dump valve.
 pub(crate) struct WheelBoard {
-    application: WheelApplication,
+    pub(super) node: WheelNode<Bridge, CounterInput, Supply, Dump>,
     encoder: CounterInput,
     /// Quadrature edges at which the counter stood at 0.
     count_zero: i64,
@@ -307,29 +263,18 @@ impl WheelBoard {
             pulse: pulse.clone(),
             sign: sign.clone(),
         };
-        let application = if address.node() == Some(Node::WHEELS[0]) {
-            let switch = SupplySwitch(supply.clone());
-            let valve = DumpPin(dump.clone());
+        let has_supply = address.node() == Some(Node::WHEELS[0]);
+        let switch = Fitted(has_supply.then(|| SupplySwitch(supply.clone())));
+        let valve = Fitted(has_supply.then(|| DumpPin(dump.clone())));
+        let mut node =
             WheelNode::from_store(who, parameters, bridge, encoder.clone(), switch, valve)
-                .map(WheelApplication::WithSupply)
-        } else {
-            WheelNode::from_store(
-                who,
-                parameters,
-                bridge,
-                encoder.clone(),
-                NoSwitches,
-                NoDumpValve,
-            )
-            .map(WheelApplication::Plain)
-        };
-        let mut application = application.map_err(|e| rejected(address, e))?;
-        if stored.is_some() && each_wheel!(&application, node => is_refused(node.faults())) {
+                .map_err(|e| rejected(address, e))?;
+        if stored.is_some() && is_refused(node.faults()) {
             return Err(rejected(address, ConfigError::Parameters));
         }
-        each_wheel!(&mut application, node => node.started_by(cause));
+        node.started_by(cause);
         Ok(Self {
-            application,
+            node,
             encoder,
             count_zero: 0,
             pulse,
@@ -360,11 +305,6 @@ impl WheelBoard {
         self.dump.level()
     }
 
-    /// Sample period of the application, µs.
-    pub(super) fn period_us(&self) -> u32 {
-        each_wheel!(&self.application, node => node.tick_period_us())
-    }
-
     /// Latches the inputs and runs the sample that starts now.
     pub(super) fn tick(
         &mut self,
@@ -375,40 +315,9 @@ impl WheelBoard {
         self.encoder
             .latch(encoder_edges.wrapping_sub(self.count_zero));
         self.supply.set_level(supply_switch);
-        each_wheel!(&mut self.application, node => {
-            let report = node.tick(now);
-            node.tick_done(now);
-            report
-        })
-    }
-
-    /// Hands received bytes over; the last one ended at `t_end`.
-    pub(super) fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
-        each_wheel!(&mut self.application, node => node.on_bus_bytes(bytes, t_end));
-    }
-
-    /// What is to be stored now, if the board wants it: then it takes it as stored.
-    pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
-        let mut taken = Taken::default();
-        each_wheel!(&mut self.application, node => if node.save_is_due() {
-            node.save(&mut taken, now);
-        });
-        taken.0
-    }
-
-    /// The driver-enable guard has cut a transmission off.
-    pub(super) fn driver_cut_off(&mut self, at: Micros) {
-        each_wheel!(&mut self.application, node => node.driver_cut_off(at));
-    }
-
-    /// What the application wants to send.
-    pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
-        each_wheel!(&mut self.application, node => node.take_transmission())
-    }
-
-    /// Internals after the last sample.
-    pub(super) fn snapshot(&self) -> &wheeleg_node::snapshot::WheelSnapshot {
-        each_wheel!(&self.application, node => node.snapshot())
+        let report = self.node.tick(now);
+        self.node.tick_done(now);
+        report
     }
 }
 
@@ -421,7 +330,7 @@ mod tests {
     fn a_damaged_memory_is_a_fault_and_contradicting_parameters_are_refused() {
         let who = identity(Address::new(2).expect("a joint"));
         let new = |stored: Option<&[(u16, i32)]>| JointBoard::new(who, stored, ResetCause::PowerUp);
-        let faults = |board: &JointBoard| each!(&board.application, node => node.faults());
+        let faults = |board: &JointBoard| board.node.faults();
         let damaged = new(None).expect("it starts");
         assert!(faults(&damaged).contains(Fault::ParameterCorrupt));
         let blank = new(Some(&[])).expect("it starts");

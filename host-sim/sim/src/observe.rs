@@ -149,7 +149,8 @@ impl Observer {
                 air_used_dm3: out.air_used_kg / gas.reference_density_kg_m3 * 1e3,
                 dump_commanded: left_wheel.is_some_and(WheelBoard::dumps),
                 dump_open: out.dumping,
-                pressure_switch: left_wheel.is_some_and(|board| board.snapshot().supply_present),
+                pressure_switch: left_wheel
+                    .is_some_and(|board| board.node.snapshot().supply_present),
             },
         );
         if recorder.wants_contacts(t_ns) {
@@ -208,7 +209,7 @@ impl Observer {
         let params = world.plant().params();
         let radius_mm = params.body.wheel_radius_m * 1e3;
         for (i, board) in world.wheels().enumerate() {
-            let node = board.snapshot();
+            let node = board.node.snapshot();
             let counts_to_mm = rim_mm_per_count(params, i);
             recorder.wheel(
                 t_ns,

@@ -251,7 +251,7 @@ impl Session {
     /// # Errors
     /// [`SimError::Simulation`] if the fault cannot begin beside those under way, or is to end
     /// and is not under way; nothing has changed then. [`SimError::Remote`] if a board elsewhere
-    /// refuses it, or one that starts anew.
+    /// refuses it, or one that restarts.
     pub fn inject(
         &mut self,
         fault: &FaultSpec,
@@ -290,7 +290,7 @@ impl Session {
                 now_s: world.now_ns() as f64 * 1e-9,
                 joint,
                 board: board.snapshot(),
-                account: board.motion_account(),
+                account: board.node.motion_account(),
                 cylinder,
             });
         }

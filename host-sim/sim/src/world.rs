@@ -396,7 +396,7 @@ impl World {
     /// A fault begins, or ends.
     ///
     /// # Errors
-    /// [`SimError`] if a board outside refuses it, or one that starts anew.
+    /// [`SimError`] if a board outside refuses it, or one that restarts.
     pub(super) fn inject(&mut self, fault: &FaultSpec, begin: bool) -> Result<(), SimError> {
         let (plant, state) = (&mut self.plant, &mut self.state);
         self.faults.inject(fault, begin, self.now_ns, plant, state);

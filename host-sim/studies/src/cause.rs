@@ -1,43 +1,44 @@
 //! What went wrong first: the faults of a run or a log, without those that only follow from one.
 
-use wheeleg_protocol::Fault;
-use wheeleg_telemetry::{Event, EventKind, finding_of_name};
+use wheeleg_master::event::HoldReason;
+use wheeleg_protocol::{Address, Fault};
+use wheeleg_telemetry::event::hold_name;
+use wheeleg_telemetry::{Event, EventCode, EventKind, finding_of_name};
 
 /// What comes so soon after a fault may follow from it, ns.
 const FOLLOWS_NS: u64 = 1_000_000_000;
 /// Reasons of the master to hold that a fault of a board gives.
-const HOLDS_THAT_FOLLOW: [&str; 3] = ["board_fault", "board_lost", "board_disarmed"];
+const HOLDS_THAT_FOLLOW: [&str; 3] = [
+    hold_name(&HoldReason::NodeFault { node: 0, faults: 0 }),
+    hold_name(&HoldReason::NodeLost(0)),
+    hold_name(&HoldReason::NodeDisarmed(0)),
+];
 
-/// An event of the kind [`EventKind::Fault`], by the names that stay the same.
+/// An event of the kind [`EventKind::Fault`].
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FaultEvent {
     pub(crate) t_ns: u64,
-    pub(crate) code: String,
+    /// None of a later version.
+    pub(crate) code: Option<EventCode>,
     pub(crate) detail: String,
-    /// Number of the board's fault; 0: none.
-    pub(crate) fault: u64,
+    pub(crate) fault: Option<Fault>,
     /// Boards that it is about.
-    pub(crate) who: Vec<String>,
-    /// Behind their names.
-    pub(crate) what: String,
+    pub(crate) boards: Vec<Address>,
+    /// For a person.
+    pub(crate) text: String,
 }
 
 impl FaultEvent {
     /// That of an event of a run, if it is a fault after the start-up.
     pub(crate) fn of(t_ns: u64, event: &Event) -> Option<Self> {
         let is_fault = event.cause.kind() == EventKind::Fault && event.start_up_us.is_none();
-        is_fault.then(|| {
-            let sample = event.sample();
-            let board = event.cause.board().map(|board| board.to_string());
-            let (who, what) = named(board, sample.text);
-            Self {
-                t_ns,
-                code: sample.code,
-                detail: sample.detail,
-                fault: sample.fault.into(),
-                who,
-                what,
-            }
+        is_fault.then(|| Self {
+            t_ns,
+            code: Some(event.cause.code()),
+            detail: event.cause.detail(),
+            fault: event.cause.fault_code().and_then(Fault::from_code),
+            boards: event.cause.board().into_iter().collect(),
+            text: event.to_string(),
         })
     }
 
@@ -45,21 +46,18 @@ impl FaultEvent {
     /// boards report the same.
     fn follows(&self, cause: &Self) -> bool {
         self.t_ns.abs_diff(cause.t_ns) <= FOLLOWS_NS
-            && match self.code.as_str() {
-                "hold" => HOLDS_THAT_FOLLOW.contains(&self.detail.as_str()),
-                "diagnosis" | "run_failed" => true,
+            && match self.code {
+                Some(EventCode::Hold) => HOLDS_THAT_FOLLOW.contains(&self.detail.as_str()),
+                Some(EventCode::Diagnosis | EventCode::RunFailed) => true,
                 code => code == cause.code && self.fault == cause.fault,
             }
     }
 }
 
-/// A text that begins with the name of its board, as that name and what is the same for all boards.
-pub(crate) fn named(board: Option<String>, text: String) -> (Vec<String>, String) {
-    let split = board.and_then(|who| {
-        let what = text.strip_prefix(&who)?.strip_prefix(": ")?.to_owned();
-        Some((vec![who], what))
-    });
-    split.unwrap_or((Vec::new(), text))
+/// Names of boards in a row.
+pub(crate) fn names(boards: &[Address]) -> String {
+    let names: Vec<String> = boards.iter().map(Address::to_string).collect();
+    names.join(", ")
 }
 
 /// A fault with what to do about it.
@@ -73,27 +71,27 @@ pub(crate) struct Cause {
 
 impl Cause {
     fn of(event: &FaultEvent) -> Self {
-        let row = match event.code.as_str() {
-            "fault_latched" => u8::try_from(event.fault)
-                .ok()
-                .and_then(Fault::from_code)
-                .map(|fault| (fault.sentence(), fault.remedy())),
-            "finding" => {
+        let row = match event.code {
+            Some(EventCode::FaultLatched) => {
+                event.fault.map(|fault| (fault.sentence(), fault.remedy()))
+            }
+            Some(EventCode::Finding) => {
                 finding_of_name(&event.detail).map(|finding| (finding.sentence(), finding.remedy()))
             }
             _ => None,
         };
-        let what = row.map_or(event.what.as_str(), |(sentence, _)| sentence);
-        let remedy = row.map(|(_, remedy)| remedy);
-        let what = what.trim_start_matches("master: ").trim_end_matches('.');
-        let headline = match event.who.as_slice() {
-            [] => what.to_owned(),
-            who => format!("{}: {}", who.join(", "), within(what)),
+        let stem = |sentence: &str| sentence.trim_end_matches('.').to_owned();
+        let headline = match row {
+            Some((sentence, _)) if event.boards.is_empty() => stem(sentence),
+            Some((sentence, _)) => {
+                format!("{}: {}", names(&event.boards), within(&stem(sentence)))
+            }
+            None => stem(&event.text),
         };
         Self {
             t_s: event.t_ns as f64 * 1e-9,
             headline,
-            remedy,
+            remedy: row.map(|(_, remedy)| remedy),
         }
     }
 }
@@ -113,7 +111,7 @@ fn within(sentence: &str) -> String {
 /// The first cause of what went wrong, and how many there are; events in their order.
 pub(crate) fn first(events: impl Iterator<Item = FaultEvent>) -> Option<(Cause, usize)> {
     let mut causes: Vec<FaultEvent> = Vec::new();
-    for event in events.filter(|event| event.code != "faults_cleared") {
+    for event in events.filter(|event| event.code != Some(EventCode::FaultsCleared)) {
         // What is latched again within the second is the same.
         if !causes.iter().any(|cause| event.follows(cause)) {
             causes.push(event);
@@ -134,42 +132,58 @@ pub(crate) fn sentence(cause: &Cause, count: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use wheeleg_master::event::Event as MasterEvent;
     use wheeleg_master::finding::Finding;
 
     use super::*;
 
-    fn event(ms: u64, code: &str, detail: &str, fault: u64, who: &str, what: &str) -> FaultEvent {
+    fn event(
+        ms: u64,
+        code: EventCode,
+        detail: &str,
+        fault: Option<Fault>,
+        board: Option<u8>,
+        text: &str,
+    ) -> FaultEvent {
         FaultEvent {
             t_ns: ms * 1_000_000,
-            code: code.to_owned(),
+            code: Some(code),
             detail: detail.to_owned(),
             fault,
-            who: (!who.is_empty())
-                .then(|| who.to_owned())
-                .into_iter()
-                .collect(),
-            what: what.to_owned(),
+            boards: board.and_then(Address::new).into_iter().collect(),
+            text: text.to_owned(),
         }
     }
 
     #[test]
     fn what_follows_from_a_fault_is_none_of_its_own() {
         let fault = Fault::SensorRange;
-        let number = u64::from(fault.code());
-        let latched = |ms, who| event(ms, "fault_latched", "sensor_range", number, who, "");
-        let hold = |ms, detail| event(ms, "hold", detail, 0, "", "master: all axes hold: so");
+        let latched = |ms, joint, fault| {
+            event(
+                ms,
+                EventCode::FaultLatched,
+                "",
+                Some(fault),
+                Some(joint),
+                "",
+            )
+        };
+        let hold = |ms, reason: HoldReason| {
+            let text = "master: all axes hold: so";
+            event(ms, EventCode::Hold, hold_name(&reason), None, None, text)
+        };
         let one = [
-            latched(3_000, "joint 3"),
+            latched(3_000, 3, fault),
             event(
                 3_014,
-                "diagnosis",
+                EventCode::Diagnosis,
                 "fault",
-                number,
+                Some(fault),
+                Some(3),
                 "",
-                "master: joint 3 says why",
             ),
-            hold(3_020, "board_fault"),
-            event(3_500, "faults_cleared", "", 0, "joint 3", "faults cleared"),
+            hold(3_020, HoldReason::NodeFault { node: 3, faults: 1 }),
+            event(3_500, EventCode::FaultsCleared, "", None, Some(3), ""),
         ];
         let (cause, count) = first(one.clone().into_iter()).expect("a cause");
         assert_eq!((count, cause.remedy), (1, Some(fault.remedy())));
@@ -180,31 +194,37 @@ mod tests {
         );
         // The operator is lost for a reason of their own; what comes later, too.
         for (another, expected) in [
-            (hold(3_100, "operator_lost"), 2),
-            (latched(3_100, "joint 4"), 1),
-            (latched(4_100, "joint 3"), 2),
-            (
-                event(3_100, "fault_latched", "link_lost", 1, "joint 3", ""),
-                2,
-            ),
+            (hold(3_100, HoldReason::OperatorLost), 2),
+            (latched(3_100, 4, fault), 1),
+            (latched(4_100, 3, fault), 2),
+            (latched(3_100, 3, Fault::LinkLost), 2),
         ] {
             let all = one.iter().cloned().chain([another.clone()]);
             let (cause, count) = first(all).expect("a cause");
             assert_eq!(count, expected, "{another:?}");
-            assert!(sentence(&cause, count).contains("joint 3: the position sensor"));
+            assert_eq!(
+                cause.headline,
+                "joint 3: the position sensor reads outside its range"
+            );
         }
-        let (cause, _) = first([hold(10, "operator_lost")].into_iter()).expect("a cause");
-        assert_eq!(sentence(&cause, 1), "all axes hold: so, at 0.01 s");
+        let lost = hold(10, HoldReason::OperatorLost);
+        let (cause, _) = first([lost].into_iter()).expect("a cause");
+        assert_eq!(sentence(&cause, 1), "master: all axes hold: so, at 0.01 s");
         assert_eq!(first(std::iter::empty()), None);
     }
 
     #[test]
     fn a_finding_is_told_apart_from_its_remedy() {
-        let text = Finding::LineFull.to_string();
-        let found = event(0, "finding", "line_full", 0, "joint 2", &text);
-        let (cause, _) = first([found].into_iter()).expect("a cause");
-        assert_eq!(cause.remedy, Some(Finding::LineFull.remedy()));
-        let sentence = Finding::LineFull.sentence().trim_end_matches('.');
+        let finding = Finding::LineFull;
+        let found = |node| {
+            let found = wheeleg_telemetry::Cause::Master(MasterEvent::Found { node, finding });
+            let event = FaultEvent::of(0, &found.into()).expect("a fault");
+            first([event].into_iter()).expect("a cause").0
+        };
+        let sentence = finding.sentence().trim_end_matches('.');
+        let cause = found(Some(2));
+        assert_eq!(cause.remedy, Some(finding.remedy()));
         assert_eq!(cause.headline, format!("joint 2: {}", within(sentence)));
+        assert_eq!(found(None).headline, sentence);
     }
 }

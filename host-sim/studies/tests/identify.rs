@@ -6,9 +6,9 @@ use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
+use wheeleg_studies::identify::intervals::{covers, undetermined};
 use wheeleg_studies::identify::lab::Lab;
 use wheeleg_studies::identify::map::Mapped;
-use wheeleg_studies::identify::told::{covers, untold};
 use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
 use wheeleg_studies::study::{Progress, Settings};
 
@@ -105,39 +105,39 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
     let progress = Progress::silent();
     let Fitted {
         fit,
-        told,
+        intervals,
         information,
         stopped,
     } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     assert!(stopped.is_none());
-    let found = (0..COUNT).filter(|i| told[*i].told).count();
-    assert!(found >= 8, "{found} told: {told:?}");
-    for i in (0..COUNT).filter(|i| told[*i].told) {
+    let found = (0..COUNT).filter(|i| intervals[*i].determined).count();
+    assert!(found >= 8, "{found} determined: {intervals:?}");
+    for i in (0..COUNT).filter(|i| intervals[*i].determined) {
         let off = (fit.logs[i] - truth[i]).abs();
         let name = FREE[i].name;
         // Three standard deviations, and a bar of its own for a mistake in the intervals.
         assert!(
-            off < 3.0 * told[i].deviation + 0.01,
+            off < 3.0 * intervals[i].deviation + 0.01,
             "{name}: {off} of {}",
-            told[i].deviation
+            intervals[i].deviation
         );
         assert!(off < 0.25, "{name}: {off}");
     }
     // The truth is about as likely as the fit: a model that has got stuck is not.
     let residuals = problem(&config, &lab).residuals(&truth).expect("a plant");
     assert!(fit.residuals.norm() < 1.1 * residuals.norm());
-    assert!(untold(&information).len() <= COUNT - found);
+    assert!(undetermined(&information).len() <= COUNT - found);
 }
 
 /// A valve that never shuts has no closing delay that could be seen.
 #[test]
-fn what_the_valves_never_did_cannot_be_told() {
+fn what_the_valves_never_did_is_not_determined() {
     let config = config();
     let text = measured(&config.axis, 1, 600, |_| OUT, false);
     let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let Fitted {
         fit,
-        told,
+        intervals,
         information,
         ..
     } = fitted(&problem(&config, &lab), 1, &Progress::silent()).expect("a fit");
@@ -145,14 +145,14 @@ fn what_the_valves_never_did_cannot_be_told() {
         .iter()
         .position(|f| f.name == "closing_delay")
         .expect("one");
-    assert!(!told[closing].told && fit.logs[closing].abs() < 1e-6);
-    let words = untold(&information);
+    assert!(!intervals[closing].determined && fit.logs[closing].abs() < 1e-6);
+    let words = undetermined(&information);
     assert!(
         words.iter().any(|w| w.starts_with("closing delay")),
         "{words:?}"
     );
     // One stroke: far from everything is known, and the intervals say so.
-    assert!(told.iter().filter(|t| t.told).count() < COUNT - 2);
+    assert!(intervals.iter().filter(|t| t.determined).count() < COUNT - 2);
 }
 
 fn study(text: &str, folder: &std::path::Path) -> Result<String, String> {
@@ -394,20 +394,20 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
         let truth = truth(1000 + seed);
         let text = measured(&applied(&config.axis, &truth), seed, 4800, rich, true);
         let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
-        let Fitted { fit, told, .. } =
+        let Fitted { fit, intervals, .. } =
             fitted(&problem(&config, &lab), seed, &Progress::silent()).expect("a fit");
-        let which = (0..COUNT).filter(|i| told[*i].told);
+        let which = (0..COUNT).filter(|i| intervals[*i].determined);
         let mut within = true;
         for i in which {
             all += 1;
-            covered += u32::from(covers(&told[i], fit.logs[i], truth[i]));
+            covered += u32::from(covers(&intervals[i], fit.logs[i], truth[i]));
             within &= (fit.logs[i] - truth[i]).abs() < 0.05;
         }
         close += u64::from(within);
     }
     let share = f64::from(covered) / f64::from(all.max(1));
     println!(
-        "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); told within 5 % in {close} of {count} cylinders (bar 95 %)",
+        "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); determined within 5 % in {close} of {count} cylinders (bar 95 %)",
         100.0 * share
     );
     assert!(count < 20 || (0.90..=0.99).contains(&share), "{share}");

@@ -1,5 +1,6 @@
 //! Events: what happened in a run, as data. Its text is made last, by [`messages`](crate::messages).
 
+pub(crate) mod code;
 mod names;
 
 use wheeleg_config::faults::FaultSpec;
@@ -12,6 +13,7 @@ use wheeleg_protocol::{
 };
 
 use crate::samples::EventSample;
+pub use code::{EventCode, EventKind};
 pub(crate) use names::parameter_name;
 pub use names::{finding_of_name, hold_name, reject_name};
 use names::{master_board, master_code, master_detail, master_kind, side_name, snake_case};
@@ -161,58 +163,6 @@ pub enum BadRequest {
     NotANumber,
 }
 
-/// Kind of an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum EventKind {
-    /// For information.
-    Info,
-    /// The scenario acted (master killed, E-stop pressed).
-    Scenario,
-    /// A user command was given or answered.
-    Command,
-    /// A node or the master changed its mode.
-    Mode,
-    /// A fault was latched or cleared, or something is to be mended.
-    Fault,
-    /// A foot touched or left the ground.
-    Contact,
-    /// A record of a board's own log.
-    Log,
-}
-
-impl EventKind {
-    /// All of them.
-    const ALL: [Self; 7] = [
-        Self::Info,
-        Self::Scenario,
-        Self::Command,
-        Self::Mode,
-        Self::Fault,
-        Self::Contact,
-        Self::Log,
-    ];
-
-    /// The kind of this name, as logged.
-    #[must_use]
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// Lower-case name, as logged.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Info => "info",
-            Self::Scenario => "scenario",
-            Self::Command => "command",
-            Self::Mode => "mode",
-            Self::Fault => "fault",
-            Self::Contact => "contact",
-            Self::Log => "log",
-        }
-    }
-}
-
 impl From<Cause> for Event {
     /// An event after the start-up.
     fn from(cause: Cause) -> Self {
@@ -238,8 +188,8 @@ impl Event {
     pub fn sample(&self) -> EventSample {
         let cause = &self.cause;
         EventSample {
-            kind: cause.kind().name().to_owned(),
-            code: cause.code().to_owned(),
+            kind: cause.kind(),
+            code: cause.code(),
             detail: cause.detail(),
             board: cause.board().map_or(0, Address::raw),
             fault: cause.fault_code().unwrap_or(0),
@@ -268,43 +218,43 @@ impl Cause {
         }
     }
 
-    /// Name that stays the same from version to version, in snake case.
+    /// Its code.
     #[must_use]
-    pub const fn code(&self) -> &'static str {
+    pub const fn code(&self) -> EventCode {
         match self {
             Self::Master(event) => master_code(event),
             Self::Board { change, .. } => match change {
-                BoardChange::Mode { .. } => "mode",
-                BoardChange::FaultLatched(_) => "fault_latched",
-                BoardChange::FaultsCleared => "faults_cleared",
+                BoardChange::Mode { .. } => EventCode::Mode,
+                BoardChange::FaultLatched(_) => EventCode::FaultLatched,
+                BoardChange::FaultsCleared => EventCode::FaultsCleared,
             },
             Self::Contact { switches, .. } => match switches {
-                [false, false, false, false] => "ground_free",
-                _ => "ground_contact",
+                [false, false, false, false] => EventCode::GroundFree,
+                _ => EventCode::GroundContact,
             },
             Self::Command { answer, .. } => match answer {
-                Answer::Accepted => "command_accepted",
-                Answer::Rejected(_) => "command_rejected",
-                Answer::Nothing => "command_unanswered",
+                Answer::Accepted => EventCode::CommandAccepted,
+                Answer::Rejected(_) => EventCode::CommandRejected,
+                Answer::Nothing => EventCode::CommandUnanswered,
             },
-            Self::Flood { .. } => "flood_rejected",
+            Self::Flood { .. } => EventCode::FloodRejected,
             Self::Scenario(act) => match act {
-                Act::KillMaster => "master_killed",
-                Act::EStop => "e_stop_pressed",
-                Act::FaultBegins(_) => "fault_begins",
-                Act::FaultEnds(_) => "fault_ends",
+                Act::KillMaster => EventCode::MasterKilled,
+                Act::EStop => EventCode::EStopPressed,
+                Act::FaultBegins(_) => EventCode::FaultBegins,
+                Act::FaultEnds(_) => EventCode::FaultEnds,
             },
             Self::Service { outcome, .. } => match outcome {
-                ServiceOutcome::Refused { .. } => "service_refused",
-                ServiceOutcome::Taken(_) => "service_taken",
-                ServiceOutcome::Unchanged { .. } => "service_unchanged",
-                ServiceOutcome::Changed { .. } => "service_changed",
-                ServiceOutcome::NotGiven => "service_not_given",
+                ServiceOutcome::Refused { .. } => EventCode::ServiceRefused,
+                ServiceOutcome::Taken(_) => EventCode::ServiceTaken,
+                ServiceOutcome::Unchanged { .. } => EventCode::ServiceUnchanged,
+                ServiceOutcome::Changed { .. } => EventCode::ServiceChanged,
+                ServiceOutcome::NotGiven => EventCode::ServiceNotGiven,
             },
-            Self::LineErrors(_) => "line_errors",
-            Self::LineBroken(_) => "line_broken",
-            Self::LineMended => "line_mended",
-            Self::Failed(_) => "run_failed",
+            Self::LineErrors(_) => EventCode::LineErrors,
+            Self::LineBroken(_) => EventCode::LineBroken,
+            Self::LineMended => EventCode::LineMended,
+            Self::Failed(_) => EventCode::RunFailed,
         }
     }
 
@@ -441,8 +391,8 @@ mod tests {
         });
         let sample = latched.sample();
         assert_eq!(
-            (&*sample.kind, &*sample.code, &*sample.detail),
-            ("fault", "fault_latched", "sensor_range")
+            (sample.kind, sample.code, &*sample.detail),
+            (EventKind::Fault, EventCode::FaultLatched, "sensor_range")
         );
         assert_eq!((sample.board, sample.fault, sample.command), (3, 32, 0));
         assert!(sample.text.starts_with("joint 3: The position sensor"));
@@ -456,14 +406,17 @@ mod tests {
         let refused = Event::from(Cause::Master(MasterEvent::Refused { ticket, reason }));
         let sample = refused.sample();
         assert_eq!(
-            (&*sample.kind, &*sample.code, &*sample.detail),
-            ("command", "command_refused", "board_busy")
+            (sample.kind, sample.code, &*sample.detail),
+            (EventKind::Command, EventCode::CommandRefused, "board_busy")
         );
         assert_eq!((sample.board, sample.command), (8, 0x0132));
 
         let ready = Cause::Master(MasterEvent::NodeReady(1));
         let sample = Event::of_start_up(ready, 5_000).sample();
-        assert_eq!((&*sample.code, sample.start_up_us), ("board_ready", 5_000));
+        assert_eq!(
+            (sample.code, sample.start_up_us),
+            (EventCode::BoardReady, 5_000)
+        );
         assert!(sample.text.starts_with("start-up, 0.005 s after power-up"));
     }
 

@@ -48,7 +48,7 @@ pub use derived::{Attached, CONTACTS_HZ, DERIVED_HZ, Derive, Derived, DerivedDef
 pub use difference::first_difference;
 pub use encode::push_fixed;
 pub use error::LogError;
-pub use event::{Cause, Event, EventKind, finding_of_name};
+pub use event::{Cause, Event, EventCode, EventKind, finding_of_name};
 pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use log_file::LogFile;

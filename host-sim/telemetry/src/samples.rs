@@ -1,6 +1,7 @@
 //! The declaration of every telemetry signal.
 
 use super::encode::{push_fixed, push_i64, push_json_string, push_u64};
+use super::event::code::{EventCode, EventKind};
 use super::registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written};
 
 /// A Rust type that can be a signal.
@@ -46,22 +47,50 @@ impl Value for String {
     const TYPE: FieldType = FieldType::Text;
     const WIRE: Wire = Wire::Text;
     fn pack(&self, out: &mut Vec<u8>) {
-        // Longer texts are cut between two characters.
-        let mut end = self.len().min(usize::from(u16::MAX));
-        while !self.is_char_boundary(end) {
-            end -= 1;
-        }
-        out.extend_from_slice(&(end as u16).to_le_bytes());
-        out.extend_from_slice(&self.as_bytes()[..end]);
+        pack_text(out, self);
     }
     fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
         push_json_string(out, self);
     }
     fn bytes(&self, out: &mut Vec<u8>) {
-        out.extend_from_slice(&(self.len() as u32).to_le_bytes());
-        out.extend_from_slice(self.as_bytes());
+        text_bytes(out, self);
     }
 }
+
+fn pack_text(out: &mut Vec<u8>, text: &str) {
+    // Longer texts are cut between two characters.
+    let mut end = text.len().min(usize::from(u16::MAX));
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    out.extend_from_slice(&(end as u16).to_le_bytes());
+    out.extend_from_slice(&text.as_bytes()[..end]);
+}
+
+fn text_bytes(out: &mut Vec<u8>, text: &str) {
+    out.extend_from_slice(&(text.len() as u32).to_le_bytes());
+    out.extend_from_slice(text.as_bytes());
+}
+
+/// Names of a closed list: texts in the log.
+macro_rules! named_values {
+    ($($t:ty),*) => {$(
+        impl Value for $t {
+            const TYPE: FieldType = FieldType::Text;
+            const WIRE: Wire = Wire::Text;
+            fn pack(&self, out: &mut Vec<u8>) {
+                pack_text(out, self.name());
+            }
+            fn json(&self, out: &mut Vec<u8>, _decimals: u8) {
+                push_json_string(out, self.name());
+            }
+            fn bytes(&self, out: &mut Vec<u8>) {
+                text_bytes(out, self.name());
+            }
+        }
+    )*};
+}
+named_values!(EventKind, EventCode);
 
 macro_rules! integer_values {
     ($($t:ty => $push:ident as $wide:ty, $wire:ident as $packed:ty;)*) => {$(
@@ -381,9 +410,9 @@ samples! {
     /// Something that happened. Filter by the fields; the text is for the eye.
     EventSample = "wheeleg.Event" {
         /// Kind: info, scenario, command, mode, fault, contact, log.
-        kind: String, "text", 0, Host;
+        kind: EventKind, "text", 0, Host;
         /// What happened, by a name that stays the same: fault_latched, hold, command_refused and so on.
-        code: String, "text", 0, Host;
+        code: EventCode, "text", 0, Host;
         /// Mode entered, reason, finding, record of a board's log, side of a foot, parameter or fault injected; empty where there is none.
         detail: String, "text", 0, Host;
         /// Bus address of the board that it is about, 1 to 8; 0: none.
@@ -412,7 +441,7 @@ samples! {
         shifts: u32, "1", 0, Host;
         /// Clients and viewers that are connected.
         clients: u32, "1", 0, Host;
-        /// Samples since the start that the clients could not be told, because the server did not keep up.
+        /// Samples since the start that were not sent to clients, because the server could not keep up.
         dropped: u32, "1", 0, Host;
     }
 
@@ -426,9 +455,9 @@ samples! {
         by: String, "text", 0, Host;
         /// Fault that begins or ends.
         fault: String, "text", 0, Host;
-        /// Simulated over wall time that is asked for, from now on; not a number: as fast as it goes.
+        /// Requested ratio of simulated to wall time, from now on; not a number: as fast as possible.
         speed: f64, "1", 3, Host;
-        /// Whether the clock stands, from now on.
+        /// Whether the clock is paused, from now on.
         paused: bool, "flag", 0, Host;
         /// What was given, for a person: a command with its arguments.
         text: String, "text", 0, Host;

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use wheeleg_control::paper::fuzzy::{GridRules, Partition};
 use wheeleg_control::wheel::{LeadFilter, WheelCommand, WheelController, WheelInput, WheelMode};
-use wheeleg_plant::dynamics::chain::reference::SplitMix;
+use wheeleg_peers::random::SplitMix;
 use wheeleg_units::WheelCount;
 
 use crate::measure::{put_ns, repetitions, timed};

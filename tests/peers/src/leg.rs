@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
-use wheeleg_plant::dynamics::chain::ChainLeg;
-use wheeleg_plant::dynamics::chain::reference::{
+use wheeleg_peers::chain::ChainLeg;
+use wheeleg_peers::chain::reference::{
     GRAVITY_M_S2, LegState, RPP, RPR, Rpp, Rpr, leg_states, weighted,
 };
 use wheeleg_plant::dynamics::{DynamicsError, RobotDynamicsParams};

@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use wheeleg_plant::dynamics::chain::reference::SplitMix;
+use wheeleg_peers::random::SplitMix;
 use wheeleg_protocol::{Address, Decoder, Header, MAX_ENCODED, MessageType, VERSION, encode};
 
 use crate::measure::{put_ns, repetitions, timed};

@@ -4,9 +4,9 @@
 use std::hint::black_box;
 
 use nalgebra::{SVector, Vector3};
+use wheeleg_peers::chain::FloatingState;
+use wheeleg_peers::chain::reference::{ROBOT14, robot_state};
 use wheeleg_plant::dynamics::DynamicsError;
-use wheeleg_plant::dynamics::chain::FloatingState;
-use wheeleg_plant::dynamics::chain::reference::{ROBOT14, robot_state};
 use wheeleg_plant::dynamics::floating::{
     Contacts, FloatingParams, FloatingRobot, FloatingState as OwnState,
 };

@@ -1,7 +1,7 @@
 //! What has to hold in every built-in walk, with every behaviour on.
 
 use wheeleg_config::{Motion, builtin};
-use wheeleg_telemetry::Recording;
+use wheeleg_telemetry::{EventCode, Recording};
 
 use super::metrics::codes;
 use crate::sil;
@@ -66,7 +66,9 @@ fn no_standing_foot_is_moved_by_a_step_and_no_switch_is_taken_for_broken_on_unev
         let [yaw, b5, b6] = most.map(|(mm, _)| mm);
         println!("{name}: steps of yaw {yaw:.2}, b5 {b5:.2}, b6 {b6:.2} mm");
         let broken = recording.events.iter();
-        let broken = broken.filter(|e| e.v.cause.code() == "foot_switch").count();
+        let broken = broken
+            .filter(|e| e.v.cause.code() == EventCode::FootSwitch)
+            .count();
         if yaw > PLANE_MM || b5 > PLANE_MM || b6 > HEIGHT_MM || broken > 0 {
             told.push(format!(
                 "{name}: {most:.2?}, {broken} switches told\n{}",

@@ -4,7 +4,7 @@ use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_master::mirror;
 use wheeleg_master::setpoint::Cylinder;
-use wheeleg_telemetry::{BehaviourSample, FootSample, Recording, Row};
+use wheeleg_telemetry::{BehaviourSample, EventCode, FootSample, Recording, Row};
 
 use crate::sil;
 
@@ -77,7 +77,7 @@ pub(super) fn stalled_swings(recording: &Recording) -> f64 {
     let latched = recording
         .events
         .iter()
-        .any(|e| e.v.cause.code() == "fault_latched");
+        .any(|e| e.v.cause.code() == EventCode::FaultLatched);
     f64::from(stalled + u32::from(latched))
 }
 
@@ -180,9 +180,12 @@ pub(crate) fn drag_of(recording: &Recording, geometry: &WalkGeometry) -> f64 {
 
 /// 0 if the robot stands at the end, has said that it is stuck, and no board has latched a fault.
 pub(super) fn not_ended_safely(recording: &Recording) -> f64 {
-    let told = recording.events.iter().any(|e| e.v.cause.code() == "stuck");
+    let told = recording
+        .events
+        .iter()
+        .any(|e| e.v.cause.code() == EventCode::Stuck);
     let mut codes = recording.events.iter().map(|e| e.v.cause.code());
-    let latched = codes.any(|code| code == "fault_latched");
+    let latched = codes.any(|code| code == EventCode::FaultLatched);
     let end = recording.body.last().map_or(0.0, Row::t_s);
     let last = sil::window(&recording.body, end - 1.0, end);
     let (slowest, fastest) = sil::range(last, |v| v.speed_mm_s);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::process::{ask, command, root, target_dir};
+use crate::process::{ask, command, empty_folder, root, step_folder};
 use crate::rust;
 
 /// Samples of the plan, a case in each of two cells.
@@ -243,13 +243,9 @@ pub(crate) fn check() -> Result<String> {
             bail!("{program} is missing: apt-get install slurm-wlm munge");
         }
     }
-    rust::build(&["--bin", "wheeleg"])?;
-    let wheeleg = target_dir().join("release").join("wheeleg");
-    let home = target_dir().join("xtask").join("slurm");
-    if home.exists() {
-        fs::remove_dir_all(&home)?;
-    }
-    fs::create_dir_all(&home)?;
+    let wheeleg = rust::build_wheeleg()?;
+    let home = step_folder("slurm");
+    empty_folder(&home)?;
     let home = home.canonicalize()?;
     let shipped = root().join("host-sim/campaigns/three-step-spread.toml");
     let plan = fs::read_to_string(&shipped).context("the shipped plan")?;

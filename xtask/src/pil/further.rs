@@ -9,7 +9,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::no_std::Way;
-use crate::process::{root, target_dir};
+use crate::process::{empty_folder, remove_folder, root, target_dir};
 use crate::qemu;
 use crate::report::StepResult;
 use crate::runs::{ensure_equal, most, put_most, run_nodes};
@@ -19,12 +19,21 @@ use crate::sizes;
 const PAPER: &str = "wheeleg-2003";
 const PREDICTIVE: &str = "wheeleg";
 
+/// What the log of a run has.
+#[derive(Debug)]
+enum Reported {
+    /// A board latches the fault of this number in the protocol's table.
+    Fault(u8),
+    /// A board tells the master that it has started anew.
+    Restart,
+}
+
 /// Runs in which boards latch faults, with what causes them: the master falls silent, a
 /// wheel runs against its drive, a valve does not open, the emergency stop; in which a
 /// board's supply or program fails in mid-move, and a request to brake ends with a tick
-/// edge; and what must be told of it.
-const EVENTFUL: [(&str, &[&str], &[&str]); 6] = [
-    ("master-lost", &[], &[NO_SYNC]),
+/// edge; and what must be reported.
+const EVENTFUL: [(&str, &[&str], &[Reported]); 6] = [
+    ("master-lost", &[], &[LINK_LOST]),
     (
         "estop",
         &["--fault", "encoder-reversed:wheel8@5s"],
@@ -38,29 +47,50 @@ const EVENTFUL: [(&str, &[&str], &[&str]); 6] = [
     (
         "three-step",
         &["--fault", "brown-out:joint2=30@3s"],
-        &[RESTARTED],
+        &[Reported::Restart],
     ),
     (
         "three-step",
         &["--fault", "node-reset:wheel8@3.0003s"],
-        &[RESTARTED],
+        &[Reported::Restart],
     ),
     (
         "three-step",
         &["--fault", "node-hang:wheel7@3s"],
-        &[RESTARTED],
+        &[Reported::Restart],
     ),
 ];
-/// Codes of faults, as boards report them, and what the master says.
-const NO_SYNC: &str = "(1)";
-const EMERGENCY_STOP: &str = "(39)";
-const ENCODER: &str = "(41)";
-const NO_MOTION: &str = "(44)";
-const RESTARTED: &str = "it has started anew";
+const LINK_LOST: Reported = Reported::Fault(1);
+const EMERGENCY_STOP: Reported = Reported::Fault(39);
+const ENCODER: Reported = Reported::Fault(41);
+const NO_MOTION: Reported = Reported::Fault(44);
 
 /// A run in which nothing happens says nothing about the ticks in which something does.
-fn ensure_printed(messages: &str, what: &str) -> anyhow::Result<()> {
-    ensure!(messages.contains(what), "nobody has told `{what}`");
+/// `events` is the table of the run's events.
+fn ensure_reported(events: &str, what: &Reported) -> anyhow::Result<()> {
+    let mut lines = events.lines();
+    let columns: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let place = |name: &str| {
+        let place = columns.iter().position(|column| *column == name);
+        place.with_context(|| format!("the table of events has no column `{name}`"))
+    };
+    let (code, detail, fault) = (
+        place("code [text]")?,
+        place("detail [text]")?,
+        place("fault [code]")?,
+    );
+    // Only the text, behind all others, may have commas of its own.
+    let mut rows = lines.map(|line| line.split(',').collect::<Vec<_>>());
+    let found = rows.any(|row| match what {
+        Reported::Fault(number) => {
+            let is_it = |fault: &&str| fault.parse() == Ok(*number);
+            row.get(code) == Some(&"fault_latched") && row.get(fault).is_some_and(is_it)
+        }
+        Reported::Restart => {
+            row.get(code) == Some(&"diagnosis") && row.get(detail) == Some(&"reset")
+        }
+    });
+    ensure!(found, "the log has no {what:?}");
     Ok(())
 }
 
@@ -74,7 +104,7 @@ fn ensure_measured(worst: u64, image: &str) -> anyhow::Result<()> {
 fn with_faults(emulator: &Path, images: &Path, folder: &str, robot: &str) -> StepResult<Value> {
     let environment = [("WHEELEG_PIL", emulator), ("WHEELEG_IMAGES", images)];
     let mut runs = Vec::new();
-    for (number, (scenario, faults, codes)) in EVENTFUL.into_iter().enumerate() {
+    for (number, (scenario, faults, reported)) in EVENTFUL.into_iter().enumerate() {
         let folder = format!("{folder}-{number}");
         let further = [&["--compare-sil", "--robot", robot], faults].concat();
         let mut run = run_nodes(
@@ -85,9 +115,10 @@ fn with_faults(emulator: &Path, images: &Path, folder: &str, robot: &str) -> Ste
             &further,
         )?;
         ensure_equal(&run["pil"]).with_context(|| format!("{scenario} {faults:?}"))?;
-        let told = run["messages"].to_string();
-        for code in codes {
-            ensure_printed(&told, code).with_context(|| format!("{scenario} {faults:?}"))?;
+        let events = target_dir().join(&folder).join("csv/events.csv");
+        let events = fs::read_to_string(&events).with_context(|| events.display().to_string())?;
+        for what in reported {
+            ensure_reported(&events, what).with_context(|| format!("{scenario} {faults:?}"))?;
         }
         let pil = run["pil"].take();
         for image in ["joint", "wheel"] {
@@ -168,8 +199,8 @@ pub(super) fn mixed(emulator: &Path, images: &Path, way: Way) -> StepResult<Valu
     qemu::emulator()?;
     let folder = target_dir().join("pil-run").join("mixed");
     let both = folder.join("images");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&both).with_context(|| both.display().to_string())?;
+    remove_folder(&folder)?;
+    empty_folder(&both)?;
     // The program looks for all images in one folder.
     let on_qemu = qemu::images(way)?;
     let wanted = [(images, "joint.elf"), (images, "wheel.elf")]
@@ -211,4 +242,22 @@ fn ensure_three_kinds(kinds: &BTreeSet<&str>) -> anyhow::Result<()> {
     let all = BTreeSet::from(["pil", "qemu", "sil"]);
     ensure!(*kinds == all, "boards of {kinds:?}, not {all:?}");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_run_reports_is_read_from_its_events() {
+        let events = "time [s],kind [text],code [text],detail [text],board [code],fault [code],text [text]\n\
+            1.0,fault,fault_latched,no_motion,3,44,\"joint 3: It does not move, or (39)\"\n\
+            1.1,fault,diagnosis,fault,3,39,\"it has started anew\"\n";
+        assert!(ensure_reported(events, &NO_MOTION).is_ok());
+        assert!(ensure_reported(events, &EMERGENCY_STOP).is_err());
+        assert!(ensure_reported(events, &Reported::Restart).is_err());
+        let restarted = format!("{events}2.0,fault,diagnosis,reset,8,0,\"so\"\n");
+        assert!(ensure_reported(&restarted, &Reported::Restart).is_ok());
+        assert!(ensure_reported("time [s],text [text]\n", &NO_MOTION).is_err());
+    }
 }

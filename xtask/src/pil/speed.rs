@@ -5,7 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::load;
-use crate::runs::{build_wheeleg, three_steps};
+use crate::runs::three_steps;
+use crate::rust::build_wheeleg;
 
 /// Least speed of eight boards with the plant, times real time, on 2 cores.
 pub(super) const SPEED_LEAST: f64 = 2.0;

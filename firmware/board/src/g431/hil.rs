@@ -17,7 +17,7 @@ use wheeleg_units::Micros;
 const DIVIDER: u16 = (clock::CLOCK_HZ / 1_000_000) as u16;
 const HOST: &str = "STM32G431, HIL over USART2";
 
-/// Runs a board on the serial line, for ever: the next partner may open a new
+/// Runs a board on the serial line, for ever: the next simulator may open a new
 /// session. Pins and session are kept where they are made: the stack holds what it takes
 /// to make a board, and not the board as well.
 pub fn run<B: Board<'static>>(

@@ -1,4 +1,4 @@
-//! Who a board is: the 96-bit unique id of the processor, and what its image says of
+//! Identity of a board: the 96-bit unique id of the processor, and what its image reports about
 //! itself.
 
 use wheeleg_identity::{Digest, Identity, Kind, Record};

@@ -29,7 +29,7 @@ pub fn start() {
 }
 
 /// The supply sags: outputs off at once; then either it goes on falling until
-/// the brown-out reset, or it comes back and the board starts anew. The watchdog
+/// the brown-out reset, or it comes back and the board restarts. The watchdog
 /// bounds the wait.
 pub fn on_sag() -> ! {
     pins::force_outputs_off();

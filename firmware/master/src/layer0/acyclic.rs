@@ -1,4 +1,4 @@
-//! Acyclic requests: what is to be asked of which node, and on whose behalf.
+//! Acyclic requests: what to request from which node, and on whose behalf.
 
 use heapless::Deque;
 use wheeleg_protocol::{Address, Message};

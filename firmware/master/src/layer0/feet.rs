@@ -1,15 +1,15 @@
-//! Foot switches that cannot be right.
+//! Foot switches whose readings are implausible.
 //!
-//! A foot may stand on an edge or tilted: that a switch stays open while the foot's other three
-//! are closed, or closed while they are open, says nothing yet. Two things do:
+//! A foot may stand on an edge or tilted: a switch that stays open while the foot's other three are
+//! closed, or closed while they are open, proves nothing yet. Two observations do:
 //!
-//! * **Stuck closed.** In a swing, clear of where the foot stood, nothing should close it. Seen in
-//!   two swings without its having opened in between, it is stuck.
-//! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as
-//!   the ground does where it is even. Twice in a row the other three closed, and it did not:
-//!   uneven ground would have closed it once.
+//! * **Stuck closed.** During a swing, clear of where the foot stood, nothing should close it. If it
+//!   is seen closed in two swings without having opened in between, it is stuck.
+//! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as even
+//!   ground does. If the other three close twice in a row and it does not, it is stuck: on uneven
+//!   ground it would have closed once.
 //!
-//! It takes some steps to know; the gait does not wait for it.
+//! This takes some steps; the gait does not wait for it.
 
 use wheeleg_units::PositionMm;
 

@@ -1,5 +1,5 @@
-//! Boards that stay armed while nobody is: the master has started again without their
-//! noticing, or a request to disarm was lost. They are named, and asked to disarm.
+//! Boards that stay armed while no other board is: the master has restarted without their noticing,
+//! or a request to disarm was lost. They are reported, and requested to disarm.
 
 use wheeleg_protocol::{Address, Disarm, Message};
 

@@ -1,10 +1,11 @@
-//! What is on the line beside what was asked for, and who sends it.
+//! Frames on the line that nobody requested, and who sends them.
 //!
-//! A board that babbles within its driver-enable guard spoils its own slot alone:
-//! the slot names it. Where the board in the slot before is not heard either, the replies of
-//! the two fall on one another: the clock of one of them runs wrong. Without the guard it spoils all of them, and nobody can be
-//! heard; when the line is quiet again, the boards' own counters tell: a board whose
-//! driver is on hears nothing, so the one that has counted no errors has made them.
+//! A board that babbles within its driver-enable time limit spoils only its own slot, which
+//! identifies it. If the board in the slot before is not received either, the replies of the two
+//! collide: the clock of one of them is wrong. Without the time limit a babbling board spoils all
+//! slots, and no board can be received. When the line is quiet again, the boards' own counters tell
+//! which one it was: a board whose driver is on receives nothing, so the one that has counted no
+//! errors has caused them.
 
 use wheeleg_protocol::link::SlotTiming;
 use wheeleg_protocol::{Address, LinkRecord, Message, MessageType};

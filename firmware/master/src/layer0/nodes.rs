@@ -168,7 +168,7 @@ impl Nodes {
     }
 
     /// Takes the frames that a node has counted. True if it goes on counting from
-    /// where it was: a board that was reset since begins anew.
+    /// where it was: a board that was reset since restarts.
     pub fn counted(&mut self, from: Address, frames: u32) -> bool {
         let node = from.slot().and_then(|index| self.nodes.get_mut(index));
         let before = node.and_then(|node| node.frames.replace(frames));

@@ -1,10 +1,10 @@
-//! Questions that the master asks by itself, in time that nobody else needs: why a
-//! board failed or started anew, what it has heard, what it has logged.
+//! Diagnostic requests that the master sends in otherwise unused time: why a board failed or
+//! restarted, what it has received, what it has logged.
 //!
-//! They take one acyclic exchange in ten cycles, and one at once after a fault. What
-//! boards have heard is asked for while the master itself hears broken frames; on a
-//! sound line, which has little to tell, in every eighth round: with it comes the sum of
-//! the parameters in force.
+//! They take one acyclic exchange in ten cycles, and one immediately after a fault. What boards have
+//! received is requested while the master itself receives broken frames; on an undisturbed line,
+//! where there is little to report, in every eighth round. The checksum of the parameters in force
+//! comes with it.
 
 use wheeleg_protocol::{Address, FaultReport, LinkReport, LogRead, Message, NodeMode, SlotReply};
 
@@ -43,7 +43,7 @@ pub struct Questions {
     quiet: u8,
 }
 
-/// Whether a board has started anew between two replies.
+/// Whether a board has restarted between two replies.
 pub(super) fn has_started(before: Option<&SlotReply>, reply: &SlotReply) -> bool {
     reply.mode == NodeMode::Boot && before.is_some_and(|b| b.mode != NodeMode::Boot)
 }

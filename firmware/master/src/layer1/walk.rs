@@ -66,7 +66,7 @@ const TRIES: u8 = 3;
 const GOVERNED: f32 = 0.5;
 /// Acts that wait to be told.
 const TOLD: usize = 2;
-/// The wheels' references begin anew after this distance, mm, far below what they can tell.
+/// The wheels' references restart after this distance, mm, far below what they can tell.
 const SEGMENT_MM: f32 = 4000.0;
 
 /// A walk under way.

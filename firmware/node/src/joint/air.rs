@@ -1,10 +1,9 @@
-//! The air that the valves should have brought, and the force that it should make.
+//! The air that the valves should have let in, and the force that it should produce.
 //!
-//! A board has no pressure sensor, but it knows every on-time it has sent and every
-//! stroke it has read. [`Air`] follows both chambers with that, for supervision only,
-//! whatever law drives: cheap rather than exact, each chamber in every third tick.
-//! Volumes are lengths, volume over piston area, and with n = 1.2 a chamber of length L
-//! obeys
+//! A board has no pressure sensor, but it knows every on-time it has commanded and every stroke it
+//! has read. From these [`Air`] estimates both chambers, for supervision only, whatever law drives:
+//! cheap rather than exact, each chamber in every third tick. Volumes are lengths, volume over
+//! piston area, and with n = 1.2 a chamber of length L obeys
 //!
 //! ```text
 //! Δp = n (C' t_fill ψ_s − C' t_vent ψ_v p − p Δx) / L        C' = C ρ0 R T / area
@@ -12,16 +11,16 @@
 //!
 //! Flow is choked up to a pressure ratio b and falls off beyond it; the chord
 //! `min(1, 3 (1 − r)/(1 − b))` stands for the ellipse of ISO 6358, at most 0.2 off it.
-//! Switching delays are left out of it while the piston moves: a pulse of a control law opens
-//! a valve for nearly as long as it lasts, and what is off is learnt with the load.
+//! Switching delays are neglected while the piston moves: a pulse of a control law opens a valve for
+//! nearly as long as it lasts, and the remaining error is learnt together with the load.
 //!
-//! While it stands nothing corrects the account, and a valve that is slower than told lets
-//! a short pulse do nothing at all: pulse after pulse the account would gain force that is not
-//! there. So only what is certain counts then: a valve is open for certain once it has been
-//! energised for nearly twice the time told for it to open ([`SLOWER_FIFTHS`]).
+//! During rest nothing corrects the estimate. A valve that is slower than stated lets a short pulse
+//! have no effect at all: pulse after pulse the estimate would gain force that does not exist. So
+//! only what is certain counts then: a valve is certainly open once it has been energised for nearly
+//! twice its stated opening time ([`SLOWER_FIFTHS`]).
 //!
-//! What was in the chambers at power-up nobody knows. It no longer matters once both
-//! have been vented for a while, for certain; so that is counted, too.
+//! The content of the chambers at power-up is unknown. It no longer matters once both have certainly
+//! been vented for a while; so that is counted, too.
 
 use core::hash::{Hash, Hasher};
 use wheeleg_control::axis::AxisModel;
@@ -274,7 +273,7 @@ impl Content {
         };
         // Pressures below 2^19, lengths of a round up to 2^18: sums below 2^39.
         let mut sum = i64::from(p).wrapping_mul(i64::from(shrinks));
-        // Of a valve of which nothing is ever certain the rounds begin anew after 15.
+        // Of a valve of which nothing is ever certain the rounds restart after 15.
         let mut next = 0;
         if open & 0xFFFF != 0 {
             let (time, sure, rounds) = taken(open, model.slow);
@@ -305,7 +304,7 @@ impl Content {
 ///
 /// Only the sum of a round is known. Where a valve that is open for certain is shut and energised
 /// again inside one round, the second pulse counts as certain, too: at most 2 ms of air that may
-/// not be there, in this round alone, because after one that is not whole the count begins anew.
+/// not be there, in this round alone, because after one that is not whole the count restarts.
 #[inline(always)]
 fn taken(open: u32, slow: u32) -> (u32, u32, u32) {
     let time = open & TIME;

@@ -1,30 +1,30 @@
-//! Motion that was expected and did not come.
+//! Detects motion that is expected but does not happen.
 //!
-//! A frozen potentiometer, a valve that is stuck, a cylinder that leaks or is blocked:
-//! each reads like an axis at rest, or like one that follows somehow. What tells them
-//! apart is the air: [`Air`] says which force the chambers should make. Three things can
-//! then not be on a sound axis that stands still:
+//! A frozen potentiometer, a stuck valve, a cylinder that leaks or is blocked: each looks like an
+//! axis at rest, or like one that follows to some degree. What distinguishes them is the air:
+//! [`Air`] estimates the force that the chambers should produce. Three conditions cannot occur on an
+//! intact axis at rest:
 //!
-//! 1. Towards its reference, it is pushed by more than its motions take, break-away
-//!    friction and the margin of the axis included, for 30 ms.
-//! 2. Nothing has been learnt from motions yet, but the force should be nine tenths of
-//!    the largest, with the opposing chamber known to be empty, for 200 ms.
-//! 3. A chamber of an account that has had time to get right should hold eleven eighths
-//!    of the supply, for 30 ms. No load makes that on an axis that the supply can move:
-//!    the air has gone another way.
+//! 1. It is pushed towards its reference by more than its motions take, break-away friction and the
+//!    margin of the axis included, for 30 ms.
+//! 2. Nothing has been learnt from motions yet, but the force should be nine tenths of the largest,
+//!    with the opposing chamber known to be empty, for 200 ms.
+//! 3. A chamber whose estimate has had time to become accurate should hold eleven eighths of the
+//!    supply pressure, for 30 ms. No load causes this on an axis that the supply can move: the air
+//!    has escaped.
 //!
-//! The force that a motion takes is learnt whenever the piston slides, as the mean over
-//! the last 0.1 s of sliding: load and errors of the account together. So neither a load
-//! nor a supply or valves other than told are taken for a fault: what the account has
-//! wrong when the piston comes to rest is taken off, and while it stands only such air
-//! counts as valves nearly twice as slow as told let through for certain. A longer mean lags behind
-//! an account that goes wrong on the way, by as much as a valve that does not open for the
-//! short pulses at the end of a motion. Robots drawn off their data are walked by
-//! `tests/system/off_data.rs`; what came of it stands in `host-sim/FAULTS.md`.
+//! The force that a motion takes is learnt whenever the piston slides, as the mean over the last
+//! 0.1 s of sliding: load and errors of the estimate together. So neither a load nor a supply or
+//! valves that differ from their parameters are taken for a fault: the error of the estimate when
+//! the piston comes to rest is subtracted, and during rest only that air counts which valves nearly
+//! twice as slow as stated would certainly let through. A longer mean would lag behind an estimate
+//! that drifts on the way, by as much as a valve that does not open for the short pulses at the end
+//! of a motion. `tests/system/off_data.rs` runs robots that differ from their data; the results are
+//! in `host-sim/FAULTS.md`.
 //!
-//! The margin is the room for a load that changes while the axis stands: a parameter,
-//! because only who knows the machine knows its loads; half of the largest force where
-//! none is told.
+//! The margin leaves room for a load that changes while the axis is at rest. It is a parameter,
+//! because only the user of the machine knows its loads; if none is stated, it is half of the
+//! largest force.
 
 use super::air::{Air, AirModel, ROUND};
 use crate::JOINT_TICK;
@@ -227,7 +227,7 @@ impl MotionWatch {
     }
 
     /// A tick in which the valves are not the law's, open for `on`: the air is followed, nothing
-    /// is expected, and loads have to be learnt anew afterwards.
+    /// is expected, and loads have to be learnt again afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         let third = self.air.follow(on, position, &model.air, false);

@@ -215,7 +215,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.controller.reset();
             self.controller.set_correction(self.settings.correction);
             // Nobody knows which stroke was damaged: with the next good reading all that holds
-            // a history of them begins anew.
+            // a history of them restarts.
             self.monitor.restart();
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -252,7 +252,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// Everything that holds a history of strokes begins anew, at the measured one: the piston
+    /// Everything that holds a history of strokes restarts, at the measured one: the piston
     /// may have moved unseen, and its way here is no motion.
     #[cold]
     #[inline(never)]

@@ -1,27 +1,28 @@
 //! Filling both chambers after arming, before the control law drives.
 //!
-//! After a stop the chambers may be empty, and a law that meets an error then drives a
-//! piston that no air holds back: it jumps. So an axis that is armed first fills both chambers
-//! to the precharge pressure, outlets shut, with short pulses of one inlet at a time.
+//! After a stop the chambers may be empty. A law that then sees an error drives a piston without
+//! any air to hold it back: it jumps. Therefore an axis first fills both chambers to the precharge
+//! pressure after arming, with the outlets shut, in short pulses of one inlet at a time.
 //!
-//! * **The piston must not move.** The force of both chambers, as the account of the air
-//!   has it, is held where it was at arming: the next pulse goes to the chamber that pushes too
-//!   little, and where the two pulses are unequal to the larger chamber until there is room for the
-//!   coarser one. A piston that has moved all the same shifts that balance against its motion, so the
-//!   chamber that pushed it waits, and the other one is filled further.
-//! * **A pulse** lasts as long as its chamber takes for a 64th of the supply pressure, but
-//!   no shorter than the valve can be opened, and no longer than half a PWM period, of which each has one.
-//! * **It ends** when both chambers hold the pressure, when the piston has moved by more than
-//!   [`WAY`], or when the time is over ([`LONGEST`]). Then the closed loop takes over, from where
-//!   the piston is. Of what is left that is the safe answer: a leg that rises or sinks is held by its
-//!   law, with inlets and outlets; shut valves would leave it to what is in the chambers.
+//! * **The piston must not move.** The force of both chambers, as estimated by the air model, is
+//!   kept at its value when arming: the next pulse goes to the chamber that pushes too little. Where
+//!   the two pulses differ in size, it goes to the larger chamber until the coarser pulse fits. If the
+//!   piston moves nevertheless, this balance is shifted against its motion: the chamber that pushed
+//!   it waits, and the other one is filled.
+//! * **A pulse** lasts until its chamber has gained a 64th of the supply pressure. It is no shorter
+//!   than the valve can be opened, and no longer than half a PWM period; each period has one pulse.
+//! * **It ends** when both chambers have reached the pressure, when the piston has moved by more than
+//!   [`WAY`], or after [`LONGEST`]. Then the closed loop takes over at the present position. That is
+//!   the safest continuation: the law holds a leg that rises or sinks, whereas shut valves would
+//!   leave it to the air in its chambers.
 //!
-//! What is in the chambers at power-up nobody knows; the account takes it for the atmosphere.
-//! With valves shut it loses pressure faster than any sound seal, at the latest when the axis is
-//! disarmed, so that an axis that stood for a while is filled anew. Chambers cannot be filled above the supply, which a cylinder bears. Where the account is wrong
-//! the filling is out of balance, and the way of the piston bounds it. A board has no pressure
-//! sensor either: without supply it counts air that does not come, for no longer than with it, and that
-//! nothing moves is found under control.
+//! The content of the chambers at power-up is unknown; the model assumes atmospheric pressure. With
+//! the valves shut the model loses pressure faster than any intact seal does, so that an axis that
+//! has been idle for a while is filled again. Chambers cannot be filled above the supply pressure,
+//! which a cylinder withstands. If the model is wrong, the filling is unbalanced, and the travel of
+//! the piston limits it. Nor does a board have a pressure sensor for the supply: without supply it
+//! counts air that does not arrive, for no longer than with supply, and the lack of motion is found
+//! under control.
 
 use super::no_motion_detector::MotionWatch;
 use super::settings::TickSettings;

@@ -159,7 +159,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Sets one parameter, or changes nothing.
     #[inline(never)]
     fn set_parameter(&mut self, id: u16, raw: i32, at: Micros) -> Result<(), NackReason> {
-        // With other units or limits the watches start anew; what they have found stands.
+        // With other units or limits the watches restart; what they have found stands.
         if let Some(fault) = self.found() {
             self.axis_fault(fault, at);
         }

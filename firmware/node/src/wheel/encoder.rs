@@ -1,11 +1,10 @@
-//! Encoder loss and reversal, seen from drive and counts.
+//! Encoder loss and reversal, detected from drive and counts.
 //!
-//! A motor that is driven well must turn, and in the direction of the drive.
-//! Suspicious is a sample in which the drive is at least
-//! [`DRIVE_PERCENT`] and the count stands still or runs against it. Suspicion
-//! for the whole of [`WINDOW`] is a fault, unless the wheel ran against the
-//! drive and has slowed down: then it is being braked, and the window starts
-//! anew. A blocked wheel is a fault by the same rule.
+//! A motor that is driven hard enough must turn, in the direction of the drive. A sample is
+//! suspicious if the drive is at least [`DRIVE_PERCENT`] and the count does not change or runs
+//! against it. If all samples of [`WINDOW`] are suspicious, that is a fault, unless the wheel ran
+//! against the drive and has slowed down: then it is being braked, and the window restarts. A
+//! blocked wheel is a fault by the same rule.
 
 use wheeleg_units::Micros;
 

@@ -360,7 +360,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         result
     }
 
-    /// Another target between two samples. Only what every sample changes is checked and sealed anew.
+    /// Another target between two samples. Only what every sample changes is checked and sealed again.
     pub(super) fn aim(&mut self, target: Target) {
         let intact = self.seal.holds(&self.moving());
         self.target = target;

@@ -142,7 +142,7 @@ impl AxisSim {
 
     /// What the board says after its last tick, as Board.snapshot().
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        board::told(py, &self.bench.board, &self.action)
+        board::report(py, &self.bench.board, &self.action)
     }
 
     /// What the board was commissioned with, as Board.parameters().

@@ -88,7 +88,7 @@ pub(crate) fn listed<'py>(
 }
 
 /// What a board says after a tick.
-pub(crate) fn told<'py>(
+pub(crate) fn report<'py>(
     py: Python<'py>,
     node: &Node,
     action: &Action,
@@ -210,7 +210,7 @@ impl Board {
     /// What the board says after its last tick: measured_m, velocity_m_s, reference_m, duty,
     /// settled, driving, faults (names).
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        told(py, &self.node, &self.action)
+        report(py, &self.node, &self.action)
     }
 
     /// What it was commissioned with, by name, in the unit of the protocol's table.

@@ -46,7 +46,7 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
     };
     let told: Vec<(String, u64)> = causes
         .iter()
-        .map(|(cause, cases)| (state.causes.told(cause), *cases))
+        .map(|(cause, cases)| (state.causes.message(cause), *cases))
         .collect();
     assert_eq!(causes[0], (&no_result(Status::Error, "planted"), 1));
     assert!(told[1].0.starts_with("panic: planted in 3 ("), "{told:?}");

@@ -125,25 +125,25 @@ const fn signed(
 
 kinds! {
     MasterSilent = "master-silent", Robot, None,
-        "The master stops sending, in mid-cycle, for good unless an end is given.";
+        "The master stops sending in mid-cycle, permanently unless an end is given.";
     MasterFrozen = "master-frozen", Robot, None,
-        "The master repeats its last SYNC: it sends, but its counter stands.";
+        "The master repeats its last SYNC: it sends, but its cycle counter does not advance.";
     MasterReset = "master-reset", Robot, value("ms", 1.0, 1000.0, 30.0, "time until it sends again"),
-        "The master is reset: it forgets everything and starts anew.";
+        "The master is reset: it loses its state and restarts.";
     ClientReset = "client-reset", Robot, None,
-        "The user's program is started anew and opens a new session at the master.";
+        "The user's program restarts and opens a new session with the master.";
     LayerOneStall = "layer1-stall", Robot, None,
-        "Layer 1 of the master gives no set-points any more.";
+        "Layer 1 of the master stops delivering set-points.";
     CommandFlood = "command-flood", Robot, value("1/cycle", 1.0, 1000.0, 100.0, "commands per bus cycle"),
         "A user gives more commands than the FIFO between the layers holds.";
     NodeSilent = "node-silent", Board, None,
         "A board receives and works, but its transmitter is dead.";
     NodeOff = "node-off", Board, None,
-        "A board loses its power, for good unless an end is given: its outputs drop, it hears and says nothing.";
+        "A board loses its power, permanently unless an end is given: its outputs drop, it neither receives nor sends.";
     NodeReset = "node-reset", Board, None,
-        "A board loses its power for a tick and starts anew.";
+        "A board loses its power for a tick and restarts.";
     BrownOut = "brown-out", Board, value("ms", 1.0, 1000.0, 30.0, "time without power"),
-        "A board loses its power for a while and starts anew.";
+        "A board loses its power for a while and restarts.";
     NodeHang = "node-hang", Board, None,
         "A board's program stops; its hardware keeps the last outputs until the watchdog resets it.";
     ProcessorFault = "processor-fault", Board, None,
@@ -153,7 +153,7 @@ kinds! {
     BabbleUnguarded = "babble-unguarded", Board, None,
         "A board babbles without end, and its driver-enable time limit is broken too.";
     BusFull = "bus-full", Robot, None,
-        "A stream of records fills all of the line that SYNC, slots and requests leave free.";
+        "A stream of records fills all capacity of the line that SYNC, slots and requests leave free.";
     DuplicateAddress = "duplicate-address", Board, None,
         "Another board with the same address straps is plugged in.";
     OtherInterface = "other-interface", Board, None,
@@ -169,7 +169,7 @@ kinds! {
     CycleJitter = "cycle-jitter", Robot, value("ms", 1e-3, 5.0, 1.0, "largest deviation to either side"),
         "The master's cycle starts early or late, at random.";
     ClockDrift = "clock-drift", Board, signed("ppm", 50_000.0, 1.0, 200.0, "too fast is positive"),
-        "A board's clock runs wrong.";
+        "A board's clock runs too fast or too slow.";
     PotOpen = "pot-open", Joint, None,
         "The potentiometer's wiper is open: the converter input floats up to its reference.";
     PotShort = "pot-short", Joint, None,
@@ -183,7 +183,7 @@ kinds! {
     SwitchStuckOff = "foot-switch-off", FootSwitch, None,
         "An optical foot switch never reports contact.";
     EncoderLost = "encoder-lost", Wheel, None,
-        "The encoder gives no more edges.";
+        "The encoder delivers no more edges.";
     EncoderReversed = "encoder-reversed", Wheel, None,
         "The encoder's channels are swapped: it counts the wrong way.";
     ValveStuckOpen = "valve-stuck-open", Valve, None,
@@ -195,13 +195,13 @@ kinds! {
     ValveLeak = "valve-leak", Joint, value("1", 1.1, 1e4, 1000.0, "factor on the leakage past piston and rod"),
         "Seals of a cylinder leak.";
     SupplySag = "supply-sag", Robot, value("bar", 0.5, 9.9, 3.0, "source pressure over ambient, below the source of the robot"),
-        "The air source gives less pressure.";
+        "The air source delivers less pressure.";
     SupplyLost = "supply-lost", Robot, None,
         "The air source fails.";
     TubeBurst = "tube-burst", Robot, None,
         "The tube behind the reservoir bursts: it empties to the atmosphere, the source is cut off.";
     LoadStep = "load-step", Joint, signed("N", 200.0, 1.0, 60.0, "force, positive extends"),
-        "A force acts on a piston from one instant to the next.";
+        "A force suddenly acts on a piston.";
     FootLosesContact = "foot-loses-contact", Robot, value("m", 0.001, 0.2, 0.03, "how far the ground falls"),
         "The ground under the feet falls away.";
     FootSinks = "foot-sinks", Robot, value("m", 0.001, 0.2, 0.03, "how far the ground gives way, at 30 mm/s"),
@@ -211,7 +211,7 @@ kinds! {
     InvalidParameter = "invalid-parameter", Board, None,
         "A service tool writes parameters of a board: a value above its limit, an unknown number, a value of another type.";
     DiskFull = "disk-full", Robot, None,
-        "The recorder can write no more.";
+        "The recorder cannot write any more.";
 }
 
 impl FaultKind {

@@ -3,8 +3,8 @@
 
 use wheeleg_protocol::param::JointParam;
 
+use crate::derived::limits_si;
 use crate::params::params;
-use crate::told::limits_si;
 
 // What a joint board is told of its axis has the limits of the board's parameters.
 const VALVE_ON: [f64; 2] = limits_si(JointParam::ValveOn, 1e6);

@@ -1,17 +1,17 @@
-//! What a joint board can be told of its axis.
+//! Limits of the parameters that a joint board gets from its axis.
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::param::JointParam;
 
 use super::Broken;
+use crate::derived::{DERIVED, limits};
 use crate::quantity::{brief, suffix};
 use crate::reader::range;
-use crate::told::{TOLD, limits};
 
 /// A quantity that is made of several fields, within the limits of the board's parameter.
-pub(super) fn told(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {
-    let told = TOLD.iter().find(|told| told.parameter == parameter)?;
-    if told.fits(axis) {
+pub(super) fn within_limits(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {
+    let derived = DERIVED.iter().find(|row| row.parameter == parameter)?;
+    if derived.fits(axis) {
         return None;
     }
     let row = parameter.info();
@@ -20,7 +20,7 @@ pub(super) fn told(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {
         figures: format!(
             "together they make its `{}` {}{}",
             row.name,
-            brief(told.value(axis)),
+            brief(derived.value(axis)),
             suffix(row.unit)
         ),
         offers: Vec::new(),

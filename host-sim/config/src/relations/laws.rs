@@ -5,10 +5,10 @@ use wheeleg_master::layer1::params::{ParamError, Pattern};
 use wheeleg_master::layer1::square::GUARD_MM;
 
 use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
+use crate::derived::STEPS_AT_REST;
 use crate::gait::GaitParams;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
-use crate::told::STEPS_AT_REST;
 
 /// Shares of its track between which a wiper stands: beyond, a board takes it for torn off or
 /// shorted. As a commissioned board is told.
@@ -63,8 +63,8 @@ pub(super) fn track(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     offered(
         format!(
             "with the rod out it stands at {} of {}",
-            f.told(it.fields[0], reach_m),
-            f.told(it.fields[0], electrical_m)
+            f.format(it.fields[0], reach_m),
+            f.format(it.fields[0], electrical_m)
         ),
         vec![
             Offer::new(f, it.fields[0], Bound::From, least_m),
@@ -220,7 +220,7 @@ pub(super) fn belly(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
             "the third value of `{}`, up from the axle, is allowed above {}, which is \
              −`{}`",
             it.fields[0],
-            f.told(it.fields[0], -radius_m),
+            f.format(it.fields[0], -radius_m),
             it.fields[1]
         ),
     )
@@ -330,7 +330,7 @@ impl Calibrated {
         ]
     }
 
-    fn told(&self, [inside, out]: [f64; 2], unit: &str) -> String {
+    fn format(&self, [inside, out]: [f64; 2], unit: &str) -> String {
         let stroke = pretty(self.stroke_m * 1e3);
         let (inside, out) = (brief(inside), brief(out));
         format!("strokes of 0 and {stroke} mm are measured as {inside} and {out} {unit}")
@@ -350,7 +350,7 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         pretty(least),
         pretty(most)
     );
-    broken(sensor.told(codes, "of 65536 codes"), allowed)
+    broken(sensor.format(codes, "of 65536 codes"), allowed)
 }
 
 /// What a joint board measures at both stops is a travel that it allows.
@@ -363,7 +363,7 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     }
     let range = format!("{} to {} mm", pretty(least), pretty(most));
     Some(Broken {
-        figures: sensor.told(measured, "mm"),
+        figures: sensor.format(measured, "mm"),
         offers: vec![sensor.calibrated(f, it)],
         words: format!("a board takes strokes of {range}"),
     })
@@ -379,7 +379,7 @@ pub(super) fn measured(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         return None;
     }
     Some(Broken {
-        figures: sensor.told(measured, "mm"),
+        figures: sensor.format(measured, "mm"),
         offers: vec![sensor.calibrated(f, it)],
         words: format!(
             "allowed are up to {} mm with the rod in and from {} mm with it out, `homing.tolerance` \

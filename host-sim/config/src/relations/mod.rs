@@ -40,7 +40,7 @@ pub struct Relation {
     /// Name.
     pub name: &'static str,
     /// Paths of the fields; the first is the one that a refusal points at. What a file has not got,
-    /// as a robot has no `moving.load`, is not told of it.
+    /// as a robot has no `moving.load`, is left out.
     pub fields: &'static [&'static str],
     /// What is wrong where it does not hold.
     pub broken: &'static str,
@@ -58,8 +58,8 @@ enum Rule {
     Below,
     /// The first field is above the other, or the sum of the others.
     Above,
-    /// A joint board can be told of the axis what this parameter holds.
-    Told(JointParam),
+    /// This parameter of a joint board, as it follows from the axis, is within its limits.
+    BoardLimits(JointParam),
     /// Something else of the fields, or of the cylinder that they make.
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
     /// Something of the whole robot, where nothing else is wrong.
@@ -142,7 +142,7 @@ impl<'a> Facts<'a> {
     }
 
     /// A value in SI as a file would have it at a path.
-    fn told(&self, path: &str, si: f64) -> String {
+    fn format(&self, path: &str, si: f64) -> String {
         let (factor, unit) = self.unit(path).unwrap_or((1.0, ""));
         format!("{}{}", pretty(si / factor), suffix(unit))
     }
@@ -212,7 +212,7 @@ impl Relation {
                     offers(sets)
                 })
             }
-            Rule::Told(parameter) => board::told(facts.axis?, parameter),
+            Rule::BoardLimits(parameter) => board::within_limits(facts.axis?, parameter),
             Rule::Law(law) => law(facts, self),
             Rule::Whole(_) | Rule::AtRest(_) => None,
         }

@@ -180,16 +180,27 @@ pub(super) fn end_stop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     }
 }
 
-/// Chamber B is that of the relation whose first field is its dead volume.
-fn is_b(it: &Relation) -> bool {
-    it.fields[0].ends_with("_b")
+/// Chamber of a cylinder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Chamber {
+    A,
+    B,
 }
 
-/// A step follows the air of a chamber.
-pub(super) fn gas(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+/// A step follows the air of chamber A.
+pub(super) fn gas_a(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    gas(f, it, Chamber::A)
+}
+
+/// A step follows the air of chamber B.
+pub(super) fn gas_b(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    gas(f, it, Chamber::B)
+}
+
+fn gas(f: &Facts<'_>, it: &Relation, chamber: Chamber) -> Option<Broken> {
     let moved = f.moved?;
     let model = CylinderModel::new(moved.cylinder, moved.gas).ok()?;
-    let number = moved.step_s * model.fastest_rate_1_s(is_b(it));
+    let number = moved.step_s * model.fastest_rate_1_s(chamber == Chamber::B);
     if number < GAS_LIMIT {
         return None;
     }
@@ -207,16 +218,24 @@ pub(super) fn gas(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     })
 }
 
-/// The piston runs into its stop; the chamber there must not vanish.
-pub(super) fn volume(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+/// The piston runs into its stop; chamber A, which is there, must not vanish.
+pub(super) fn volume_a(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    volume(f, it, Chamber::A)
+}
+
+/// The same of chamber B.
+pub(super) fn volume_b(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    volume(f, it, Chamber::B)
+}
+
+fn volume(f: &Facts<'_>, it: &Relation, chamber: Chamber) -> Option<Broken> {
     let moved = f.moved?;
     let c = moved.cylinder;
     let depth_m = IMPACT * moved.force_n() / c.end_stop.stiffness_n_m;
     let least_m3 = moved.piston_m2() * depth_m;
-    let dead_m3 = if is_b(it) {
-        c.dead_volume_b_m3
-    } else {
-        c.dead_volume_a_m3
+    let dead_m3 = match chamber {
+        Chamber::A => c.dead_volume_a_m3,
+        Chamber::B => c.dead_volume_b_m3,
     };
     let volume_m3 = dead_m3 + c.line_volume_m3;
     if volume_m3 > least_m3 {

@@ -42,12 +42,12 @@ const fn law(
     relation(name, fields, broken, Rule::Law(law))
 }
 
-const fn told(name: &'static str, fields: Fields, parameter: JointParam) -> Relation {
+const fn board_limits(name: &'static str, fields: Fields, parameter: JointParam) -> Relation {
     relation(
         name,
         fields,
         "a joint board cannot be configured for this axis",
-        Rule::Told(parameter),
+        Rule::BoardLimits(parameter),
     )
 }
 
@@ -99,11 +99,11 @@ pub const RELATIONS: &[Relation] = &[
     law("step and friction, robot", &["friction.bristle_damping", "friction.viscous", "friction.bristle_stiffness", "numerics.step", "link.vertical_rod.mass"], FRICTION, moved::friction),
     law("step and end stop", &["end_stop.stiffness", "end_stop.damping", "end_stop.cushion_damping", "friction.bristle_damping", "numerics.step", "moving.load", "moving.mass"], STOP, moved::end_stop),
     law("step and end stop, robot", &["end_stop.stiffness", "end_stop.damping", "end_stop.cushion_damping", "friction.bristle_damping", "numerics.step", "link.vertical_rod.mass"], STOP, moved::end_stop),
-    law("step and air A", &["cylinder.dead_volume_a", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas),
-    law("step and air B", &["cylinder.dead_volume_b", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas),
+    law("step and air A", &["cylinder.dead_volume_a", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas_a),
+    law("step and air B", &["cylinder.dead_volume_b", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas_b),
     law("step and supply", &["supply.reservoir", "supply.droop", "supply.source_pressure", "regulator.conductance", "numerics.step"], "the step is too long for a reservoir that fills so fast", moved::supply),
-    law("air in the stop A", &["cylinder.dead_volume_a", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume),
-    law("air in the stop B", &["cylinder.dead_volume_b", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume),
+    law("air in the stop A", &["cylinder.dead_volume_a", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_a),
+    law("air in the stop B", &["cylinder.dead_volume_b", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_b),
     // What a robot does before and in its gait.
     above("settling in time", &["homing.timeout", "homing.settle"], "no joint would be taken to be settled in time"),
     above("ready in time", &["start_up.limit", "start_up.rest", "homing.settle"], "the robot would never get ready in time"),
@@ -142,12 +142,12 @@ pub const RELATIONS: &[Relation] = &[
     law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max"], "a joint board would take a piston in its stop for a fault of the sensor", laws::calibration),
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
-    // What the board of an axis can be told; of one field it is the field's own range.
-    told("told full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
-    told("told volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),
-    told("told volume B", &["cylinder.dead_volume_b", "line.volume"], JointParam::DeadVolumeB),
-    told("told conductance", &["fill_valve.conductance", "line.conductance"], JointParam::Conductance),
-    told("told band of rest", &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"], JointParam::RestBand),
+    // What the board of an axis can hold; of one field it is the field's own range.
+    board_limits("board's full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
+    board_limits("board's volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),
+    board_limits("board's volume B", &["cylinder.dead_volume_b", "line.volume"], JointParam::DeadVolumeB),
+    board_limits("board's conductance", &["fill_valve.conductance", "line.conductance"], JointParam::Conductance),
+    board_limits("board's band of rest", &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"], JointParam::RestBand),
     // The whole robot.
     relation("closed leg", &["body.crank", "body.p4", "body.stroke_zero", "start.yaw.stroke", "cylinder.stroke", "body.min_cos_theta3"], "they make no leg", Rule::Whole(standing::closes)),
     relation("standing", &["body.chassis_com", "body.chassis_mass", "body.o4", "body.foot_pad", "body.wheel_radius", "body.stroke_zero", "gait.stroke", "gait.held_leg_s5", "gait.held_leg_s6", "body.gravity", "contact.stiffness", "wheel_contact.stiffness"], "the robot does not stand on its wheels and feet in its start pose, on level ground", Rule::AtRest(standing::stands)),

@@ -13,8 +13,8 @@ use crate::reader::Reader;
 
 /// Values along a side; the plant says so, too.
 const MOST: usize = 4096;
-/// Wrong cells of a file that are told.
-const TOLD: usize = 5;
+/// Wrong cells of a file that are listed.
+const LISTED: usize = 5;
 /// Highest and lowest, m.
 const HIGHEST_M: f64 = 1e4;
 
@@ -176,7 +176,7 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
         };
         if values.lines.len() == 1 {
             values.columns = parted.len();
-        } else if parted.len() != values.columns && wrong.len() < TOLD {
+        } else if parted.len() != values.columns && wrong.len() < LISTED {
             wrong.push(format!(
                 "line {number} has {} values, line {} has {}",
                 parted.len(),
@@ -187,7 +187,7 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
         for (column, cell) in (1..).zip(parted) {
             match cell.parse::<f64>() {
                 Ok(value) if value.is_finite() => values.values.push(value),
-                _ if wrong.len() < TOLD => wrong.push(format!(
+                _ if wrong.len() < LISTED => wrong.push(format!(
                     "line {number}, column {column}: {} is not a finite number",
                     shortened(cell)
                 )),

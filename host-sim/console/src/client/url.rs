@@ -135,7 +135,9 @@ impl Url {
             let done = stream.conn.complete_io(&mut stream.sock);
             done.map_err(|e| match e.kind() {
                 ErrorKind::WouldBlock | ErrorKind::TimedOut => self.broken(e),
-                _ => self.error(format!("no TLS to the server of that certificate: {e}")),
+                _ => self.error(format!(
+                    "TLS with the server of that certificate failed: {e}"
+                )),
             })?;
         }
         Ok(Stream::Tls(Box::new(stream)))
@@ -155,7 +157,8 @@ impl Url {
             let _ = found.send(all);
         };
         let thread = Builder::new().spawn(look_up);
-        thread.map_err(|e| self.error(format!("no thread to look up the host: {e}")))?;
+        thread
+            .map_err(|e| self.error(format!("cannot start a thread to look up the host: {e}")))?;
         let left = end.saturating_duration_since(Instant::now());
         match addresses.recv_timeout(left) {
             Ok(all) => all.map_err(|e| self.error(e)),

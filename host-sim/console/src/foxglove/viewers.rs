@@ -121,7 +121,7 @@ impl Viewers {
             let mut numbers = viewer.subscriptions.values();
             let taken = viewer.subscriptions.contains_key(&channel) || numbers.any(|n| n == id);
             if taken {
-                let text = format!("subscription {id} of channel {channel_id} is there already");
+                let text = format!("subscription {id} of channel {channel_id} exists already");
                 viewer.outbox.answer(status(1, &text));
                 continue;
             }

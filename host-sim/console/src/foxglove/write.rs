@@ -35,7 +35,7 @@ pub(crate) async fn write(
     if let Err(why) = write_all(&hub, settings).await {
         hub.tell_viewer(
             viewer,
-            status(2, &format!("nothing more is written: {why}")),
+            status(2, &format!("no further parameter is written: {why}")),
         );
     }
     // What was not taken is told as it is.
@@ -74,7 +74,7 @@ impl Session {
         let outbox = Arc::new(Outbox::default());
         let session = hex::encode(&number);
         let entered = hub.enter(Role::Control, (NAME, &session), false, &outbox);
-        let (asking, _) = entered.ok_or("all places of the console are taken")?;
+        let (asking, _) = entered.ok_or("all client slots of the console are taken")?;
         Ok(Self {
             hub: Arc::clone(hub),
             asking,
@@ -121,7 +121,7 @@ impl Session {
     async fn answer(&mut self) -> Result<(), String> {
         loop {
             let Message::Text(text) = self.outbox.wait().await else {
-                return Err("the server ends".to_owned());
+                return Err("the server is shutting down".to_owned());
             };
             let message: Value = serde_json::from_str(&text).unwrap_or_default();
             if message["op"] == "state" {

@@ -30,7 +30,8 @@ impl Inner {
             return;
         };
         if client.role != Role::Control {
-            let text = "the view key may look and stop; connect with the control key";
+            let text =
+                "the view key allows viewing and stopping only; connect with the control key";
             return self.tell(id, &refused(n, Reason::Role, text));
         }
         let now = Instant::now();
@@ -38,7 +39,7 @@ impl Inner {
         let holds = self.desk.holds(id);
         let (input, what) = match order {
             Order::Robot(Command::EmergencyStop) => {
-                let text = "a stop is no command that waits: send {\"op\":\"stop\"}";
+                let text = "a stop is not a queued command: send {\"op\":\"stop\"}";
                 return self.tell(id, &refused(n, Reason::BadCommand, text));
             }
             Order::Robot(command) => {
@@ -58,7 +59,7 @@ impl Inner {
                         return self.tell(id, &self.held(n));
                     }
                     Err(Denied::NotInControl) => {
-                        let text = "take the control first";
+                        let text = "take control first";
                         return self.tell(id, &refused(n, Reason::NotInControl, text));
                     }
                 }
@@ -79,14 +80,14 @@ impl Inner {
             }
             Order::HandOver(to) => {
                 if !holds {
-                    let text = "take the control first";
+                    let text = "take control first";
                     return self.tell(id, &refused(n, Reason::NotInControl, text));
                 }
                 let drives = |(other, client): &(&ClientId, &Client)| {
                     client.session == to && client.role == Role::Control && **other != id
                 };
                 let Some((&heir, _)) = self.clients.iter().find(drives) else {
-                    let text = "`to`: no other client that may drive has this session";
+                    let text = "`to`: no other client with the role `control` has this session";
                     return self.tell(id, &refused(n, Reason::BadArgument, text));
                 };
                 let spoken = Spoken {
@@ -105,7 +106,7 @@ impl Inner {
             }
             Order::Host(HostCommand::Revoke) => {
                 if !client.is_local {
-                    let text = "the control is taken away at the robot's own computer alone";
+                    let text = "control can be revoked only on the robot's own computer";
                     return self.tell(id, &refused(n, Reason::Role, text));
                 }
                 let id = self.next_request;
@@ -150,8 +151,8 @@ impl Inner {
     fn held(&self, n: u64) -> Value {
         let name = self.desk.name().unwrap_or_default();
         let text = match self.desk.holder() {
-            Some(_) => format!("{name:?} holds the control"),
-            None => format!("the control is kept for {name:?}, for 2 s"),
+            Some(_) => format!("{name:?} has control"),
+            None => format!("control is reserved for {name:?} for 2 s"),
         };
         let mut answer = refused(n, Reason::ControlHeld, &text);
         answer["holder"] = json!(name);

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, VecDeque};
 use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
 use serde_json::Value;
-use wheeleg_telemetry::OwnedSample;
+use wheeleg_master::event::HoldReason;
+use wheeleg_telemetry::event::hold_name;
+use wheeleg_telemetry::{EventCode, OwnedSample};
 
 use super::{Client, EVENTS, Inner, Subscription};
 use crate::desk::ClientId;
@@ -51,7 +53,8 @@ impl Inner {
             let gap = moving.number - arrived.number - 1;
             arrived.number = moving.number;
             if let OwnedSample::Event(event) = &moving.sample {
-                let lost = event.code == "hold" && event.detail == "operator_lost";
+                let lost = event.code == EventCode::Hold
+                    && event.detail == hold_name(&HoldReason::OperatorLost);
                 let mut event = event_json(moving.t_ns, event);
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();

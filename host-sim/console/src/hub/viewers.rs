@@ -173,7 +173,7 @@ fn asset(request: u32, file: Option<&[u8]>) -> Message {
     out.extend_from_slice(&request.to_le_bytes());
     let why = match file {
         Some(_) => String::new(),
-        None => format!("there is {URDF}, and no other file"),
+        None => format!("the only file is {URDF}"),
     };
     out.push(u8::from(file.is_none()));
     out.extend_from_slice(&(why.len() as u32).to_le_bytes());

@@ -118,7 +118,7 @@ impl Machine {
     ) -> Result<(), SimError> {
         match self {
             Self::Simulated(session) => session.inject(fault, begin, recorder),
-            Self::Line(_) => Err(only_simulated("a fault is injected into")),
+            Self::Line(_) => Err(only_simulated("faults can be injected into")),
         }
     }
 }
@@ -126,7 +126,7 @@ impl Machine {
 /// What can be done with a simulated robot alone.
 pub(super) fn only_simulated(what: &str) -> SimError {
     SimError::simulation(
-        format!("{what} a simulated robot only: these boards are at a serial port"),
+        format!("{what} a simulated robot only: these boards are on a serial port"),
         "start `wheeleg serve` without --port",
     )
 }

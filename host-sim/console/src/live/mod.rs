@@ -202,7 +202,7 @@ pub(crate) struct Status {
     pub(crate) simulated: bool,
     /// The master lives.
     pub(crate) alive: bool,
-    /// Every board is there and fits.
+    /// Every board is present and compatible.
     pub(crate) ready: bool,
     /// All axes are armed.
     pub(crate) armed: bool,

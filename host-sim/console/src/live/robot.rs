@@ -387,7 +387,7 @@ impl Loop {
             HostCommand::Pause | HostCommand::Step(_) | HostCommand::Speed(_)
         );
         if paces && !self.machine.is_simulated() {
-            return Answer::Simulation(Box::new(only_simulated("the clock is set for")));
+            return Answer::Simulation(Box::new(only_simulated("the clock can be set for")));
         }
         match command {
             HostCommand::Pause => {
@@ -397,7 +397,7 @@ impl Loop {
             HostCommand::Resume => self.pace.pause(false, now),
             HostCommand::Step(_) if !self.pace.status().paused => {
                 return Answer::Simulation(Box::new(SimError::simulation(
-                    "the clock is not paused, and steps by itself",
+                    "the simulation is not paused: it steps by itself",
                     "pause it first: `wheeleg ctl pause`",
                 )));
             }

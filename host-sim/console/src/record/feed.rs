@@ -48,7 +48,7 @@ impl Feed {
     /// Begins a recording, or says why not.
     pub(crate) fn begin(&mut self, request: u32, at_us: u64) -> Result<(), &'static str> {
         if self.is_running() {
-            return Err("a recording is under way: stop it first");
+            return Err("a recording is in progress: stop it first");
         }
         let number = self.number + 1;
         let note = Note::Begin {

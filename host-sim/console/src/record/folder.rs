@@ -111,7 +111,10 @@ fn numbered(root: &Path) -> Result<(String, PathBuf), String> {
             Err(e) => return Err(said(&path, &e)),
         }
     }
-    Err(format!("{}: {MOST} recordings are there", root.display()))
+    Err(format!(
+        "{}: there are {MOST} recordings already",
+        root.display()
+    ))
 }
 
 impl Folder {
@@ -265,7 +268,10 @@ pub(crate) fn summary(folder: &Path) -> Result<Summary, String> {
     let file = opened(&path)?;
     let size = file.metadata().map_err(|e| said(&path, &e))?.len();
     if size > SUMMARY_MAX {
-        return Err(format!("{}: {size} bytes are too many", path.display()));
+        return Err(format!(
+            "{}: it has {size} bytes, which is too large",
+            path.display()
+        ));
     }
     let mut text = String::new();
     let read = file.take(SUMMARY_MAX).read_to_string(&mut text);

@@ -42,11 +42,11 @@ impl Given {
                 };
                 (kind, format!("{} {what}", sample.fault))
             }
-            Self::Pace { .. } if pace.paused => ("pace", "the clock stands".to_owned()),
+            Self::Pace { .. } if pace.paused => ("pace", "the clock is paused".to_owned()),
             Self::Pace { speed, .. } => {
                 let text = match speed {
-                    Some(speed) => format!("the clock goes at {speed} times real time"),
-                    None => "the clock goes as fast as it can".to_owned(),
+                    Some(speed) => format!("the clock runs at {speed} times real time"),
+                    None => "the clock runs as fast as it can".to_owned(),
                 };
                 ("pace", text)
             }

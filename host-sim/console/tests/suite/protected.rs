@@ -15,13 +15,13 @@ use crate::common::{done, look};
 /// A name of the network, at which the server listens beside the loopback address.
 const NAME: &str = "robot.example";
 
-struct Rig {
+struct TestRig {
     server: Server,
     keys: Keys,
     _home: tempfile::TempDir,
 }
 
-impl Rig {
+impl TestRig {
     fn start(protection: Protection) -> Result<Self, wheeleg_console::ConsoleError> {
         let home = tempfile::tempdir().expect("a folder");
         let keys = Keys::open(home.path()).expect("keys");
@@ -74,7 +74,7 @@ impl Rig {
 
 #[test]
 fn with_tls_one_drives_and_who_pins_another_certificate_is_told() {
-    let rig = Rig::start(Protection::AsNeeded).expect("it starts");
+    let rig = TestRig::start(Protection::AsNeeded).expect("it starts");
     assert_eq!(rig.server.url(), format!("https://{NAME}:{}", rig.port()));
     let fingerprint = rig.server.fingerprint().expect("a certificate");
     let url = rig.url("https").with_certificate(fingerprint);
@@ -104,7 +104,7 @@ fn with_tls_one_drives_and_who_pins_another_certificate_is_told() {
 
 #[test]
 fn half_tls_handshakes_lose_their_place() {
-    let rig = Rig::start(Protection::AsNeeded).expect("it starts");
+    let rig = TestRig::start(Protection::AsNeeded).expect("it starts");
     let fingerprint = rig.server.fingerprint().expect("a certificate");
     let url = rig.url("https").with_certificate(fingerprint);
     let address = SocketAddr::from(([127, 0, 0, 1], rig.port()));
@@ -126,12 +126,15 @@ fn half_tls_handshakes_lose_their_place() {
 
 #[test]
 fn plain_http_from_elsewhere_lets_look_and_stop_and_takes_no_key() {
-    let rig = Rig::start(Protection::Plain).expect("it starts");
+    let rig = TestRig::start(Protection::Plain).expect("it starts");
     assert!(rig.server.is_look_only());
     let url = rig.url("http");
     let refused = Client::connect(&url, "control", "driver", &rig.keys.control);
     let error = refused.err().expect("refused").to_string();
-    assert!(error.contains("nobody drives"), "{error}");
+    assert!(
+        error.contains("control is refused over plain HTTP"),
+        "{error}"
+    );
     // Keys in clear open nothing, and the lists need none.
     let key = format!("Authorization: Bearer {}\r\n", rig.keys.control.to_hex());
     for path in ["state", "events", "recordings"] {
@@ -154,7 +157,7 @@ fn plain_http_from_elsewhere_lets_look_and_stop_and_takes_no_key() {
 
 #[test]
 fn a_wildcard_answers_to_its_names_alone() {
-    let rig = Rig::start(Protection::Plain).expect("it starts");
+    let rig = TestRig::start(Protection::Plain).expect("it starts");
     let port = rig.port();
     let answer = rig.get("/", "");
     assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
@@ -194,7 +197,7 @@ fn a_certificate_that_cannot_be_used_is_refused_by_its_file() {
     let open = write("open.pem", &pem("PRIVATE KEY", &der), 0o644);
     let empty = write("empty.pem", "", 0o600);
     let start = |certificate: &Path, key: &Path| {
-        Rig::start(Protection::Tls(Files {
+        TestRig::start(Protection::Tls(Files {
             certificate: certificate.to_owned(),
             key: key.to_owned(),
         }))

@@ -217,7 +217,7 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
         ),
         (
             "{\"ms\":1,\"command\":{\"id\":1,\"deadline_us\":9,\"spoken\":{\"cmd\":\"Pause\",\"args\":{}}}}\n",
-            "Pause is no command of the robot",
+            "Pause is not a command of the robot",
         ),
         (
             "{\"ms\":1,\"fault_begins\":\"pot-open:joint9\"}\n",

@@ -4,12 +4,10 @@
 //!   48 × 4), with the corrected equations. [`printed`] holds the paper's printed variants.
 //! * [`floating`]: the engine the simulator steps: the whole robot with a floating chassis,
 //!   fourteen velocities, both ways.
-//! * [`chain`]: a recursive engine for any tree of revolute and prismatic joints, and the leg on it.
 //!
 //! Positive cylinder forces extend their cylinder. Gravity is a vector, so a slope is a tilted
 //! gravity.
 
-pub mod chain;
 mod error;
 pub mod floating;
 pub mod noc;

@@ -2,7 +2,6 @@
 
 mod axis;
 mod axis_reference;
-mod chain;
 mod contact;
 mod dynamics;
 mod eight;

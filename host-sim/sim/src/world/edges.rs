@@ -89,7 +89,7 @@ impl World {
         self.restart_tripped()
     }
 
-    /// A board outside that was reset: the application beside it starts anew.
+    /// A board outside that was reset: the application beside it restarts.
     fn restart_tripped(&mut self) -> Result<(), SimError> {
         for node in Node::ALL {
             let Some(trip) = self.remote.as_mut().and_then(|o| o.take_trip(node)) else {

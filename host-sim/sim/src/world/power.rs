@@ -1,5 +1,5 @@
 //! Power, resets and restarts: boards without power or with a stopped program,
-//! and a master or a user's program that starts anew.
+//! and a master or a user's program that restarts.
 
 use wheeleg_master::{Master, MasterConfig};
 use wheeleg_protocol::{Node, ResetCause};

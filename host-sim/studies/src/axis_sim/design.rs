@@ -6,7 +6,7 @@
 //! [`wheeleg_control::axis::AxisModel::new`].
 
 use wheeleg_config::SENSOR_TRACK;
-use wheeleg_config::told::{limits, told};
+use wheeleg_config::derived::{derived, limits};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
 use wheeleg_node::sensor::SensorConfig;
@@ -119,7 +119,7 @@ fn supervision(facts: &Facts) -> Supervision {
 /// The axis's data sheet in the formats of the board.
 #[must_use]
 pub fn axis_data(axis: &AxisParams) -> AxisData {
-    let of = |parameter: JointParam| told(axis, parameter).unwrap_or_default();
+    let of = |parameter: JointParam| derived(axis, parameter).unwrap_or_default();
     let fixed = |parameter: JointParam| PositionMm::from_f64(of(parameter));
     let micros = |us: f64| Micros(us.round() as u32);
     let gain = |parameter: JointParam| Gain::saturating_from_num(of(parameter));
@@ -356,7 +356,7 @@ mod tests {
         assert!((40.0..=46.0).contains(&slow), "{slow}");
     }
 
-    /// What an axis file may say, at and between the ends of its ranges, is what a board can be told:
+    /// What an axis file may say, at and between the ends of its ranges, is what a board can hold:
     /// no design is refused by the board.
     #[test]
     fn a_board_accepts_the_designs_for_every_axis_that_a_file_may_have() {

@@ -84,7 +84,7 @@ pub type Before = BTreeMap<String, bool>;
 /// The part of a row that says whether its bars are kept, as it is read again.
 #[derive(Deserialize)]
 #[serde(expecting = "a case")]
-struct Told {
+struct ReadCase {
     id: String,
     variation: String,
     steady_error_mm: Option<f64>,
@@ -95,9 +95,9 @@ struct Told {
 
 #[derive(Deserialize)]
 #[serde(expecting = "an object with `schema` and `cases`")]
-struct ToldCases {
+struct ReadCases {
     schema: String,
-    cases: Vec<Told>,
+    cases: Vec<ReadCase>,
 }
 
 /// Whether a combination keeps its bars.
@@ -137,17 +137,17 @@ fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
     let help = "give the summary.json that `wheeleg compare --root N` of the other version wrote";
     let named = |what: String| StudyError::refused(format!("`{}` {what}", path.display()), help);
     let text = text_of(path).map_err(|e| named(format!("cannot be read: {e}")))?;
-    let told: ToldCases = serde_json::from_str(&text)
+    let read: ReadCases = serde_json::from_str(&text)
         .map_err(|e| named(format!("is not a summary of a comparison: {e}")))?;
-    if !told.schema.starts_with("wheeleg.compare/") {
-        return Err(named(format!("is a `{}`, not a comparison", told.schema)));
+    if !read.schema.starts_with("wheeleg.compare/") {
+        return Err(named(format!("is a `{}`, not a comparison", read.schema)));
     }
     let (root, combinations) = (options.root, options.combinations);
-    let drawn = |row: &Told| match row.variation.parse() {
+    let drawn = |row: &ReadCase| match row.variation.parse() {
         Ok(Variation::Drawn(number)) => number.wrapping_sub(root) < combinations,
         _ => false,
     };
-    let before: Before = told
+    let before: Before = read
         .cases
         .into_iter()
         .filter(drawn)

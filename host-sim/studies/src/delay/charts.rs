@@ -4,7 +4,7 @@ use wheeleg_report::plot::Colour;
 
 use super::preview::Previewed;
 use super::trial::{LEAD_S, Law, Outcome, Start};
-use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, PAPER_BAND_S, PAPER_DELAY_S, Study};
+use super::{EARLY_LIMIT_MM, PAPER_BAND_S, PAPER_DELAY_S, PREVIEW_LIMIT_S, Study};
 use wheeleg_report::plot::{Axis, Content, Figure, Panel, RasterRow, Series, colour, line};
 
 type Points = Vec<(f64, f64)>;
@@ -100,7 +100,7 @@ fn home(study: &Study) -> Figure {
     let runs: [(&str, &Outcome); 3] = [
         ("paper's law", &study.starts.home[0]),
         ("default law", &study.starts.home[1]),
-        ("default law, 0.4 s notice", &study.preview.home),
+        ("default law, 0.4 s preview", &study.preview.home),
     ];
     let time = ("time since the command [s]", (-0.45, 0.8));
     let points = |o: &Outcome, y: &dyn Fn(&crate::axis_sim::Row) -> f64| -> Points {
@@ -243,7 +243,7 @@ fn scaling(study: &Study) -> Figure {
     }
 }
 
-/// Delay and early motion over notice.
+/// Delay and early motion over preview.
 fn preview(study: &Study) -> Figure {
     let rows = |start: Start, load_n: f64, y: fn(&Previewed) -> Option<f64>| -> Points {
         let list = study.preview.rows.iter();
@@ -266,12 +266,12 @@ fn preview(study: &Study) -> Figure {
             })
             .collect()
     };
-    let x = ("notice [s]", (0.0, 0.4));
+    let x = ("preview [s]", (0.0, 0.4));
     Figure {
-        id: "notice".to_owned(),
+        id: "preview".to_owned(),
         title: "What an announced move gains".to_owned(),
         caption: format!(
-            "Default law, worst of {} seeds. Red: at most {NOTICED_LIMIT_S} s, and at most {EARLY_LIMIT_MM} mm before the command.",
+            "Default law, worst of {} seeds. Red: at most {PREVIEW_LIMIT_S} s, and at most {EARLY_LIMIT_MM} mm before the command.",
             study.preview.seeds
         ),
         panels: vec![
@@ -280,7 +280,7 @@ fn preview(study: &Study) -> Figure {
                 x,
                 ("[s]", (0.0, 0.35)),
                 series(|r| r.delay_s, true),
-                &[NOTICED_LIMIT_S],
+                &[PREVIEW_LIMIT_S],
             ),
             curves(
                 "motion before the command",

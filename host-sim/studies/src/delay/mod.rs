@@ -43,7 +43,7 @@ pub const PAPER_DELAY_S: f64 = 0.25;
 /// Half of the band \[s\].
 pub const PAPER_BAND_S: f64 = 0.05;
 /// Largest start delay of an announced move \[s\].
-pub const NOTICED_LIMIT_S: f64 = 0.08;
+pub const PREVIEW_LIMIT_S: f64 = 0.08;
 /// Largest motion before an announced move \[mm\].
 pub const EARLY_LIMIT_MM: f64 = 1.0;
 

@@ -62,20 +62,20 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
         let last = study.preview.of(Law::Default, start).last();
         list.push(match (study.preview.enough_s(start), last) {
             (Some(0.0), Some(last)) => format!(
-                "Default law, {}: it starts within {} s without any notice; with 0.4 s within {} s.",
+                "Default law, {}: it starts within {} s without preview; with 0.4 s within {} s.",
                 start.name(),
-                super::NOTICED_LIMIT_S,
+                super::PREVIEW_LIMIT_S,
                 maybe(last.delay_s)
             ),
             (Some(preview_s), _) => format!(
                 "Default law, {}: announced {preview_s} s before or earlier, it starts within {} s, and has not moved 1 mm before.",
                 start.name(),
-                super::NOTICED_LIMIT_S
+                super::PREVIEW_LIMIT_S
             ),
             (None, last) => format!(
-                "Default law, {}: no notice up to 0.4 s brings every start within {} s; with 0.4 s the median is {} s and the worst {} s.",
+                "Default law, {}: no preview up to 0.4 s brings every start within {} s; with 0.4 s the median is {} s and the worst {} s.",
                 start.name(),
-                super::NOTICED_LIMIT_S,
+                super::PREVIEW_LIMIT_S,
                 maybe(last.and_then(|l| l.median_s)),
                 maybe(last.and_then(|l| l.delay_s))
             ),
@@ -94,14 +94,14 @@ struct Page<'a> {
     findings: Vec<String>,
     kinds: Vec<Kind<'a>>,
     predictions: Vec<Predicted<'a>>,
-    notices: Vec<Announced<'a>>,
+    previews: Vec<Announced<'a>>,
     /// Medians \[s\].
     paper_home: Option<f64>,
     paper_reached: bool,
     default_home: Option<f64>,
-    /// The longest notice.
-    noticed: Option<Announced<'a>>,
-    noticed_rest: Option<Announced<'a>>,
+    /// The longest preview.
+    announced: Option<Announced<'a>>,
+    announced_rest: Option<Announced<'a>>,
 }
 
 /// A kind of move, with its distributions under the two laws.
@@ -160,7 +160,7 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         rival: prediction.rival,
         prediction,
     });
-    let notices = study.preview.rows.iter().map(Announced::new);
+    let previews = study.preview.rows.iter().map(Announced::new);
     let home = |law| study.starts.of(law, Start::HomeHeld).map(|d| d.median_s);
     let announced = |start| {
         study
@@ -178,12 +178,12 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         findings: findings(study),
         kinds: kinds.into(),
         predictions: predictions.collect(),
-        notices: notices.collect(),
+        previews: previews.collect(),
         paper_home: home(Law::Paper),
         paper_reached: home(Law::Paper).is_some_and(|s| band.contains(&s)),
         default_home: home(Law::Default),
-        noticed: announced(Start::HomeHeld),
-        noticed_rest: announced(Start::HomeRest),
+        announced: announced(Start::HomeHeld),
+        announced_rest: announced(Start::HomeRest),
     };
     Ok(page(TEMPLATE, values)?)
 }

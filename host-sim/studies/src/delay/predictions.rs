@@ -248,9 +248,9 @@ pub fn measure(
         ),
         prediction(
             "look-ahead",
-            "venting ahead of an announced move gains 0.15 to 0.2 s from the held home (default law, notice 0.4 s)",
+            "venting ahead of an announced move gains 0.15 to 0.2 s from the held home (default law, preview 0.4 s)",
             format!(
-                "{gain_s:.3} s: {:.3} s without, {:.3} s with notice, medians",
+                "{gain_s:.3} s: {:.3} s without, {:.3} s with preview, medians",
                 announced(0.0),
                 announced(0.4)
             ),

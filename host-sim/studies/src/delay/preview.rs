@@ -6,7 +6,7 @@ use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 
 use super::trial::{Law, Outcome, Start, Trial};
-use super::{EARLY_LIMIT_MM, NOTICED_LIMIT_S, run_all};
+use super::{EARLY_LIMIT_MM, PREVIEW_LIMIT_S, run_all};
 use crate::study::{Ended, Progress};
 use wheeleg_report::stats::{largest, median};
 
@@ -46,7 +46,7 @@ impl Previewed {
     /// Starts in time, and stands until then.
     #[must_use]
     pub fn meets(&self) -> bool {
-        self.delay_s.is_some_and(|d| d <= NOTICED_LIMIT_S) && self.early_mm <= EARLY_LIMIT_MM
+        self.delay_s.is_some_and(|d| d <= PREVIEW_LIMIT_S) && self.early_mm <= EARLY_LIMIT_MM
     }
 }
 

@@ -113,11 +113,11 @@ pub(super) fn write(folder: &Path, study: &Study) -> Result<(), StudyError> {
         "law",
         "start",
         "load [N]",
-        "notice [s]",
+        "preview [s]",
         "median delay [s]",
         "worst delay [s]",
         "worst early motion [mm]",
         "meets",
     ];
-    Ok(table(folder, "notice", &header, rows)?)
+    Ok(table(folder, "preview", &header, rows)?)
 }

@@ -133,7 +133,7 @@ impl Trial {
 pub struct Outcome {
     /// Command to the first millimetre in its direction \[s\]; `None` if it never moved.
     pub delay_s: Option<f64>,
-    /// Largest motion between the notice and the command \[mm\].
+    /// Largest motion between the announcement and the command \[mm\].
     pub early_mm: f64,
     /// Chamber pressures A, B at the command, absolute \[Pa\].
     pub pressure_pa: [f64; 2],
@@ -357,14 +357,14 @@ impl Trial {
     fn outcome(&self, rows: &[Row], command: usize) -> Outcome {
         let sign = self.start.sign();
         let (before, after) = rows.split_at(command);
-        let noticed = before
+        let announced = before
             .len()
             .saturating_sub((self.preview_s * 1e3).round() as usize);
         let stood_m = before
-            .get(noticed)
+            .get(announced)
             .or(after.first())
             .map_or(0.0, |r| r.stroke_m);
-        let early = before[noticed..]
+        let early = before[announced..]
             .iter()
             .map(|r| (r.stroke_m - stood_m).abs())
             .fold(0.0, f64::max);

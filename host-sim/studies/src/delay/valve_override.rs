@@ -1,4 +1,4 @@
-//! A joint board with hands on its valves, at the end of a bus.
+//! A joint board whose valves are overridden, at the end of a bus.
 
 use std::collections::VecDeque;
 
@@ -6,11 +6,11 @@ use wheeleg_control::pwm::OnTimes;
 
 use crate::axis_sim::{Action, Board, Firmware, Sample};
 
-/// The board with hands on its valves, at the end of a bus.
+/// The board, and what overrides its valves.
 pub(super) struct ValveOverride {
     pub(super) firmware: Firmware,
     pub(super) forced: Option<OnTimes>,
-    /// Ticks until hands let go, or throw valves open.
+    /// Ticks until the override ends, or opens valves.
     pub(super) then: Option<(u32, Option<OnTimes>)>,
     /// Set-points on their way to the board.
     pub(super) under_way: VecDeque<Sample>,

@@ -2,8 +2,8 @@
 
 use super::fit::Problem;
 use super::free::Logs;
+use super::intervals::{ignorance, information};
 use super::lab::{Lab, Sample};
-use super::told::{ignorance, information};
 
 /// Length of a sequence \[ms\].
 const TICKS: usize = 4000;

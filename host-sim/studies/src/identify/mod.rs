@@ -3,16 +3,16 @@
 //! A measurement ([`lab`]) has what the valves were told and where the piston was. The plant is
 //! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and
 //! judged by the rest. Every parameter gets an interval; what the data cannot tell is said
-//! ([`told`]), and which valve sequence would tell most of it ([`experiment`]).
+//! ([`intervals`]), and which valve sequence would tell most of it ([`experiment`]).
 
 pub mod experiment;
 pub mod fit;
 pub mod free;
+pub mod intervals;
 pub mod lab;
 pub mod map;
 mod page;
 mod predict;
-pub mod told;
 
 use std::path::Path;
 
@@ -29,10 +29,10 @@ use wheeleg_plant::sensors::AdcNoise;
 use self::experiment::Experiment;
 use self::fit::{Fit, Noise, Problem, scatter, trust};
 use self::free::{COUNT, FREE, Logs, applied};
+use self::intervals::Interval;
 use self::lab::Lab;
 use self::map::Mapped;
 use self::predict::{Predicted, predict};
-use self::told::Told;
 use crate::StudyError;
 use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
@@ -65,8 +65,8 @@ pub struct Parameter {
     pub low: f64,
     /// Largest factor, 95 %.
     pub high: f64,
-    /// Whether the data tell it; otherwise it is what the file is trusted to.
-    pub told: bool,
+    /// Whether the data determine it; otherwise it is what the file is trusted to.
+    pub determined: bool,
 }
 
 /// How far the plant is from what was measured.
@@ -97,8 +97,8 @@ pub struct Identified {
     pub after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     pub noise_mm: f64,
-    /// What the data cannot tell.
-    pub untold: Vec<String>,
+    /// What the data do not determine.
+    pub undetermined: Vec<String>,
     /// Next experiments, the most telling first.
     pub experiments: Vec<Experiment>,
     /// Stroke by the file and by the fit, at every sample.
@@ -130,8 +130,8 @@ pub struct Summary<'a> {
     noise_mm: f64,
     /// Whether the rest of the measurement is met within three times the noise.
     explained: bool,
-    /// What the data cannot tell.
-    cannot_tell: &'a [String],
+    /// What the data do not determine.
+    undetermined: &'a [String],
     /// The most telling next experiment, null if the plant plays none.
     next_experiment: Option<&'a str>,
 }
@@ -268,7 +268,7 @@ pub struct Fitted {
     /// The fit.
     pub fit: Fit,
     /// Of each factor.
-    pub told: [Told; COUNT],
+    pub intervals: [Interval; COUNT],
     /// Information of the data about the logarithms.
     pub information: DMatrix<f64>,
     /// What stopped it before all starts were tried.
@@ -297,10 +297,10 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
     let why = ": it leaves its range close to the best fit";
     let leaves = || unplayed(problem, "the measurement", why);
     let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
-    let information = told::information(&jacobian, variance(&fit, channels).max(1.0));
+    let information = intervals::information(&jacobian, variance(&fit, channels).max(1.0));
     Ok(Fitted {
         fit,
-        told: told::told(&information),
+        intervals: intervals::intervals(&information),
         information,
         stopped,
     })
@@ -326,7 +326,7 @@ impl Identified {
         };
         let Fitted {
             fit,
-            told,
+            intervals,
             information,
             stopped,
         } = fitted(&problem, options.seed, progress)?;
@@ -335,9 +335,9 @@ impl Identified {
                 .map_err(|e| unplayed(&problem, "the rest of the measurement", &format!(": {e}")))
         };
         let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
-        let parameters = FREE.iter().zip(&fit.logs).zip(&told);
-        let parameters = parameters.map(|((free, log), told)| {
-            let [low, high] = told.factors(*log);
+        let parameters = FREE.iter().zip(&fit.logs).zip(&intervals);
+        let parameters = parameters.map(|((free, log), interval)| {
+            let [low, high] = interval.factors(*log);
             Parameter {
                 name: free.name,
                 words: free.words,
@@ -345,7 +345,7 @@ impl Identified {
                 factor: log.exp(),
                 low,
                 high,
-                told: told.told,
+                determined: interval.determined,
             }
         });
         Ok(Self {
@@ -353,7 +353,7 @@ impl Identified {
             before: misses(&lab, &played[0], ticks),
             after: misses(&lab, &played[1], ticks),
             noise_mm: noise.position_m * 1e3,
-            untold: told::untold(&information),
+            undetermined: intervals::undetermined(&information),
             experiments: experiment::ranked(&problem, &fit.logs, &information, 1.0),
             ticks,
             fit,
@@ -398,7 +398,7 @@ impl Identified {
                         path: info.path.clone(),
                         values: vec![value(parameter.factor).clamp(info.min, info.max)],
                         unit: info.unit.clone(),
-                        source: if parameter.told {
+                        source: if parameter.determined {
                             format!("IDENTIFIED from {lab}: {interval} (95 %)")
                         } else {
                             format!(
@@ -426,7 +426,7 @@ impl Identified {
             after: self.after,
             noise_mm: self.noise_mm,
             explained: self.is_explained(),
-            cannot_tell: &self.untold,
+            undetermined: &self.undetermined,
             next_experiment: self.experiments.first().map(|e| e.name),
         }
     }

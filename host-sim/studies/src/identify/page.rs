@@ -79,7 +79,7 @@ struct Page<'a> {
     after_mm: f64,
     noise_mm: f64,
     parameters: Vec<Shown<'a>>,
-    untold: &'a [String],
+    undetermined: &'a [String],
     experiments: Vec<Next<'a>>,
     figures: Vec<Picture<'a>>,
 }
@@ -101,7 +101,11 @@ pub(super) fn render(
     identified: &Identified,
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
-    let told = identified.parameters.iter().filter(|p| p.told).count();
+    let determined = identified
+        .parameters
+        .iter()
+        .filter(|p| p.determined)
+        .count();
     let explained = if identified.is_explained() {
         "the held-out data are matched within three times the sensor's noise"
     } else {
@@ -113,7 +117,7 @@ pub(super) fn render(
         version: env!("CARGO_PKG_VERSION"),
         name: &identified.config.name,
         verdict: format!(
-            "{told} of {} parameters are determined; {explained}.",
+            "{determined} of {} parameters are determined; {explained}.",
             identified.parameters.len()
         ),
         before_mm: identified.before.held_out_mm,
@@ -127,7 +131,7 @@ pub(super) fn render(
                 paths: parameter.paths.join(", "),
             })
             .collect(),
-        untold: &identified.untold,
+        undetermined: &identified.undetermined,
         experiments: identified
             .experiments
             .iter()

@@ -2,7 +2,7 @@
 
 use super::expected::Expected;
 use super::measure::{Measured, line, lost_messages, messages};
-use super::operator::Strangers;
+use super::operator::Intrusion;
 use super::ran::Ran;
 use super::row::{Expect, Row, Stop};
 use wheeleg_config::RobotConfig;
@@ -148,7 +148,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         matches!(outcome, Some(ServiceOutcome::Taken(_)))
     });
     f.check(!taken, || "a board takes what it must refuse".to_owned());
-    if let Some(Strangers { frames, taken }) = ran.strangers {
+    if let Some(Intrusion { frames, taken }) = ran.intrusion {
         f.check(frames > 0, || "nobody tried".to_owned());
         f.check(taken == 0, || {
             format!("{taken} of {frames} frames that must have no effect have one")
@@ -359,7 +359,7 @@ mod tests {
             recording: Recording::default(),
             line: LineAudit::default(),
             arming_asked: true,
-            strangers: None,
+            intrusion: None,
             outputs: Outputs::default(),
             error: None,
         }
@@ -414,9 +414,9 @@ mod tests {
         let robot = builtin::robot("wheeleg-2003").expect("built in");
         let row = select(&["ui-replay".to_owned()]).expect("a row")[0];
         let failures = |frames, taken| {
-            let strangers = Some(Strangers { frames, taken });
+            let intrusion = Some(Intrusion { frames, taken });
             let ran = Ran {
-                strangers,
+                intrusion,
                 ..empty_run()
             };
             judge(*row, &robot, &ran, Measured::default())

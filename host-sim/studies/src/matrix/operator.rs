@@ -28,8 +28,8 @@ const BEAT_MS: u64 = 50;
 const CUT_MS: u64 = 1_000;
 /// Commands that were given meanwhile.
 const QUEUED: u64 = 1_000;
-/// How often a stranger tries, ms.
-const STRANGER_MS: u64 = 20;
+/// How often an intruder tries, ms.
+const INTRUDER_MS: u64 = 20;
 /// Life of a command, ms.
 const VALID_MS: u64 = 500;
 
@@ -47,7 +47,7 @@ impl Robot<'_, '_> {
 
 /// Frames that must have no effect.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Strangers {
+pub(super) struct Intrusion {
     /// How many came.
     pub(super) frames: u32,
     /// How many of them had one.
@@ -153,7 +153,7 @@ pub(super) struct Operator {
     connection: Connection,
     counter: Counter,
     holder: Client,
-    stranger: Client,
+    intruder: Client,
     /// Frames on their way: when they arrive, µs.
     line: Vec<(u64, Vec<u8>)>,
     /// Newest master time that the operator was shown, µs.
@@ -161,7 +161,7 @@ pub(super) struct Operator {
     /// Frames of the holder that somebody has kept.
     kept: Vec<Vec<u8>>,
     /// What had to have no effect.
-    pub(super) strangers: Strangers,
+    pub(super) intrusion: Intrusion,
 }
 
 impl Operator {
@@ -175,11 +175,11 @@ impl Operator {
                 next_request: 0,
             },
             holder: Client::new(1, begin),
-            stranger: Client::new(2, begin),
+            intruder: Client::new(2, begin),
             line: Vec::new(),
             shown_us: 0,
             kept: Vec::new(),
-            strangers: Strangers::default(),
+            intrusion: Intrusion::default(),
         }
     }
 
@@ -223,7 +223,7 @@ impl Operator {
             self.counter.arrive(&mut self.holder, &frame, robot);
             self.kept.push(frame);
         }
-        if since_ms.is_some_and(|since| since.is_multiple_of(STRANGER_MS)) {
+        if since_ms.is_some_and(|since| since.is_multiple_of(INTRUDER_MS)) {
             match self.connection {
                 Connection::SecondClient => self.intrude(now_us, robot),
                 Connection::Replay => self.replay(robot),
@@ -241,9 +241,9 @@ impl Operator {
             door: key.map_or_else(|| self.holder.door.clone(), |key| Door::new(key, now)),
             n: 0,
         };
-        self.strangers.frames += 1;
+        self.intrusion.frames += 1;
         let taken = self.counter.arrive(&mut client, frame, robot);
-        self.strangers.taken += u32::from(taken);
+        self.intrusion.taken += u32::from(taken);
     }
 
     /// The holder's next frame with each of its bits the other way, and under another key.
@@ -258,7 +258,7 @@ impl Operator {
         }
         let disarm = json!({ "n": self.holder.n, "seen_us": self.shown_us, "valid_ms": VALID_MS,
             "cmd": "Disarm", "args": {} });
-        let forged = self.stranger.key.seal(disarm.to_string().as_bytes());
+        let forged = self.intruder.key.seal(disarm.to_string().as_bytes());
         self.try_door(&forged, None, robot);
     }
 
@@ -266,7 +266,7 @@ impl Operator {
     fn replay(&mut self, robot: &mut Robot<'_, '_>) {
         for frame in self.kept.clone() {
             self.try_door(&frame, None, robot);
-            let other = self.stranger.key.clone();
+            let other = self.intruder.key.clone();
             self.try_door(&frame, Some(other), robot);
         }
         // One of those to come before its turn.
@@ -277,18 +277,18 @@ impl Operator {
 
     /// Another client with the key of control commands, takes and beats.
     fn intrude(&mut self, now_us: u64, robot: &mut Robot<'_, '_>) {
-        let stranger = &mut self.stranger;
+        let intruder = &mut self.intruder;
         let frames = [
-            stranger.command(now_us, "TakeControl", json!({})),
-            stranger.frame(json!({ "op": "beat", "seen_us": now_us })),
-            stranger.command(now_us, "Hold", json!({})),
-            stranger.command(now_us, "Disarm", json!({})),
-            stranger.command(now_us, "ReleaseControl", json!({})),
+            intruder.command(now_us, "TakeControl", json!({})),
+            intruder.frame(json!({ "op": "beat", "seen_us": now_us })),
+            intruder.command(now_us, "Hold", json!({})),
+            intruder.command(now_us, "Disarm", json!({})),
+            intruder.command(now_us, "ReleaseControl", json!({})),
         ];
         for frame in frames {
-            let taken = self.counter.arrive(&mut self.stranger, &frame, robot);
-            self.strangers.frames += 1;
-            self.strangers.taken += u32::from(taken);
+            let taken = self.counter.arrive(&mut self.intruder, &frame, robot);
+            self.intrusion.frames += 1;
+            self.intrusion.taken += u32::from(taken);
         }
     }
 
@@ -307,16 +307,16 @@ impl Operator {
         for frame in &frames {
             let mut closed = Client::new(3, self.counter.wall(now_us));
             let taken = self.counter.arrive(&mut closed, frame, robot);
-            self.strangers.frames += 1;
-            self.strangers.taken += u32::from(taken);
+            self.intrusion.frames += 1;
+            self.intrusion.taken += u32::from(taken);
         }
         let take = anew.command(now_us, "TakeControl", json!({}));
         self.counter.arrive(&mut anew, &take, robot);
         frames = (0..QUEUED).map(|i| queued(&mut anew, i)).collect();
         for frame in &frames {
             let taken = self.counter.arrive(&mut anew, frame, robot);
-            self.strangers.frames += 1;
-            self.strangers.taken += u32::from(taken);
+            self.intrusion.frames += 1;
+            self.intrusion.taken += u32::from(taken);
         }
         self.holder = anew;
         self.line.clear();

@@ -1,6 +1,6 @@
 //! What a run of a row leaves for measuring and judging.
 
-use super::operator::Strangers;
+use super::operator::Intrusion;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_sim::{LineAudit, SimError};
 use wheeleg_telemetry::Recording;
@@ -17,7 +17,7 @@ pub(super) struct Ran {
     /// Arming was asked for when every fault was over.
     pub(super) arming_asked: bool,
     /// Frames that had to have no effect.
-    pub(super) strangers: Option<Strangers>,
+    pub(super) intrusion: Option<Intrusion>,
     /// From power-up on.
     pub(super) outputs: Outputs,
     /// The run ended before its time, and why.

@@ -153,7 +153,7 @@ pub enum Connection {
 impl Connection {
     /// Whether frames come that must have no effect.
     #[must_use]
-    pub const fn has_strangers(self) -> bool {
+    pub const fn has_intruder(self) -> bool {
         !matches!(self, Self::Lost | Self::HalfOpen | Self::Slow)
     }
 

@@ -257,7 +257,7 @@ fn simulate(
         recording,
         line,
         arming_asked: false,
-        strangers: None,
+        intrusion: None,
         outputs,
         error,
     })
@@ -297,7 +297,7 @@ fn operated(
         recording,
         line,
         arming_asked: false,
-        strangers: connection.has_strangers().then_some(operator.strangers),
+        intrusion: connection.has_intruder().then_some(operator.intrusion),
         outputs: Outputs::default(),
         error,
     })

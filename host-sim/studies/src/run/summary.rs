@@ -115,8 +115,8 @@ fn alike(cause: &Cause) -> Option<Cause> {
     }
 }
 
-/// Faults, findings and refusals that are told one by one.
-const TOLD: usize = 20;
+/// Faults, findings and refusals that are listed one by one.
+const LISTED: usize = 20;
 /// What several boards tell alike within this time is one line \[ns\].
 const ALIKE_NS: u64 = 50_000_000;
 
@@ -153,7 +153,7 @@ fn messages(recording: &Recording) -> Vec<String> {
             boards.push(board);
             continue;
         }
-        if lines.len() == TOLD {
+        if lines.len() == LISTED {
             more += 1;
             continue;
         }

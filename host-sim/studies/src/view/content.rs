@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use wheeleg_config::Drawing;
-use wheeleg_protocol::Address;
-use wheeleg_telemetry::{EventKind, Logged, Read, Scalar, channels, read};
+use wheeleg_protocol::{Address, Fault};
+use wheeleg_telemetry::{EventCode, EventKind, Logged, Read, Scalar, channels, read};
 
 use super::plain::plain;
 use super::signals::{self, Signal, foot, joint, signal};
@@ -40,32 +40,50 @@ pub(super) struct LoggedEvent {
     pub(super) t_ns: u64,
     /// None of a later version.
     pub(super) kind: Option<EventKind>,
-    /// What makes it alike another: code, detail, fault.
-    alike: (String, String, u64),
-    /// Whom it is about.
-    who: Vec<String>,
-    what: String,
+    /// None of a later version.
+    code: Option<EventCode>,
+    detail: String,
+    fault: Option<Fault>,
+    /// Boards to which it happens.
+    boards: Vec<Address>,
+    /// The mode that the first of them was in before, as far as the log says.
+    mode: Option<String>,
+    /// That of the first board.
+    text: String,
 }
 
 impl LoggedEvent {
     fn fault(&self) -> FaultEvent {
-        let (code, detail, fault) = self.alike.clone();
         FaultEvent {
             t_ns: self.t_ns,
-            code,
-            detail,
-            fault,
-            who: self.who.clone(),
-            what: self.what.clone(),
+            code: self.code,
+            detail: self.detail.clone(),
+            fault: self.fault,
+            boards: self.boards.clone(),
+            text: self.text.clone(),
         }
+    }
+
+    /// Whether several boards may do the same at one time.
+    fn is_change_of_board(&self) -> bool {
+        matches!(
+            self.code,
+            Some(EventCode::Mode | EventCode::FaultLatched | EventCode::FaultsCleared)
+        )
+    }
+
+    /// Whether it is the same change of another board.
+    fn is_alike(&self, other: &Self) -> bool {
+        self.is_change_of_board()
+            && (self.code, &self.detail, self.fault, &self.mode)
+                == (other.code, &other.detail, other.fault, &other.mode)
     }
 
     /// For a person.
     pub(super) fn text(&self) -> String {
-        if self.who.is_empty() {
-            self.what.clone()
-        } else {
-            format!("{}: {}", self.who.join(", "), self.what)
+        match self.boards.as_slice() {
+            [] | [_] => self.text.clone(),
+            [_, others @ ..] => format!("{} (likewise {})", self.text, cause::names(others)),
         }
     }
 }
@@ -88,6 +106,8 @@ pub(super) struct Content {
     pub(super) strokes: [Vec<(u64, f32)>; 6],
     robot: Instants,
     phases: Vec<(u64, Option<(String, bool)>)>,
+    /// The mode of each board.
+    modes: BTreeMap<Address, String>,
 }
 
 /// The robot at instants of equal distance.
@@ -184,6 +204,7 @@ impl Content {
             strokes: Default::default(),
             robot: Instants::default(),
             phases: Vec::new(),
+            modes: BTreeMap::new(),
         };
         let mut latest: BTreeMap<Signal, f64> = BTreeMap::new();
         let mut looked_ms = 0;
@@ -252,31 +273,36 @@ impl Content {
 
     fn event(&mut self, logged: &Logged<'_>) {
         let [kind, code, detail, text] = texts(logged, ["kind", "code", "detail", "text"]);
+        let code = EventCode::of_name(&code);
+        let board = Address::new(logged.number("board").unwrap_or_default() as u8);
+        let board = board.filter(|board| board.is_node());
+        let mode = match board {
+            Some(board) if code == Some(EventCode::Mode) => {
+                self.modes.insert(board, detail.clone())
+            }
+            _ => None,
+        };
         if logged.number("start_up_us").is_some_and(|us| us > 0.0) {
             if self.start_up.len() < EVENTS {
                 self.start_up.push(text);
             }
             return;
         }
-        let board = Address::new(logged.number("board").unwrap_or_default() as u8);
-        let fault = logged.number("fault").unwrap_or_default() as u64;
-        let board = board.filter(|board| board.is_node());
-        let (who, what) = cause::named(board.map(|board| board.to_string()), text);
         let event = LoggedEvent {
             t_ns: logged.t_ns,
             kind: EventKind::of_name(&kind),
-            alike: (code, detail, fault),
-            who,
-            what,
+            code,
+            detail,
+            fault: Fault::from_code(logged.number("fault").unwrap_or_default() as u8),
+            boards: board.into_iter().collect(),
+            mode,
+            text,
         };
         // What happens to several boards at one time is one line that names them all.
         let now = self.events.iter_mut().rev();
         let mut now = now.take_while(|other| other.t_ns == event.t_ns);
-        let same = now.find(|other| {
-            !event.who.is_empty() && other.alike == event.alike && other.what == event.what
-        });
-        if let Some(same) = same {
-            same.who.extend(event.who);
+        if let Some(same) = now.find(|other| event.is_alike(other)) {
+            same.boards.extend(event.boards);
         } else if self.events.len() < EVENTS {
             self.events.push(event);
         } else {

@@ -8,7 +8,7 @@ use wheeleg_master::finding::Finding;
 use wheeleg_protocol::LogEvent;
 use wheeleg_protocol::param::params_at;
 
-use super::EventKind;
+use super::code::{EventCode, EventKind};
 
 pub(super) const fn master_kind(event: &MasterEvent) -> EventKind {
     match event {
@@ -44,54 +44,53 @@ pub(super) const fn master_kind(event: &MasterEvent) -> EventKind {
     }
 }
 
-/// Name of an act of a behaviour, in snake case.
-const fn act_name(act: Behaves) -> &'static str {
+const fn act_code(act: Behaves) -> EventCode {
     match act {
-        Behaves::Overload { .. } => "overload",
-        Behaves::TipGuard => "tip_guard",
-        Behaves::EarlyGround(_) => "early_ground",
-        Behaves::LateGround(_) => "late_ground",
-        Behaves::NoGround(_) => "no_ground",
-        Behaves::Bump(_) => "bump",
-        Behaves::LostGround(_) => "lost_ground",
-        Behaves::Slip => "slip",
-        Behaves::BackOff => "back_off",
-        Behaves::Stuck => "stuck",
-        Behaves::LoadShare => "load_share",
-        Behaves::Governor => "governor",
+        Behaves::Overload { .. } => EventCode::Overload,
+        Behaves::TipGuard => EventCode::TipGuard,
+        Behaves::EarlyGround(_) => EventCode::EarlyGround,
+        Behaves::LateGround(_) => EventCode::LateGround,
+        Behaves::NoGround(_) => EventCode::NoGround,
+        Behaves::Bump(_) => EventCode::Bump,
+        Behaves::LostGround(_) => EventCode::LostGround,
+        Behaves::Slip => EventCode::Slip,
+        Behaves::BackOff => EventCode::BackOff,
+        Behaves::Stuck => EventCode::Stuck,
+        Behaves::LoadShare => EventCode::LoadShare,
+        Behaves::Governor => EventCode::Governor,
     }
 }
 
-pub(super) const fn master_code(event: &MasterEvent) -> &'static str {
+pub(super) const fn master_code(event: &MasterEvent) -> EventCode {
     match event {
-        MasterEvent::Done(_) => "command_done",
-        MasterEvent::Refused { .. } => "command_refused",
-        MasterEvent::NodeReady(_) => "board_ready",
-        MasterEvent::SchemaMismatch { .. } => "other_interface",
-        MasterEvent::WrongRole(_) => "wrong_role",
-        MasterEvent::DuplicateAddress { .. } => "duplicate_address",
-        MasterEvent::ForeignBoard { .. } => "foreign_board",
-        MasterEvent::Commissioned { .. } => "commissioned",
-        MasterEvent::Found { .. } => "finding",
-        MasterEvent::Diagnosis { .. } => "diagnosis",
-        MasterEvent::Link { .. } => "link",
-        MasterEvent::Log { .. } => "log",
-        MasterEvent::LogLost { .. } => "log_lost",
-        MasterEvent::Parameter { .. } => "parameter",
-        MasterEvent::NodeLost(_) => "board_lost",
-        MasterEvent::NodeBack(_) => "board_back",
-        MasterEvent::Armed => "armed",
-        MasterEvent::Disarmed => "disarmed",
-        MasterEvent::Hold(_) => "hold",
-        MasterEvent::Homed => "homed",
-        MasterEvent::HomingFailed { .. } => "homing_failed",
-        MasterEvent::Behaviour(act) => act_name(*act),
-        MasterEvent::GaitDone { .. } => "gait_done",
-        MasterEvent::TrajectoryDone => "trajectory_done",
-        MasterEvent::TouchDown { .. } => "touch_down",
-        MasterEvent::FootSwitch { .. } => "foot_switch",
-        MasterEvent::LiftOff(_) => "lift_off",
-        MasterEvent::Position { .. } => "position",
+        MasterEvent::Done(_) => EventCode::CommandDone,
+        MasterEvent::Refused { .. } => EventCode::CommandRefused,
+        MasterEvent::NodeReady(_) => EventCode::BoardReady,
+        MasterEvent::SchemaMismatch { .. } => EventCode::OtherInterface,
+        MasterEvent::WrongRole(_) => EventCode::WrongRole,
+        MasterEvent::DuplicateAddress { .. } => EventCode::DuplicateAddress,
+        MasterEvent::ForeignBoard { .. } => EventCode::ForeignBoard,
+        MasterEvent::Commissioned { .. } => EventCode::Commissioned,
+        MasterEvent::Found { .. } => EventCode::Finding,
+        MasterEvent::Diagnosis { .. } => EventCode::Diagnosis,
+        MasterEvent::Link { .. } => EventCode::Link,
+        MasterEvent::Log { .. } => EventCode::Log,
+        MasterEvent::LogLost { .. } => EventCode::LogLost,
+        MasterEvent::Parameter { .. } => EventCode::Parameter,
+        MasterEvent::NodeLost(_) => EventCode::BoardLost,
+        MasterEvent::NodeBack(_) => EventCode::BoardBack,
+        MasterEvent::Armed => EventCode::Armed,
+        MasterEvent::Disarmed => EventCode::Disarmed,
+        MasterEvent::Hold(_) => EventCode::Hold,
+        MasterEvent::Homed => EventCode::Homed,
+        MasterEvent::HomingFailed { .. } => EventCode::HomingFailed,
+        MasterEvent::Behaviour(act) => act_code(*act),
+        MasterEvent::GaitDone { .. } => EventCode::GaitDone,
+        MasterEvent::TrajectoryDone => EventCode::TrajectoryDone,
+        MasterEvent::TouchDown { .. } => EventCode::TouchDown,
+        MasterEvent::FootSwitch { .. } => EventCode::FootSwitch,
+        MasterEvent::LiftOff(_) => EventCode::LiftOff,
+        MasterEvent::Position { .. } => EventCode::Position,
     }
 }
 

@@ -14,7 +14,7 @@ use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
 use wheeleg_studies::study::Finished;
 
 /// So many false alarms are named; all of them are in the report.
-const ALARMS_TOLD: usize = 5;
+const ALARMS_LISTED: usize = 5;
 
 /// Arguments of `wheeleg compare`.
 #[derive(Debug, Args)]
@@ -182,7 +182,7 @@ fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
     out += &combinations(comparison);
     let alarms = comparison.false_alarms();
     let mut told = String::new();
-    let shown = if all { usize::MAX } else { ALARMS_TOLD };
+    let shown = if all { usize::MAX } else { ALARMS_LISTED };
     for row in alarms.clone().take(shown) {
         let _ = writeln!(told, "  {}: {}", row.case.id, row.figures.faults);
     }

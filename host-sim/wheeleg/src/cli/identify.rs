@@ -76,15 +76,15 @@ pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
 fn text(identified: &Identified, report: &Path) -> String {
     let mut text = format!("{:<34}{:>9}{:>9}{:>9}\n", "", "factor", "from", "to");
     for p in &identified.parameters {
-        let note = if p.told { "" } else { "  not determined" };
+        let note = if p.determined { "" } else { "  not determined" };
         let _ = writeln!(
             text,
             "{:<34}{:>9.4}{:>9.4}{:>9.4}{note}",
             p.words, p.factor, p.low, p.high
         );
     }
-    for untold in &identified.untold {
-        let _ = writeln!(text, "undetermined   {untold}");
+    for direction in &identified.undetermined {
+        let _ = writeln!(text, "undetermined   {direction}");
     }
     let _ = writeln!(
         text,

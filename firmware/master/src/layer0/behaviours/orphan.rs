@@ -1,8 +1,8 @@
-//! A walk whose layer 1 stands still: what layer 0 makes of the last references.
+//! A walk whose layer 1 has stopped: what layer 0 does with the last references.
 //!
-//! Standing feet go with the ground until the wheels stand. When layer 1 is given up, a foot in the
-//! air is set down where it is; then the robot stands, and its behaviours go on for a while
-//! ([`CARRIED`]).
+//! Standing feet move with the ground until the wheels have stopped. When layer 1 is given up, a
+//! foot in the air is set down where it is; then the robot stands, and its behaviours continue for a
+//! while ([`CARRIED`]).
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 

@@ -1,8 +1,8 @@
-//! The wheels of a walk at the pace that the behaviours allow.
+//! The wheels of a walk, at the pace that the behaviours allow.
 //!
-//! Layer 1 tells where the wheels should be; what they are held back by is given up, not made up
-//! for. Where layer 1 is late the wheels go on as they did, and slow down when it stays away; what
-//! they have gone meanwhile is not taken back.
+//! Layer 1 gives the position that the wheels should have. Travel that the behaviours withhold is
+//! given up, not caught up. While layer 1 is late the wheels continue as before, and slow down if it
+//! stays away; the distance covered in the meantime is not taken back.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};

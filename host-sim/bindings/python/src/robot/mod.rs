@@ -234,8 +234,8 @@ impl Robot {
         for event in self.on_thread(py, Live::take_events)? {
             let dict = PyDict::new(py);
             dict.set_item("t_s", event.t_s)?;
-            dict.set_item("kind", event.kind)?;
-            dict.set_item("code", event.code)?;
+            dict.set_item("kind", event.kind.name())?;
+            dict.set_item("code", event.code.name())?;
             dict.set_item("text", event.text)?;
             list.append(dict)?;
         }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use wheeleg_telemetry::samples::{BodySample, FootSample, JointSample, SupplySample, WheelSample};
-use wheeleg_telemetry::{SampleRef, Sink, Taken};
+use wheeleg_telemetry::{EventCode, EventKind, SampleRef, Sink, Taken};
 
 /// Most events that wait to be taken; then the oldest goes.
 const EVENTS: usize = 10_000;
@@ -43,8 +43,8 @@ pub(super) struct Sight {
 #[derive(Debug, Clone)]
 pub(super) struct Happened {
     pub(super) t_s: f64,
-    pub(super) kind: String,
-    pub(super) code: String,
+    pub(super) kind: EventKind,
+    pub(super) code: EventCode,
     pub(super) text: String,
 }
 
@@ -112,8 +112,8 @@ impl Sink for SeenSink {
                 }
                 seen.events.push(Happened {
                     t_s: taken.t_ns as f64 * 1e-9,
-                    kind: sample.kind.clone(),
-                    code: sample.code.clone(),
+                    kind: sample.kind,
+                    code: sample.code,
                     text: sample.text.clone(),
                 });
             }

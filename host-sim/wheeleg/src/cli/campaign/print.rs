@@ -90,7 +90,7 @@ const CAUSES: usize = 20;
 fn causes(causes: &Causes) -> String {
     let mut out = String::new();
     for (cause, cases) in causes.first(CAUSES) {
-        let _ = writeln!(out, "        {cases:>5}  {}", causes.told(cause));
+        let _ = writeln!(out, "        {cases:>5}  {}", causes.message(cause));
     }
     let more = causes.kinds().saturating_sub(CAUSES);
     if more > 0 {

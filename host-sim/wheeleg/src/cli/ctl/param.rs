@@ -85,15 +85,16 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
     if code != 200 {
         return Ok(not_answered(&all));
     }
-    let (value, unit) = told(&all, board, parameter).ok_or_else(|| {
+    let (value, unit) = reported(&all, board, parameter).ok_or_else(|| {
         StudyError::refused(
             format!("the server has not received `{parameter}` from board {board}"),
             "use the `wheeleg` of the same version as the server",
         )
     })?;
     if reach.json {
-        let told = json!({ "board": board, "parameter": parameter, "value": value, "unit": unit });
-        return print(&format!("{told}\n"));
+        let answer =
+            json!({ "board": board, "parameter": parameter, "value": value, "unit": unit });
+        return print(&format!("{answer}\n"));
     }
     print(&match unit {
         "1" => format!("{value}\n"),
@@ -102,7 +103,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
 }
 
 /// Value and unit of a parameter that its board has told, in the answer of `/api/v1/parameters`.
-fn told<'a>(all: &'a Value, board: u8, parameter: &str) -> Option<(&'a Value, &'a str)> {
+fn reported<'a>(all: &'a Value, board: u8, parameter: &str) -> Option<(&'a Value, &'a str)> {
     let mut boards = all["boards"].as_array()?.iter();
     let board = boards.find(|of| of["address"] == board)?;
     let table = all[board["kind"].as_str()?].as_array()?;
@@ -127,12 +128,16 @@ mod tests {
             "wheel": [{ "name": "b", "unit": "s" }],
             "boards": [of(1, "joint", json!(2.5), true), of(2, "joint", json!(3), false)],
         });
-        assert_eq!(told(&all, 1, "b"), Some((&json!(2.5), "1")));
-        assert_eq!(told(&all, 2, "a"), Some((&json!(1), "mm")));
+        assert_eq!(reported(&all, 1, "b"), Some((&json!(2.5), "1")));
+        assert_eq!(reported(&all, 2, "a"), Some((&json!(1), "mm")));
         for (board, parameter) in [(2, "b"), (3, "a"), (1, "c")] {
-            assert_eq!(told(&all, board, parameter), None, "{board} {parameter}");
+            assert_eq!(
+                reported(&all, board, parameter),
+                None,
+                "{board} {parameter}"
+            );
         }
-        assert_eq!(told(&json!({}), 1, "a"), None);
+        assert_eq!(reported(&json!({}), 1, "a"), None);
     }
 
     #[test]

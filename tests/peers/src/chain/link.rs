@@ -2,7 +2,7 @@
 
 use super::num::Num;
 use super::spatial::{Mass, Sym3, Vec3};
-use crate::dynamics::DynamicsError;
+use wheeleg_plant::dynamics::DynamicsError;
 
 /// Bits of a pattern: which parameters of a link may differ from zero.
 const ORIGIN: [u16; 3] = [1, 2, 4];

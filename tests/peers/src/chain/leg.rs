@@ -6,11 +6,11 @@
 
 use wheeleg_kinematics::{LegGeometry, LegLengths, LegParameters, LegPosture};
 
+use super::finite;
 use super::link::{End, LinkParams, Py, Pz, Rz};
 use super::model::{Fixed, floats};
 use super::tree::Rates;
-use crate::dynamics::error::finite;
-use crate::dynamics::{BodyParams, DynamicsError, LegBodies};
+use wheeleg_plant::dynamics::{BodyParams, DynamicsError, LegBodies};
 
 /// Origins and products are zero, the mass centre is anywhere.
 const BODY: u16 = 0b000_111_000;
@@ -22,7 +22,7 @@ type VerticalRod = Pz<BODY>;
 type Horizontal = Py<BODY, VerticalRod>;
 type Carriage = Rz<BODY, Horizontal>;
 
-/// The assembled leg, q = [b2, b5, b6] (m): same numbers as [`crate::dynamics::noc::Leg`].
+/// The assembled leg, q = [b2, b5, b6] (m): same numbers as [`wheeleg_plant::dynamics::noc::Leg`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChainLeg {
     geometry: LegGeometry<f64>,

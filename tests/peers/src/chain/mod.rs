@@ -13,7 +13,7 @@
 //! [`Fixed`] stands on an unmoved base, [`Floating`] on a free body.
 //!
 //! ```
-//! use wheeleg_plant::dynamics::chain::{End, Fixed, LinkParams, Pz, Ry};
+//! use wheeleg_peers::chain::{End, Fixed, LinkParams, Pz, Ry};
 //!
 //! // A telescope on a hinge: two bodies of 1 kg, 0.1 m and 0.3 m + q1 below the hinge.
 //! const ARM: LinkParams = LinkParams {
@@ -49,3 +49,17 @@ pub use leg::ChainLeg;
 pub use link::{DENSE, End, Link, LinkParams, Px, Py, Pz, Rx, Ry, Rz};
 pub use model::{Fixed, Floating, FloatingState};
 pub use tree::Tree;
+
+use wheeleg_plant::dynamics::DynamicsError;
+
+/// Passes a finite array, refuses the first value that is not.
+fn finite<const N: usize>(name: &'static str, values: &[f64; N]) -> Result<(), DynamicsError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(DynamicsError::NonFinite {
+            name,
+            index,
+            value: values[index],
+        }),
+    }
+}

@@ -1,12 +1,12 @@
 //! Chains on a fixed and on a floating base.
 
 use super::factor::{Ancestors, BASE, System, Top};
+use super::finite;
 use super::link::{BodyMoments, LinkParams};
 use super::num::Num;
 use super::spatial::{Mass, Pose, Vec3};
 use super::tree::{Columns, Motion, Positions, Rates, Tree, set_base};
-use crate::dynamics::DynamicsError;
-use crate::dynamics::error::finite;
+use wheeleg_plant::dynamics::DynamicsError;
 
 /// Largest deviation of |quaternion|² from 1 that is accepted.
 const UNIT_TOLERANCE: f64 = 1e-6;

@@ -5,7 +5,7 @@
 //! branched kinematic trees", 2005).
 
 use super::num::Num;
-use crate::dynamics::DynamicsError;
+use wheeleg_plant::dynamics::DynamicsError;
 
 /// H x = b under elimination; of H the lower triangle.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,5 @@
-//! What a joint board is told of its axis: each quantity with the board's parameter that holds it,
-//! and the fields of the axis file that it is made of.
+//! Parameters of a joint board that follow from its axis file: each with the fields of the file
+//! from which it is computed.
 //!
 //! The limits are those of the protocol's table. A quantity that is one field of the file has them
 //! as the range of that field; one that is made of several is a relation between these.
@@ -15,7 +15,7 @@ pub const STEPS_AT_REST: f64 = 2.5;
 
 /// One quantity.
 #[derive(Debug, Clone, Copy)]
-pub struct Told {
+pub struct Derived {
     /// The board's parameter.
     pub parameter: JointParam,
     /// Fields of the axis file.
@@ -23,14 +23,14 @@ pub struct Told {
     value: fn(&AxisParams) -> f64,
 }
 
-impl Told {
+impl Derived {
     /// The quantity of an axis, in the unit of the parameter.
     #[must_use]
     pub fn value(&self, axis: &AxisParams) -> f64 {
         (self.value)(axis)
     }
 
-    /// Whether a board can be told so.
+    /// Whether the board's table allows it.
     #[must_use]
     pub fn fits(&self, axis: &AxisParams) -> bool {
         raw_within(self.parameter.info(), self.value(axis)).is_some()
@@ -39,48 +39,48 @@ impl Told {
 
 /// The quantity of a parameter, in its unit; `None` if it is not of the axis.
 #[must_use]
-pub fn told(axis: &AxisParams, parameter: JointParam) -> Option<f64> {
-    let row = TOLD.iter().find(|row| row.parameter == parameter);
+pub fn derived(axis: &AxisParams, parameter: JointParam) -> Option<f64> {
+    let row = DERIVED.iter().find(|row| row.parameter == parameter);
     row.map(|row| row.value(axis))
 }
 
 /// All of them.
 #[rustfmt::skip]
-pub const TOLD: &[Told] = &[
-    told_by(JointParam::StrokeMax, &["cylinder.stroke"], |a| a.cylinder.stroke_m * 1e3),
-    told_by(JointParam::ValveOn, &["fill_valve.t_on", "vent_valve.t_on"], |a| longer(a, |v| v.t_on_s)),
-    told_by(JointParam::ValveOff, &["fill_valve.t_off", "vent_valve.t_off"], |a| longer(a, |v| v.t_off_s)),
-    told_by(JointParam::SensorFullScale, &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"],
+pub const DERIVED: &[Derived] = &[
+    from_fields(JointParam::StrokeMax, &["cylinder.stroke"], |a| a.cylinder.stroke_m * 1e3),
+    from_fields(JointParam::ValveOn, &["fill_valve.t_on", "vent_valve.t_on"], |a| longer(a, |v| v.t_on_s)),
+    from_fields(JointParam::ValveOff, &["fill_valve.t_off", "vent_valve.t_off"], |a| longer(a, |v| v.t_off_s)),
+    from_fields(JointParam::SensorFullScale, &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"],
         |a| a.potentiometer.electrical_stroke_m / a.potentiometer.gain * 1e3),
-    told_by(JointParam::Bore, &["cylinder.bore"], |a| a.cylinder.bore_m * 1e3),
-    told_by(JointParam::Rod, &["cylinder.rod"], |a| a.cylinder.rod_m * 1e3),
-    told_by(JointParam::DeadVolumeA, &["cylinder.dead_volume_a", "line.volume"],
+    from_fields(JointParam::Bore, &["cylinder.bore"], |a| a.cylinder.bore_m * 1e3),
+    from_fields(JointParam::Rod, &["cylinder.rod"], |a| a.cylinder.rod_m * 1e3),
+    from_fields(JointParam::DeadVolumeA, &["cylinder.dead_volume_a", "line.volume"],
         |a| (a.cylinder.dead_volume_a_m3 + a.cylinder.line_volume_m3) * 1e6),
-    told_by(JointParam::DeadVolumeB, &["cylinder.dead_volume_b", "line.volume"],
+    from_fields(JointParam::DeadVolumeB, &["cylinder.dead_volume_b", "line.volume"],
         |a| (a.cylinder.dead_volume_b_m3 + a.cylinder.line_volume_m3) * 1e6),
-    told_by(JointParam::Conductance, &["fill_valve.conductance", "line.conductance"],
+    from_fields(JointParam::Conductance, &["fill_valve.conductance", "line.conductance"],
         |a| path(a).conductance_m3_s_pa * 1e8),
-    told_by(JointParam::CriticalRatio, &["fill_valve.critical_ratio", "line.critical_ratio"],
+    from_fields(JointParam::CriticalRatio, &["fill_valve.critical_ratio", "line.critical_ratio"],
         |a| path(a).critical_ratio),
-    told_by(JointParam::SupplyPressure, &["supply.set_pressure"], |a| a.supply.set_pressure_pa * 1e-3),
-    told_by(JointParam::MovingMass, &["moving.mass"], |a| a.moving_mass_kg),
-    told_by(JointParam::FrictionCoulomb, &["friction.coulomb"], |a| a.cylinder.friction.coulomb_n),
-    told_by(JointParam::FrictionBreakaway, &["friction.static"], |a| a.cylinder.friction.static_n),
-    told_by(JointParam::FrictionViscous, &["friction.viscous"], |a| a.cylinder.friction.viscous_n_s_m),
-    told_by(JointParam::LineDelay, &["line.delay"], |a| a.cylinder.line_delay_s * 1e6),
-    told_by(JointParam::RestBand, &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"],
+    from_fields(JointParam::SupplyPressure, &["supply.set_pressure"], |a| a.supply.set_pressure_pa * 1e-3),
+    from_fields(JointParam::MovingMass, &["moving.mass"], |a| a.moving_mass_kg),
+    from_fields(JointParam::FrictionCoulomb, &["friction.coulomb"], |a| a.cylinder.friction.coulomb_n),
+    from_fields(JointParam::FrictionBreakaway, &["friction.static"], |a| a.cylinder.friction.static_n),
+    from_fields(JointParam::FrictionViscous, &["friction.viscous"], |a| a.cylinder.friction.viscous_n_s_m),
+    from_fields(JointParam::LineDelay, &["line.delay"], |a| a.cylinder.line_delay_s * 1e6),
+    from_fields(JointParam::RestBand, &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"],
         |a| (STEPS_AT_REST * lsb_m(a) * 1e3).max(LEAST_BAND_MM)),
 ];
 
-/// A band of rest is never told smaller \[mm\]: that of the parameter.
+/// A band of rest is never smaller \[mm\]: that of the parameter.
 const LEAST_BAND_MM: f64 = limits(JointParam::RestBand)[0];
 
-const fn told_by(
+const fn from_fields(
     parameter: JointParam,
     fields: &'static [&'static str],
     value: fn(&AxisParams) -> f64,
-) -> Told {
-    Told {
+) -> Derived {
+    Derived {
         parameter,
         fields,
         value,
@@ -137,9 +137,9 @@ mod tests {
     /// Three decimals are all that the limits of these rows have.
     #[test]
     fn limits_are_those_of_the_table_to_the_raw_number() {
-        for told in TOLD {
-            let row = told.parameter.info();
-            let raw = limits(told.parameter).map(|limit| (limit * scale(row.format)).round());
+        for derived in DERIVED {
+            let row = derived.parameter.info();
+            let raw = limits(derived.parameter).map(|limit| (limit * scale(row.format)).round());
             assert_eq!(
                 raw,
                 [f64::from(row.min), f64::from(row.max)],

@@ -4,10 +4,10 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use wheeleg_plant::dynamics::chain::reference::{
+use wheeleg_peers::chain::reference::{
     GRAVITY_M_S2, LegState, ROBOT14, RPP, RPR, leg_states, robot_state, rpp_dense, weighted,
 };
-use wheeleg_plant::dynamics::chain::{
+use wheeleg_peers::chain::{
     ChainLeg, DENSE, End, Fixed, Floating, FloatingState, LinkParams, Px, Py, Pz, Rx, Ry, Rz,
 };
 use wheeleg_plant::dynamics::noc::Leg;

@@ -1,25 +1,25 @@
-//! What a fit tells: intervals, and what the data cannot tell.
+//! Intervals of a fit, and what the data do not determine.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::fit::{Z95, trust};
-use super::free::{COUNT, FREE, Logs};
+use super::free::{COUNT, FREE};
 
-/// A parameter is told if the data leave less than this share of the file's uncertainty.
-const TOLD: f64 = 0.5;
+/// A parameter is determined if the data leave less than this share of the file's uncertainty.
+const DETERMINED: f64 = 0.5;
 /// Least share of a parameter in a direction that is named.
 const SHARE: f64 = 0.3;
 
-/// What the data say of one factor.
+/// How well the data determine one factor.
 #[derive(Debug, Clone, Copy)]
-pub struct Told {
+pub struct Interval {
     /// Standard deviation of the logarithm.
     pub deviation: f64,
-    /// Whether the data tell it.
-    pub told: bool,
+    /// Whether the data determine it.
+    pub determined: bool,
 }
 
-impl Told {
+impl Interval {
     /// Least and largest factor, 95 %.
     #[must_use]
     pub fn factors(&self, log: f64) -> [f64; 2] {
@@ -33,9 +33,9 @@ pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
     jacobian.tr_mul(jacobian) / variance
 }
 
-/// Deviations under the information of data and file.
+/// Intervals under the information of data and file.
 #[must_use]
-pub fn told(information: &DMatrix<f64>) -> [Told; COUNT] {
+pub fn intervals(information: &DMatrix<f64>) -> [Interval; COUNT] {
     let mut whole = information.clone();
     for i in 0..COUNT {
         whole[(i, i)] += trust(i).powi(-2);
@@ -44,9 +44,9 @@ pub fn told(information: &DMatrix<f64>) -> [Told; COUNT] {
     std::array::from_fn(|i| {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
         let deviation = variance.sqrt().min(trust(i));
-        Told {
+        Interval {
             deviation,
-            told: deviation < TOLD * trust(i),
+            determined: deviation < DETERMINED * trust(i),
         }
     })
 }
@@ -54,13 +54,13 @@ pub fn told(information: &DMatrix<f64>) -> [Told; COUNT] {
 /// What can change together without the data noticing, in words: directions in which the data
 /// say less than the file.
 #[must_use]
-pub fn untold(information: &DMatrix<f64>) -> Vec<String> {
+pub fn undetermined(information: &DMatrix<f64>) -> Vec<String> {
     // In units of what the file is trusted to.
     let scaled = DMatrix::from_fn(COUNT, COUNT, |i, k| {
         trust(i) * information[(i, k)] * trust(k)
     });
     let eigen = SymmetricEigen::new(scaled);
-    let limit = TOLD.powi(-2) - 1.0;
+    let limit = DETERMINED.powi(-2) - 1.0;
     let mut weak: Vec<usize> = (0..COUNT)
         .filter(|k| eigen.eigenvalues[*k] < limit)
         .collect();
@@ -108,13 +108,6 @@ pub fn ignorance(information: &DMatrix<f64>) -> f64 {
 
 /// Whether a value lies in the interval of its parameter; for tests of the coverage.
 #[must_use]
-pub fn covers(told: &Told, log: f64, truth: f64) -> bool {
-    (log - truth).abs() <= Z95 * told.deviation
-}
-
-/// Largest told deviation from a truth; for tests.
-#[must_use]
-pub fn worst_told(told: &[Told; COUNT], logs: &Logs, truth: &Logs) -> f64 {
-    let all = (0..COUNT).filter(|i| told[*i].told);
-    all.map(|i| (logs[i] - truth[i]).abs()).fold(0.0, f64::max)
+pub fn covers(interval: &Interval, log: f64, truth: f64) -> bool {
+    (log - truth).abs() <= Z95 * interval.deviation
 }
