@@ -86,6 +86,18 @@ def changed(axis, paths, logs, start=None):
     return axis.with_values(values)
 
 
+def bounds(axis, paths):
+    """Logarithms of the least and the largest factor that the file's ranges allow, by parameter."""
+    parameters = axis.parameters()
+    least, largest = [], []
+    for at in paths:
+        rows = [parameters[path] for path in at]
+        least.append(max(np.log(max(row["min"], 1e-9) / row["value"]) for row in rows))
+        largest.append(min(np.log(row["max"] / row["value"]) for row in rows))
+    # Not onto the ends, where rounding may leave them.
+    return np.array(least) + 1e-6, np.array(largest) - 1e-6
+
+
 def main():
     program, folder = sys.argv[1], Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
@@ -137,7 +149,7 @@ def main():
 
     starts = [np.zeros(len(names)), *(trust * random.uniform(-1, 1, (2, len(names))))]
     fits = [
-        least_squares(residuals, begin, diff_step=2e-3, xtol=1e-6, ftol=1e-6, max_nfev=40)
+        least_squares(residuals, begin, bounds=bounds(axis, at), diff_step=2e-3, xtol=1e-6, ftol=1e-6, max_nfev=40)
         for begin in starts
     ]
     best = min(fits, key=lambda fit: fit.cost)
