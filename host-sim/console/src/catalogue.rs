@@ -43,7 +43,7 @@ pub enum HostCode {
     RecordStop = 0x0308,
     /// The control goes to another client.
     HandOver = 0x0309,
-    /// The control is taken away.
+    /// The control is revoked.
     Revoke = 0x030A,
 }
 
@@ -153,7 +153,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
         code: HostCode::Revoke,
         name: "Revoke",
         arguments: &[],
-        effect: "Takes the control away from who holds it, as if they had been lost: an armed robot holds. At the robot's own computer alone.",
+        effect: "Ends the control of who holds it or has asked for it, as if they had been lost: an armed robot holds. For 2 s after that whoever revoked alone may take it. At the robot's own computer alone.",
     },
 ];
 

@@ -9,9 +9,11 @@ use wheeleg_telemetry::messages::reject;
 use crate::live::Answer;
 use crate::reason::Reason;
 
-pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
+/// An event, with its number since power-up.
+pub(crate) fn event_json(number: u64, t_ns: u64, event: &EventSample) -> Value {
     json!({
         "op": "event",
+        "number": number,
         "t_ns": t_ns,
         "kind": event.kind,
         "code": event.code,
@@ -51,7 +53,7 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
         Answer::Revoked => refused(
             n,
             Reason::Revoked,
-            "the control was taken away at the robot's computer: look at the robot, then take it anew",
+            "the control was revoked at the robot's computer, and its lease is not over: look at the robot, then take it anew",
         ),
         Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(

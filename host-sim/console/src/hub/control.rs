@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
 use super::{Asked, Client, Inner, Pending, Role, TICKET};
-use crate::desk::{ClientId, Denied};
+use crate::desk::{ClientId, Denied, Ended};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use crate::reason::Reason;
@@ -43,15 +43,24 @@ impl Inner {
             }
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
+                // Its answers may come in another order than it may expect: what is released behind a
+                // grant would leave the master with a holder of whom nobody here knows.
+                if takes && self.pending.values().any(|p| p.client == id && p.what.is_of_control()) {
+                    let text = "what was asked for the control before is not answered yet";
+                    return self.tell(id, &refused(n, Reason::Busy, text));
+                }
                 let who = (&*client.name, &*client.session);
                 match self.desk.ask(id, who, takes) {
                     Ok(()) => {}
+                    Err(Denied::Revoked) => {
+                        return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
+                    }
                     Err(Denied::Held) => {
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
                         if !told {
                             client.asked = Some(now);
                             let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
-                            if let Some(holder) = self.desk.holder() {
+                            if let Some(holder) = self.desk.holder().filter(|h| h.ended.is_none()) {
                                 self.tell(holder.client, &asked);
                             }
                         }
@@ -103,17 +112,21 @@ impl Inner {
                 };
                 (input, Asked::HandOver(heir))
             }
-            Order::Host(HostCommand::Revoke) => {
+            Order::Revoke => {
                 if !client.is_local {
                     let text = "the control is taken away at the robot's own computer alone";
                     return self.tell(id, &refused(n, Reason::Role, text));
                 }
+                let by = client.name.clone();
+                let Some(holder) = self.desk.holder().map(|holder| holder.name.clone()) else {
+                    // Where nobody is in control there is nothing to take away.
+                    return self.tell_done(id, n);
+                };
                 let id = self.next_request;
-                let command = HostCommand::Revoke;
-                (Input::Host { id, command }, Asked::Revoke)
+                (Input::Revoked { id, holder, by }, Asked::Revoke)
             }
             Order::Host(command) => {
-                if self.desk.holder().is_some() && !holds {
+                if !self.desk.may_command_host(id) {
                     return self.tell(id, &self.held(n));
                 }
                 let what = match &command {
@@ -126,6 +139,7 @@ impl Inner {
             }
         };
         let takes = matches!(what, Asked::Take);
+        let revokes = matches!(what, Asked::Revoke);
         if self.robot.inputs.push(input).is_err() {
             if takes && !holds {
                 self.desk.withdraw(id);
@@ -134,6 +148,9 @@ impl Inner {
                 id,
                 &refused(n, Reason::Busy, "the queue to the robot is full"),
             );
+        }
+        if revokes {
+            self.revoke(id);
         }
         let pending = Pending {
             client: id,
@@ -149,8 +166,11 @@ impl Inner {
     /// The answer to who wants what another holds.
     fn held(&self, n: u64) -> Value {
         let name = self.desk.name().unwrap_or_default();
-        let text = match self.desk.holder() {
-            Some(_) => format!("{name:?} holds the control"),
+        let text = match self.desk.holder().map(|holder| holder.ended) {
+            Some(None) => format!("{name:?} holds the control"),
+            Some(Some(_)) => format!(
+                "{name:?} is no longer in control, but its lease is not over: resume the clock if it stands, then ask again"
+            ),
             None => format!("the control is kept for {name:?}, for 2 s"),
         };
         let mut answer = refused(n, Reason::ControlHeld, &text);
@@ -179,20 +199,25 @@ impl Inner {
             );
         }
         let pending = self.pending.remove(&id);
-        let message = outcome(n, time_us, &answer);
+        let mut message = outcome(n, time_us, &answer);
         let is_done = matches!(answer, Answer::Done);
         match pending.map(|p| p.what) {
             Some(Asked::Take) if is_done => {
-                self.desk.grant(client, time_us);
-                if let Some(holder) = self.desk.holder() {
+                if !self.desk.grant(client, time_us) {
+                    // The master has granted what was revoked here. Nobody beats for it.
+                    message = outcome(n, time_us, &Answer::Revoked);
+                } else if let Some(holder) = self.desk.holder() {
                     self.last_holder.clone_from(&holder.name);
                     self.revoked_by = None;
                 }
             }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
-            Some(Asked::HandOver(heir)) if is_done => self.handed_over(client, heir),
-            Some(Asked::Revoke) if is_done => self.revoked(client),
+            // Who was revoked meanwhile hands nothing over.
+            Some(Asked::HandOver(heir)) if is_done && self.desk.holds(client) => {
+                self.handed_over(client, heir);
+            }
+            Some(Asked::HandOver(_)) if is_done => self.desk.release(client),
             Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
@@ -208,28 +233,35 @@ impl Inner {
     fn handed_over(&mut self, client: ClientId, heir: ClientId) {
         // Where one of them is gone by now, it is a release.
         self.desk.release(client);
-        let [from, to] = [client, heir].map(|id| Some(&*self.clients.get(&id)?.name));
+        let [from, to] = [client, heir].map(|id| self.clients.get(&id));
         let (Some(from), Some(to)) = (from, to) else {
             return;
         };
-        let offered = json!({ "op": "offered", "by": from });
-        self.desk.hand_over(client, (heir, to), Instant::now());
+        let offered = json!({ "op": "offered", "by": from.name });
+        let who = (&*to.name, &*to.session);
+        self.desk.hand_over(client, heir, who, Instant::now());
         self.tell(heir, &offered);
     }
 
-    fn revoked(&mut self, by: ClientId) {
-        let name = self.clients.get(&by).map(|client| client.name.clone());
-        let name = name.unwrap_or_default();
-        if let Some(holder) = self.desk.holder() {
-            let revoked = json!({ "op": "revoked", "by": name });
-            self.tell(holder.client, &revoked);
-            self.revoked_by = Some(name);
-        }
+    /// A client ends the control of whoever has it, or has asked for it: from now on nothing of theirs
+    /// reaches the robot, beats neither, so that the master ends the lease.
+    fn revoke(&mut self, by: ClientId) {
+        let Some(client) = self.clients.get(&by) else {
+            return;
+        };
+        let Some(holder) = self.desk.revoke(by, (&client.name, &client.session)) else {
+            return;
+        };
+        self.last_holder.clone_from(&holder.name);
+        self.revoked_by = Some(client.name.clone());
+        let (holder, revoked) = (holder.client, json!({ "op": "revoked", "by": client.name }));
+        self.tell(holder, &revoked);
     }
 
     pub(super) fn take_status(&mut self, status: Status) {
         self.desk
             .look(status.now_us, status.lease_seen_us.is_some());
+        self.desk.free(Instant::now());
         self.status = Some(status);
         self.faults.retain(|(_, over_us)| *over_us > status.now_us);
     }
@@ -255,9 +287,11 @@ impl Inner {
                 );
             }
         }
-        // Whoever asked is gone, and nobody else is told.
+        // Whoever asked is gone, and nobody else is told. What comes of a control that was asked for is
+        // waited for: in a queue of the master it may be granted yet.
         let clients = &self.clients;
-        self.pending
-            .retain(|_, p| clients.contains_key(&p.client) || now - p.since < TICKET);
+        self.pending.retain(|_, p| {
+            clients.contains_key(&p.client) || now - p.since < TICKET || p.what.is_of_control()
+        });
     }
 }
