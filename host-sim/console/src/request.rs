@@ -244,10 +244,12 @@ fn body(raw: Raw) -> Result<Body, Malformed> {
 
 fn indices(topics: &[String]) -> Result<Vec<u16>, BadRequest> {
     let find = |topic: &String| {
-        channel_index(topic).map(|index| index as u16).ok_or_else(|| BadRequest {
-            reason: Reason::UnknownChannel,
-            text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
-        })
+        channel_index(topic)
+            .map(|index| index as u16)
+            .ok_or_else(|| BadRequest {
+                reason: Reason::UnknownChannel,
+                text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
+            })
     };
     topics.iter().map(find).collect()
 }

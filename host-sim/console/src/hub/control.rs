@@ -45,7 +45,12 @@ impl Inner {
                 let takes = command.code() == CommandCode::TakeControl;
                 // Its answers may come in another order than it may expect: what is released behind a
                 // grant would leave the master with a holder of whom nobody here knows.
-                if takes && self.pending.values().any(|p| p.client == id && p.what.is_of_control()) {
+                if takes
+                    && self
+                        .pending
+                        .values()
+                        .any(|p| p.client == id && p.what.is_of_control())
+                {
                     let text = "what was asked for the control before is not answered yet";
                     return self.tell(id, &refused(n, Reason::Busy, text));
                 }

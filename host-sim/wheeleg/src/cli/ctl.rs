@@ -275,7 +275,9 @@ fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     };
     tell(&plain(&format!("{name:?} is no longer in control")));
     if after["control"]["session"] == holder["session"] {
-        tell("the clock stands: after `wheeleg ctl resume` the lease ends, and an armed robot holds");
+        tell(
+            "the clock stands: after `wheeleg ctl resume` the lease ends, and an armed robot holds",
+        );
     }
     reach.print_outcome(&Outcome::Done)
 }
