@@ -88,7 +88,8 @@ struct Pending {
     client: ClientId,
     n: u64,
     since: Instant,
-    accepted: bool,
+    /// Master time at which the master has accepted it, µs.
+    accepted_us: Option<u64>,
     what: Asked,
 }
 

@@ -16,6 +16,8 @@ const RELEASE: CommandCode = CommandCode::ReleaseControl;
 /// The holder of the control is told of one who asks for it so often at most: who asks without end
 /// fills no queue of theirs.
 const ASKED: Duration = Duration::from_secs(1);
+/// Time of the master in which it has answered what it accepted about the control: at its next cycle.
+const CONTROL_US: u64 = 1_000_000;
 
 impl Inner {
     pub(super) fn give(
@@ -161,7 +163,7 @@ impl Inner {
             client: id,
             n,
             since: now,
-            accepted: false,
+            accepted_us: None,
             what,
         };
         self.pending.insert(self.next_request, pending);
@@ -197,7 +199,7 @@ impl Inner {
         };
         let (client, n) = (pending.client, pending.n);
         if matches!(answer, Answer::Accepted) {
-            pending.accepted = true;
+            pending.accepted_us = Some(time_us);
             return self.tell(
                 client,
                 &json!({ "op": "answer", "n": n, "status": "accepted" }),
@@ -211,9 +213,12 @@ impl Inner {
                 if !self.desk.grant(client, time_us) {
                     // The master has granted what was revoked here. Nobody beats for it.
                     message = outcome(n, time_us, &Answer::Revoked);
-                } else if let Some(holder) = self.desk.holder() {
+                }
+                if let Some(holder) = self.desk.holder().filter(|h| h.client == client) {
                     self.last_holder.clone_from(&holder.name);
-                    self.revoked_by = None;
+                    if holder.ended != Some(Ended::Revoked) {
+                        self.revoked_by = None;
+                    }
                 }
             }
             Some(Asked::Take) => self.desk.withdraw(client),
@@ -272,10 +277,16 @@ impl Inner {
     }
 
     pub(super) fn tell_unknown(&mut self, now: Instant) {
+        let now_us = self.now_us();
+        let is_late = |pending: &Pending| match pending.accepted_us {
+            None => now - pending.since >= TICKET,
+            // A master that has died since does not answer.
+            Some(us) => pending.what.is_of_control() && now_us > us + CONTROL_US,
+        };
         let late: Vec<u32> = self
             .pending
             .iter()
-            .filter(|(_, pending)| !pending.accepted && now - pending.since >= TICKET)
+            .filter(|(_, pending)| is_late(pending))
             .map(|(id, _)| *id)
             .collect();
         for id in late {
@@ -293,7 +304,7 @@ impl Inner {
             }
         }
         // Whoever asked is gone, and nobody else is told. What comes of a control that was asked for is
-        // waited for: in a queue of the master it may be granted yet.
+        // waited for: the master may grant it yet.
         let clients = &self.clients;
         self.pending.retain(|_, p| {
             clients.contains_key(&p.client) || now - p.since < TICKET || p.what.is_of_control()

@@ -590,6 +590,39 @@ fn control_that_is_only_asked_for_is_revoked_as_well() {
     assert_eq!(state["armed"], false);
 }
 
+/// The master has accepted it, and dies before its next cycle.
+#[test]
+fn a_master_that_dies_with_what_it_accepted_leaves_the_control_free() {
+    let rig = TestRig::new();
+    let mut asker = rig.control("asker");
+    let mut other = rig.control("other");
+    let mut outcome = Outcome::Done;
+    for _ in 0..5 {
+        rig.until("ready and free", |state| {
+            state["ready"] == true && state["control"].is_null()
+        });
+        look(&mut asker, "state");
+        // A cycle takes 100 ms now: the time for both.
+        asker
+            .give("Speed", &json!({ "speed": 0.1 }), 500)
+            .expect("sent");
+        let n = asker.give("TakeControl", &json!({}), 1_000).expect("sent");
+        for (name, args) in [
+            ("Inject", json!({ "fault": "master-reset=100" })),
+            ("Speed", json!({ "speed": 1.0 })),
+        ] {
+            asker.give(name, &args, 500).expect("sent");
+        }
+        outcome = asker.outcome(n);
+        if outcome != Outcome::Done {
+            break;
+        }
+    }
+    assert_eq!(outcome, Outcome::Unknown);
+    look(&mut other, "state");
+    done(&mut other, "TakeControl");
+}
+
 /// The master would grant it again to who has just handed it over.
 #[test]
 fn who_hands_over_does_not_take_it_back_in_the_same_breath() {
