@@ -319,7 +319,7 @@ def events_fail(browser, console):
     without = lambda page: page.route("**/api/v1/events", lambda route: route.abort())
     page = opened(browser, console, f"#v={console.keys['view']}", prepare=without)
     with contextlib.suppress(Exception):
-        page.wait_for_selector(".eventlist .bad:not([hidden])", timeout=5000)
+        page.wait_for_selector(".eventlist p.bad:not([hidden])", timeout=5000)
     del problems[heard:]  # the browser tells of the request that failed
     told = page.inner_text(".eventlist") if page.locator(".eventlist").count() else page.inner_text("body")
     expect("Earlier events are missing" in told, f"earlier events that do not come: {told[:300]!r}")
