@@ -223,11 +223,7 @@ impl Inner {
             }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
-            // Who was revoked meanwhile hands nothing over.
-            Some(Asked::HandOver(heir)) if is_done && self.desk.holds(client) => {
-                self.handed_over(client, heir);
-            }
-            Some(Asked::HandOver(_)) if is_done => self.desk.release(client),
+            Some(Asked::HandOver(heir)) if is_done => self.handed_over(client, heir),
             Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
@@ -266,6 +262,12 @@ impl Inner {
         self.revoked_by = Some(client.name.clone());
         let (holder, revoked) = (holder.client, json!({ "op": "revoked", "by": client.name }));
         self.tell(holder, &revoked);
+        // What it hands over is a release now: control is kept for another already.
+        for pending in self.pending.values_mut() {
+            if matches!(pending.what, Asked::HandOver(_)) {
+                pending.what = Asked::Release;
+            }
+        }
     }
 
     pub(super) fn take_status(&mut self, status: Status) {

@@ -121,7 +121,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
 #[test]
 fn a_revoked_control_is_recorded_and_repeats() {
     let rig = TestRig::recorded(1.0);
-    let mut driver = rig.driver("driver");
+    let driver = rig.driver("driver");
     let mut owner = rig.control("owner");
     done(&mut owner, "Revoke");
     let state = rig.until("over", |state| state["control"].is_null());
