@@ -4,7 +4,7 @@
 
 Every channel is read; a robot is armed, moved and recorded; what is wrong is refused by name; a viewer may
 look and stop; a program whose connection is cut loses the control. On a terminal `ctl top` shows the robot and stops it, and
-leaves the terminal as it was; `ctl revoke` takes the control away.
+leaves the terminal as it was, also while it is suspended; `ctl revoke` takes the control away, also while the clock stands.
 """
 
 import contextlib
@@ -13,6 +13,7 @@ import json
 import os
 import pty
 import select
+import signal
 import struct
 import subprocess
 import sys
@@ -116,6 +117,26 @@ class Terminal:
             assert time.monotonic() < end, f"{wanted!r} is not shown: {self.text[-2000:]!r}"
             self._read()
 
+    def is_as_before(self):
+        """Its modes, and its screen."""
+        screens = self.text.count("\x1b[?1049l") == self.text.count("\x1b[?1049h")
+        return screens and self._modes() == self.before
+
+    def suspends(self):
+        """Waits until the program is stopped; the terminal is as it was."""
+        end = time.monotonic() + 10
+        while not os.WIFSTOPPED(os.waitpid(self.process.pid, os.WUNTRACED | os.WNOHANG)[1]):
+            assert time.monotonic() < end, f"it is not suspended: {self.text[-500:]!r}"
+            self._read()
+        while self._read():
+            pass
+
+    def goes_on(self, wanted):
+        """Continues the program, which shows this on a terminal of its own again."""
+        self.process.send_signal(signal.SIGCONT)
+        self.shows(wanted)
+        assert not self._modes()[3] & termios.ICANON, "after it was suspended the terminal waits for whole lines"
+
     def press(self, keys):
         os.write(self.near, keys)
 
@@ -127,8 +148,7 @@ class Terminal:
             self._read()
         while self._read():
             pass
-        assert self._modes() == self.before, "the terminal is not as it was"
-        assert self.text.count("\x1b[?1049l") == self.text.count("\x1b[?1049h"), f"its screen stays: {self.text[-500:]!r}"
+        assert self.is_as_before(), f"the terminal is not as it was: {self.text[-500:]!r}"
         os.close(self.near)
         os.close(self.far)
         return self.process.returncode
@@ -143,6 +163,16 @@ def top(command, environment, robot):
     terminal.press(b"\x1b[A\x1b[B")
     terminal.shows("ARMED")
     assert not robot.state()["emergency_stop"], "an arrow key stops"
+    for suspend in (lambda: terminal.press(b"\x1a"), lambda: terminal.process.send_signal(signal.SIGTSTP)):
+        suspend()
+        terminal.suspends()
+        assert terminal.is_as_before(), f"suspended, the terminal is not as it was: {terminal.text[-500:]!r}"
+        terminal.goes_on("ARMED")
+    # What is not asked: a shell gives the terminal its own modes.
+    terminal.process.send_signal(signal.SIGSTOP)
+    terminal.suspends()
+    termios.tcsetattr(terminal.far, termios.TCSANOW, terminal.before)
+    terminal.goes_on("ARMED")
     terminal.press(b"\x1b")
     terminal.shows("STOPPED")
     robot.until(lambda state: state["emergency_stop"])
@@ -175,6 +205,14 @@ def revoke(command, environment, robot):
         robot.until(lambda state: state["hold"] == "operator_lost", 5)
     done = asks()
     assert done.returncode == 0 and "nobody is in control" in done.stderr, done
+    # Nor is it kept by a clock that stands.
+    with robot.control():
+        robot.command("Pause")
+        done = asks()
+        assert done.returncode == 0 and "no longer in control" in done.stderr and "ctl resume" in done.stderr, done
+        assert robot.state()["control"]["ended"] == "revoked", robot.state()
+        robot.command("Resume")
+        robot.until(lambda state: state["control"] is None, 5)
 
 
 def at_the_robot(program):

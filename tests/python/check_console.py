@@ -6,7 +6,7 @@ Without a key and with a wrong one nothing is shown. With the right one: ready, 
 provoke a fault, read its remedy, stop with Esc from within a field. A slider asks for a stroke; a parameter is written, and not saved while armed. Who has the view key may look and
 stop. Signals are plotted, frozen, zoomed and saved; events are sieved and saved; what is done is recorded, and repeats to the bit. Somebody drives by
 hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space, and on a slope on its
-ground. A page that did not run says so. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+ground. A page that did not run says so; one whose earlier events do not come keeps its STOP. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
@@ -69,7 +69,7 @@ class Console:
         self.process.wait()
 
 
-def opened(browser, console, fragment, scheme="light", address=None):
+def opened(browser, console, fragment, scheme="light", address=None, prepare=lambda page: None):
     address = address or console.address
     context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme=scheme)
     # A gamepad that the test holds.
@@ -81,6 +81,7 @@ def opened(browser, console, fragment, scheme="light", address=None):
     page.on("request", lambda request: expect(request.url.startswith(address), f"asks for {request.url}"))
     # A browser tells of each answer that a wrong key gets.
     page.on("console", lambda message: reported.append(f"console: {message.text}") if message.type in ("error", "warning") and "401" not in message.text else None)
+    prepare(page)
     page.goto(f"{address}/{fragment}")
     return page
 
@@ -345,6 +346,54 @@ def sees_what_was(browser, console, lines):
     page.context.close()
 
 
+def events_fail(browser, console):
+    """The page of a robot whose earlier events do not come stays, with its STOP; what failed is told beside the events."""
+    heard = len(reported)
+    without = lambda page: page.route("**/api/v1/events", lambda route: route.abort())
+    page = opened(browser, console, f"#v={console.keys['view']}", prepare=without)
+    with contextlib.suppress(Exception):
+        page.wait_for_selector(".eventlist p.bad:not([hidden])", timeout=5000)
+    del reported[heard:]  # the browser tells of the request that failed
+    told = page.inner_text(".eventlist") if page.locator(".eventlist").count() else page.inner_text("body")
+    expect("Earlier events are missing" in told, f"earlier events that do not come: {told[:300]!r}")
+    expect(page.locator(".stop").is_visible(), "without earlier events there is no STOP")
+    expect(waits(page, "State", ["disarmed"]), "without earlier events the page is not live")
+    seen = cell(page, "Time")
+    page.wait_for_timeout(500)
+    expect(cell(page, "Time") != seen, "without earlier events the page stands still")
+    page.context.close()
+
+
+def events_alone(page):
+    """The list by itself: what comes twice is one event, what differs is not one line, and who revoked is saved."""
+    lines = page.evaluate("""async () => {
+        const { eventsView } = await import("/events.js");
+        const view = eventsView();
+        view.root.id = "alone";
+        document.body.append(view.root);
+        const event = (number, text, rest) => ({ number, t_ns: 1e9 + number, kind: "fault", code: "diagnosis", detail: "", board: 0, fault: 3, command: 0, text, ...rest });
+        const says = (number, board, s) => event(number, `joint ${board} says why: first fault, ${s} s ago: it is hot`, { board });
+        view.add(event(3, "third"));
+        // Its answer was quicker than the line, on which the fourth comes after it.
+        view.past([event(1, "first"), event(2, "second"), event(3, "third"), event(4, "fourth")]);
+        view.add(event(4, "fourth"));
+        view.add(says(5, 1, 0.01));
+        view.add(says(6, 2, 0.01));
+        view.add(says(7, 3, 0.25));
+        view.add(event(8, "hold", { code: "hold", holder: "tablet", revoked_by: "owner" }));
+        return [...view.root.querySelectorAll("li span")].map((line) => line.textContent).reverse();
+    }""")
+    wanted = ["first", "second", "third", "fourth"]
+    wanted += [f"{who} says why: first fault, {s} s ago: it is hot" for who, s in (("joints 1–2", "0.01"), ("joint 3", "0.25"))]
+    wanted += ["hold (tablet, revoked by owner)"]
+    expect(lines == wanted, f"the list of events: {lines}")
+    with page.expect_download() as download:
+        page.locator("#alone").get_by_role("button", name="Save events as CSV").click()
+    table = list(csv.DictReader(Path(download.value.path()).read_text().splitlines()))
+    expect(len(table) == 8 and table[-1]["holder"] == "tablet" and table[-1]["revoked_by"] == "owner", f"the table of events: {table}")
+    page.evaluate("document.getElementById('alone').remove()")
+
+
 def board_table(page):
     page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
     row = page.locator(".boardtable tbody tr").nth(2)
@@ -569,6 +618,7 @@ def journey(browser, console, folder):
     page.wait_for_timeout(300)
     expect("Boards 1, 2, 3" in page.inner_text(".faults"), "equal faults of all boards are not one line")
     events(page)
+    events_alone(page)
     sees_what_was(browser, console, page.locator(".events li").count())
     return page
 
@@ -665,6 +715,7 @@ def main(program, folder, axe):
         try:
             without_the_key(browser, console)
             space_fails(browser, console)
+            events_fail(browser, console)
             page = journey(browser, console, folder)
             looks_only(browser, console)
             ground(browser, program, folder)

@@ -100,6 +100,7 @@ def second_browser(browser, console, first, robot):
 def hands_over(first, second, robot):
     """Who is in control gives it to who has asked, and gets it back; neither is disturbed."""
     for giver, taker in ((first, second), (second, first)):
+        kept = False
         for _ in range(check_console.ATTEMPTS):
             giver.bring_to_front()
             if cell(giver, "Control") != "you":
@@ -110,10 +111,12 @@ def hands_over(first, second, robot):
                 give.wait_for(timeout=3000)
                 give.click(timeout=1000)
                 taker.wait_for_function("() => document.querySelector('.answer').textContent.includes('to you')", timeout=2000)
+            kept |= waits(taker, "Control", ["kept for you"], 0.3)
             taker.bring_to_front()
             taker.locator(".buttons button", has_text="Take control").dispatch_event("click")
             if waits(taker, "Control", ["you"], 3):
                 break
+        expect(kept, "the page does not show for whom control is kept")
         expect(cell(taker, "Control") == "you", f"handed over: {taker.inner_text('.answer')!r}")
     expect(robot.state()["control"]["holder"] == "browser", "nobody is in control after a hand-over")
 

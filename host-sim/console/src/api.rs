@@ -18,6 +18,7 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::{MethodRouter, get, post};
 use serde::Deserialize;
 use serde_json::json;
+use wheeleg_telemetry::channel_index;
 
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Peer, Place};
@@ -409,18 +410,17 @@ async fn samples(
         let detail = format!("`seconds`: allowed are 1 to {LONGEST_S}");
         return wrong(&detail, "leave it out");
     }
-    let index = wheeleg_telemetry::channels()
-        .iter()
-        .position(|def| def.topic == channel);
-    let Some(index) = index else {
+    let Some(index) = channel_index(&channel) else {
         return wrong(
             "`channel`: there is no such channel",
             "/api/v1/channels lists them",
         );
     };
     let index = index as u16;
-    let samples = server.context.hub.samples(index, seconds);
-    table(index, samples, prefers_csv(&headers))
+    let hub = Arc::clone(&server.context.hub);
+    let mut reader = hub.reader(index, seconds);
+    let pieces = move |most| hub.samples(&mut reader, most);
+    table(index, pieces, prefers_csv(&headers))
 }
 
 #[derive(Deserialize)]

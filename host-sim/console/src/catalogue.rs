@@ -43,7 +43,7 @@ pub enum HostCode {
     RecordStop = 0x0308,
     /// The control goes to another client.
     HandOver = 0x0309,
-    /// The control is taken away.
+    /// The control is revoked.
     Revoke = 0x030A,
 }
 
@@ -153,7 +153,7 @@ pub const HOST_TABLE: &[HostInfo] = &[
         code: HostCode::Revoke,
         name: "Revoke",
         arguments: &[],
-        effect: "Revokes control from its holder, as if the operator were lost: an armed robot holds. Only on the robot's own computer.",
+        effect: "Revokes control from its holder, or from who has asked for it, as if the operator were lost: an armed robot holds. For 2 s after that, only whoever revoked may take control. Only on the robot's own computer.",
     },
 ];
 

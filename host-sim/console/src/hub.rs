@@ -18,7 +18,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
-use self::history::History;
+use self::history::{History, Reader};
 use crate::catalogue::Catalogue;
 use crate::close::Close;
 use crate::desk::{ClientId, Desk};
@@ -88,7 +88,8 @@ struct Pending {
     client: ClientId,
     n: u64,
     since: Instant,
-    accepted: bool,
+    /// Master time at which the master has accepted it, µs.
+    accepted_us: Option<u64>,
     what: Asked,
 }
 
@@ -101,6 +102,13 @@ enum Asked {
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),
+}
+
+impl Asked {
+    /// Whether the asker is in control, or is not, with its answer.
+    fn is_of_control(&self) -> bool {
+        matches!(self, Self::Take | Self::Release | Self::HandOver(_))
+    }
 }
 
 /// A client's connection, as it asks.
@@ -285,7 +293,7 @@ impl Hub {
         Some((Asking { id, stops }, now_us))
     }
 
-    /// A client is gone. Control that it holds ends with its beats, at the master.
+    /// A client is gone. Its lease ends with its beats, at the master.
     pub(crate) fn leave(&self, asking: &Asking) {
         let mut inner = self.inner();
         inner.clients.remove(&asking.id);
@@ -383,12 +391,18 @@ impl Hub {
         format!(r#"{{"events":[{}]}}"#, events.join(","))
     }
 
-    /// Samples of a channel in the last seconds of master time, the oldest first, each as a frame has it.
-    pub(crate) fn samples(&self, channel: u16, seconds: u8) -> Vec<Bytes> {
+    /// A reader of the samples of a channel in the last seconds of master time.
+    pub(crate) fn reader(&self, channel: u16, seconds: u8) -> Reader {
         let inner = self.inner();
         let now_ns = inner.now_us() * 1_000;
         let from_ns = now_ns.saturating_sub(u64::from(seconds) * 1_000_000_000);
-        inner.history.since(channel, from_ns)
+        inner.history.reader(channel, from_ns)
+    }
+
+    /// Its next samples, at most so many, the oldest first, each as a frame has it; none: there are no
+    /// more. What nobody keeps by now is left out: a slow reader keeps nothing.
+    pub(crate) fn samples(&self, reader: &mut Reader, most: usize) -> Vec<Bytes> {
+        self.inner().history.read(reader, most)
     }
 
     /// The boards' parameters.

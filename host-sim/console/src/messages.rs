@@ -9,9 +9,11 @@ use wheeleg_telemetry::messages::reject;
 use crate::live::Answer;
 use crate::reason::Reason;
 
-pub(crate) fn event_json(t_ns: u64, event: &EventSample) -> Value {
+/// An event, with its number since power-up.
+pub(crate) fn event_json(number: u64, t_ns: u64, event: &EventSample) -> Value {
     json!({
         "op": "event",
+        "number": number,
         "t_ns": t_ns,
         "kind": event.kind.name(),
         "code": event.code.name(),
@@ -55,7 +57,7 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
         Answer::Revoked => refused(
             n,
             Reason::Revoked,
-            "control was revoked on the robot's computer: check the robot, then take control again",
+            "control was revoked on the robot's computer, and its lease is not over: check the robot, then take control again",
         ),
         Answer::NoMaster => refused(n, Reason::NoMaster, "the master does not answer"),
         Answer::TooFast => refused(

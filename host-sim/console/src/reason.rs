@@ -15,7 +15,7 @@ pub enum Reason {
     Busy,
     /// A robot command while the simulation is paused.
     Paused,
-    /// The control was taken away at the robot's computer.
+    /// The control was revoked at the robot's computer.
     Revoked,
     /// The role may not do this.
     Role,

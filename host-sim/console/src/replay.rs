@@ -28,7 +28,7 @@ const LONGEST_MS: u64 = 31 * 24 * 3_600_000;
 const TOML_MAX: u64 = 4 << 20;
 /// What is said of a line that is none.
 const NO_INPUT: &str = "it is no input: allowed is an object of JSON with `ms`, a whole number, and one of \
-    `beat`, `stop`, `command`, `fault_begins`, `fault_ends`, `pace` and `hash`";
+    `beat`, `stop`, `command`, `fault_begins`, `fault_ends`, `pace`, `revoked` and `hash`";
 /// Simulated between two looks at the progress, ms.
 const STRIDE_MS: u64 = 10;
 
@@ -274,7 +274,7 @@ impl Repeated {
             }
             Input::FaultBegins(text) => self.fault(&text, true)?,
             Input::FaultEnds(text) => self.fault(&text, false)?,
-            Input::Pace(_) => self.inputs -= 1,
+            Input::Pace(_) | Input::Revoked(_) => self.inputs -= 1,
             Input::Hash(recorded) => {
                 self.inputs -= 1;
                 let hash = self.recorder.hash();

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_master::command::{Command, CommandCode, TABLE};
-use wheeleg_telemetry::channels;
+use wheeleg_telemetry::channel_index;
 
 use crate::arguments::{self, meant};
 use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
@@ -95,6 +95,8 @@ pub enum Order {
     Host(HostCommand),
     /// Who is in control, and is followed by the client of this session.
     HandOver(String),
+    /// Who is in control, and is to be no longer.
+    Revoke,
 }
 
 /// A command of the host.
@@ -116,8 +118,6 @@ pub enum HostCommand {
     RecordStart,
     /// The recording ends.
     RecordStop,
-    /// The control is taken away.
-    Revoke,
 }
 
 /// Why a frame that is sound in form cannot be done.
@@ -244,11 +244,12 @@ fn body(raw: Raw) -> Result<Body, Malformed> {
 
 fn indices(topics: &[String]) -> Result<Vec<u16>, BadRequest> {
     let find = |topic: &String| {
-        let found = channels().iter().position(|channel| channel.topic == topic);
-        found.map(|index| index as u16).ok_or_else(|| BadRequest {
-            reason: Reason::UnknownChannel,
-            text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
-        })
+        channel_index(topic)
+            .map(|index| index as u16)
+            .ok_or_else(|| BadRequest {
+                reason: Reason::UnknownChannel,
+                text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
+            })
     };
     topics.iter().map(find).collect()
 }
@@ -354,7 +355,7 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<Order, BadRequest> 
             let to = json.as_str().ok_or_else(no_text)?.to_owned();
             return Ok(Order::HandOver(to));
         }
-        HostCode::Revoke => HostCommand::Revoke,
+        HostCode::Revoke => return Ok(Order::Revoke),
     }))
 }
 

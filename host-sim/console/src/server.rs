@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -119,6 +119,11 @@ impl Server {
     /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
     /// not there, the robot cannot be built, or the recording's folder cannot be made.
     pub fn start(options: Options) -> Result<Self, ConsoleError> {
+        Self::start_among(options, |peer| peer.ip())
+    }
+
+    /// The same, where `address_of` says which address a client has.
+    fn start_among(options: Options, address_of: AddressOf) -> Result<Self, ConsoleError> {
         let Options {
             live,
             recordings,
@@ -230,7 +235,7 @@ impl Server {
         runtime.spawn(turn(Arc::clone(&hub)));
         let fingerprint = certificate.as_ref().map(|c| c.fingerprint);
         let tls = certificate.map(|c| TlsAcceptor::from(c.config));
-        runtime.spawn(accept(listener, server, tls));
+        runtime.spawn(accept(listener, server, tls, address_of));
         Ok(Self {
             address,
             name: names.into_iter().next(),
@@ -390,7 +395,15 @@ async fn turn(hub: Arc<Hub>) {
     }
 }
 
-async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<TlsAcceptor>) {
+/// The address that a client at the other end of a connection has.
+type AddressOf = fn(SocketAddr) -> IpAddr;
+
+async fn accept(
+    listener: TcpListener,
+    server: Arc<api::Server>,
+    tls: Option<TlsAcceptor>,
+    address_of: AddressOf,
+) {
     let places = Arc::new(Places::default());
     let router = api::router(server);
     loop {
@@ -402,7 +415,8 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<Tls
                 continue;
             }
         };
-        let Some(place) = places.take(peer.ip()) else {
+        let ip = address_of(peer);
+        let Some(place) = places.take(ip) else {
             // Closed at once: who holds all places loses them within seconds.
             continue;
         };
@@ -415,10 +429,8 @@ async fn accept(listener: TcpListener, server: Arc<api::Server>, tls: Option<Tls
         let router = router
             .clone()
             .layer(Extension(Peer {
-                ip: peer.ip(),
-                is_local: stream
-                    .local_addr()
-                    .is_ok_and(|own| is_local(peer.ip(), own.ip())),
+                ip,
+                is_local: stream.local_addr().is_ok_and(|own| is_local(ip, own.ip())),
             }))
             .layer(Extension(Arc::clone(&place)));
         let tls = tls.clone();
@@ -448,4 +460,60 @@ async fn serve(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, rou
         )
         .with_upgrades();
     let _ = connection.await;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::client::{Client, Incoming, Outcome, Url};
+    use std::time::Instant;
+
+    /// Asks to revoke the control of a driver as a client that has this address; what is answered, and
+    /// whether the driver has lost the control.
+    fn revoke_from(address_of: AddressOf) -> (Outcome, bool) {
+        let home = tempfile::tempdir().expect("a folder");
+        let keys = Keys::open(home.path()).expect("keys");
+        let options = Options {
+            live: Live::load("three-step", Some("wheeleg-2003")).expect("built in"),
+            recordings: home.path().join("recordings"),
+            record: false,
+            listen: "127.0.0.1:0".parse().expect("an address"),
+            names: Vec::new(),
+            protection: Protection::AsNeeded,
+            keys: keys.clone(),
+            page: None,
+            viewer_pages: Vec::new(),
+            viewers_write: false,
+        };
+        let server = Server::start_among(options, address_of).expect("it starts");
+        let url = Url::parse(&server.address().to_string()).expect("an address");
+        let connect = |name| Client::connect(&url, "control", name, &keys.control).expect("let in");
+        let (mut driver, mut other) = (connect("driver"), connect("other"));
+        while driver.seen_us() == 0 {
+            driver.read();
+        }
+        let taken = driver.carry_out("TakeControl", &json!({}), 1_000);
+        assert_eq!(taken.expect("sent"), Outcome::Done);
+        driver.keep_control(true);
+        let outcome = other.carry_out("Revoke", &json!({}), 1_000);
+        let end = Instant::now() + Duration::from_millis(500);
+        let is_lost = loop {
+            match driver.read() {
+                Some(Incoming::Json(message)) if message["op"] == "revoked" => break true,
+                _ if Instant::now() > end => break false,
+                _ => {}
+            }
+        };
+        (outcome.expect("sent"), is_lost)
+    }
+
+    #[test]
+    fn control_is_revoked_on_the_robot_s_own_computer_and_from_nowhere_else() {
+        assert_eq!(revoke_from(|peer| peer.ip()), (Outcome::Done, true));
+        let (outcome, is_lost) = revoke_from(|_| IpAddr::from([192, 0, 2, 8]));
+        let Outcome::Refused { reason, .. } = outcome else {
+            panic!("{outcome:?}");
+        };
+        assert_eq!((&*reason, is_lost), ("role", false));
+    }
 }

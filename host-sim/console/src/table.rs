@@ -33,8 +33,13 @@ pub(crate) fn prefers_csv(headers: &HeaderMap) -> bool {
     }) == Some(true)
 }
 
-/// The answer with these samples of a channel, each as a frame has it.
-pub(crate) fn table(channel: u16, samples: Vec<Bytes>, csv: bool) -> Response {
+/// The answer with the samples of a channel. `next` gives those of the next piece, at most so many, each
+/// as a frame has it; none: that was the last.
+pub(crate) fn table(
+    channel: u16,
+    mut next: impl FnMut(usize) -> Vec<Bytes> + Send + 'static,
+    csv: bool,
+) -> Response {
     let def = &channels()[usize::from(channel)];
     let fields = def.fields.iter().map(|field| field.name);
     let columns: Vec<&str> = [TIME].into_iter().chain(fields).collect();
@@ -46,9 +51,9 @@ pub(crate) fn table(channel: u16, samples: Vec<Bytes>, csv: bool) -> Response {
         let head = format!(r#"{{"channel":{topic},"fields":{columns},"rows":["#);
         ("application/json", head, "]}")
     };
-    let rows = move |first: usize, samples: &[Bytes]| {
+    let rows = move |samples: Vec<Bytes>, is_first: bool| {
         let mut out = String::new();
-        for (at, sample) in (first..).zip(samples) {
+        for sample in samples {
             let Some((t_ns, mut values)) = unpack(channel, &mut &sample[..]) else {
                 continue;
             };
@@ -58,7 +63,7 @@ pub(crate) fn table(channel: u16, samples: Vec<Bytes>, csv: bool) -> Response {
                 out.push_str(&cells.join(","));
                 out.push('\n');
             } else {
-                if at > 0 {
+                if !(is_first && out.is_empty()) {
                     out.push(',');
                 }
                 out.push_str(&Value::Array(values).to_string());
@@ -66,24 +71,30 @@ pub(crate) fn table(channel: u16, samples: Vec<Bytes>, csv: bool) -> Response {
         }
         out
     };
-    // Head, rows, end; each piece with the number of its first sample.
-    let pieces = stream::unfold(Some((head, 0)), move |piece| {
-        let next = piece.map(|(text, at)| {
-            let upto = samples.len().min(at + PIECE);
-            let rest = match at.cmp(&samples.len()) {
-                std::cmp::Ordering::Less => Some((rows(at, &samples[at..upto]), upto)),
-                std::cmp::Ordering::Equal => Some((end.to_owned(), at + 1)),
-                std::cmp::Ordering::Greater => None,
-            };
-            (Ok::<_, Infallible>(Bytes::from(text)), rest)
-        });
+    let pieces = stream::unfold(Part::Head, move |part| {
+        let piece = match part {
+            Part::Head => Some((head.clone(), Part::Rows { is_first: true })),
+            Part::Rows { is_first } => Some(match next(PIECE) {
+                samples if samples.is_empty() => (end.to_owned(), Part::Over),
+                samples => (rows(samples, is_first), Part::Rows { is_first: false }),
+            }),
+            Part::Over => None,
+        };
+        let piece = piece.map(|(text, then)| (Ok::<_, Infallible>(Bytes::from(text)), then));
         async move {
             // Between two pieces it is others' turn.
             tokio::task::yield_now().await;
-            next
+            piece
         }
     });
     ([(CONTENT_TYPE, kind)], Body::from_stream(pieces)).into_response()
+}
+
+/// What of an answer comes next.
+enum Part {
+    Head,
+    Rows { is_first: bool },
+    Over,
 }
 
 /// A value in a table; what is no number is empty.
@@ -102,10 +113,9 @@ fn cell(value: &Value) -> String {
 mod tests {
     use super::*;
     use axum::http::HeaderValue;
-    use wheeleg_telemetry::{EventSample, Sample as _};
+    use wheeleg_telemetry::{EventSample, Sample as _, channel_index};
 
     fn events(texts: &[&str]) -> (u16, Vec<Bytes>) {
-        let channel = channels().iter().position(|def| def.topic == "/events");
         let pack = |text: &&str| {
             let event = EventSample {
                 text: (*text).to_owned(),
@@ -116,12 +126,14 @@ mod tests {
             bytes.into()
         };
         let samples = texts.iter().map(pack).collect();
-        (channel.expect("a channel") as u16, samples)
+        let channel = channel_index("/events").expect("a channel");
+        (channel as u16, samples)
     }
 
     async fn text(texts: &[&str], csv: bool) -> String {
-        let (channel, samples) = events(texts);
-        let body = table(channel, samples, csv).into_body();
+        let (channel, mut samples) = events(texts);
+        let next = move |most: usize| samples.drain(..most.min(samples.len())).collect();
+        let body = table(channel, next, csv).into_body();
         let bytes = axum::body::to_bytes(body, 1 << 20).await.expect("a body");
         String::from_utf8(bytes.to_vec()).expect("UTF-8")
     }

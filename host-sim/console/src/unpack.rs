@@ -42,11 +42,10 @@ fn value(field: &FieldDef, bytes: &mut &[u8]) -> Option<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_telemetry::{BodySample, EventSample, Sample as _};
+    use wheeleg_telemetry::{BodySample, EventSample, Sample as _, channel_index};
 
     fn index(topic: &str) -> u16 {
-        let index = channels().iter().position(|def| def.topic == topic);
-        index.expect("a channel") as u16
+        channel_index(topic).expect("a channel") as u16
     }
 
     #[test]

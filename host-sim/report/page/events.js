@@ -11,10 +11,7 @@ const ALIKE_NS = 50e6;
 const RECENT = 32;
 const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
 const FIRST_WHEEL = 7;
-const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "text"];
-
-/** A board tells of its own log. */
-const DIAGNOSIS = "diagnosis";
+const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "revoked_by", "text"];
 
 /** A board as texts of events name it. @param {number} board */
 const name = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
@@ -43,7 +40,7 @@ function cell(value) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** @typedef {{t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string}} RobotEvent */
+/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string}} RobotEvent */
 /** @typedef {{events: RobotEvent[], boards: number[], before: string, after: string, root: HTMLElement, what: HTMLElement}} Line */
 
 /** List, sieve and table. */
@@ -52,6 +49,9 @@ export function eventsView() {
   let lines = [];
   /** Events that have come over the line, until those of before are there. @type {RobotEvent[] | null} */
   let first = [];
+  /** Number of the newest event. */
+  let newest = 0;
+  const missing = html("p", { class: "effect bad", role: "status", hidden: true });
   const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
   const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: "" }, "every kind"));
   const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, name(b))));
@@ -81,6 +81,9 @@ export function eventsView() {
   }
   /** @param {RobotEvent} event */
   function add(event) {
+    // What the server has kept may have overtaken the same over the line.
+    if (event.number <= newest) return;
+    newest = event.number;
     if (![...kinds.options].some(({ value }) => value === event.kind)) kinds.append(html("option", { value: event.kind }, event.kind));
     // Where its text names the board, the same of another board differs in the name alone.
     const at = event.board > 0 ? event.text.indexOf(name(event.board)) : -1;
@@ -89,9 +92,7 @@ export function eventsView() {
     /** @param {Line} line */
     const alike = (line) => {
       const [other] = line.events;
-      // Each board says for itself how long ago its first fault was.
-      const told = event.code === DIAGNOSIS || (line.before === before && line.after === after);
-      return told && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
+      return line.before === before && line.after === after && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
     };
     const known = at < 0 ? undefined : lines.find((line, i) => i < RECENT && Math.abs(event.t_ns - line.events[0].t_ns) <= ALIKE_NS && alike(line));
     if (known) {
@@ -112,7 +113,7 @@ export function eventsView() {
     tell();
   }
   return {
-    root: html("section", { class: "panel eventlist", "aria-label": "Events of the robot" }, html("h2", {}, "Events"), html("div", { class: "row" }, kinds, board, words), html("div", { class: "row" }, table, count), list),
+    root: html("section", { class: "panel eventlist", "aria-label": "Events of the robot" }, html("h2", {}, "Events"), html("div", { class: "row" }, kinds, board, words), html("div", { class: "row" }, table, count), missing, list),
     /** @param {RobotEvent} event */
     add(event) {
       first?.push(event);
@@ -120,14 +121,18 @@ export function eventsView() {
     },
     /** What the server has kept, the oldest first; its end may have come over the line, too. @param {RobotEvent[]} kept */
     past(kept) {
-      const came = first ?? [];
+      const all = new Map([...kept, ...(first ?? [])].map((event) => [event.number, event]));
       first = null;
-      const same = (a, b) => COLUMNS.every((column) => a[column] === b[column]);
-      let begin = 0;
-      while (begin < kept.length && !kept.slice(begin).every((event, i) => came[i] && same(event, came[i]))) begin += 1;
       lines = [];
+      newest = 0;
       list.replaceChildren();
-      for (const event of [...kept.slice(0, begin), ...came]) add(event);
+      for (const event of [...all.values()].sort((a, b) => a.number - b.number)) add(event);
+    },
+    /** What the server has kept did not come. @param {string} why */
+    noPast(why) {
+      first = null;
+      missing.hidden = false;
+      say(missing, `Earlier events are missing: ${why}. Reload the page to ask for them again.`);
     },
   };
 }

@@ -243,7 +243,7 @@ const parameters = parametersView(command, () => (link ? link.ask("parameters") 
 /** Who asked for the control last, and how long that is offered here. @type {{session: string, until_ms: number} | null} */
 let heir = null;
 const handOver = html("div", { class: "row", hidden: true }, html("button", { class: "btn", type: "button", onclick: () => heir && command("HandOver", { to: heir.session }) }));
-const mine = () => Boolean(link && now.state?.control?.session === link.session);
+const mine = () => Boolean(link && now.state?.control?.session === link.session && !now.state.control.ended);
 const stepping = () => Boolean(now.state?.stepping);
 
 addEventListener("keydown", (key) => {
@@ -316,13 +316,21 @@ function build({ robot, commands: list, faults: injectable }) {
   );
 }
 
+/** Who is in control, or for whom control is kept. */
+function whose({ control, kept_for: kept }) {
+  if (mine()) return "you";
+  if (control) return control.ended ? `${control.holder}, ${control.ended}` : control.holder;
+  if (kept) return kept.session === link?.session ? "kept for you" : `kept for ${kept.name}`;
+  return "free";
+}
+
 const ROLE = { armed: "ARMED", disarmed: "disarmed" };
 function showState(state) {
   const stopped = state.emergency_stop ? "STOPPED" : state.hold ? `HOLD: ${state.hold.replaceAll("_", " ")}` : null;
   say(head.mode.value, !state.alive ? "master is dead" : stopped ?? (state.armed ? ROLE.armed : ROLE.disarmed));
   head.mode.root.classList.toggle("alarm", Boolean(stopped) || !state.alive);
   say(head.gait.value, state.step > 0 && state.stepping ? `${state.phase}, step ${state.step}` : state.phase);
-  say(head.control.value, mine() ? "you" : (state.control?.holder ?? "free"));
+  say(head.control.value, whose(state));
   const speed = state.pace.paused ? "paused" : `× ${fixed(state.pace.factor)}`;
   say(head.speed.value, speed);
   say(take.firstElementChild, mine() ? "Release control" : "Take control");
@@ -392,7 +400,7 @@ const listener = {
     say(answer, `${by} hands the control over to you: press Take control within 2 s. Then it is free for everybody.`);
   },
   revoked(by) {
-    say(answer, `${by}, at the robot's computer, has taken the control away. Look at the robot, then take it anew.`);
+    say(answer, `${by}, at the robot's computer, has revoked your control. Check the robot, then take control again.`);
   },
   closed(why) {
     lost = `${why}. Nothing is sent any more; reload the page to look again.`;
@@ -406,26 +414,33 @@ async function begin() {
     page.replaceChildren(html("p", { class: "alone" }, "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key. Without a terminal, add #k= and the digits of the file control.key, whose place `wheeleg serve` prints."));
     return;
   }
+  const opened = new Link(who, listener);
+  const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...WHEELS, ...LINKS]);
+  const said = (error) => (error instanceof Error ? error.message : String(error));
   try {
-    const opened = new Link(who, listener);
     const about = await opened.open();
     link = opened;
-    const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...WHEELS, ...LINKS]);
     scope = new Scope([...opened.channels.values()], (topic) => {
       if (drawn.has(topic)) return;
       drawn.add(topic);
       link?.subscribe([topic], HZ);
     });
     build(about);
-    await link.subscribe([...drawn], HZ);
-    events.past((await link.ask("events")).events);
-    setInterval(() => {
-      pauses.run(link?.late_ms() ?? 0);
-      if (mine()) link?.beat();
-    }, BEAT_MS);
-    setInterval(() => link?.echo(), ECHO_MS);
   } catch (error) {
-    page.replaceChildren(html("p", { class: "alone", role: "alert" }, error instanceof Error ? error.message : String(error)));
+    page.replaceChildren(html("p", { class: "alone", role: "alert" }, said(error)));
+    return;
+  }
+  // From here on there is a robot that can be stopped: whatever fails, its page stays.
+  setInterval(() => {
+    pauses.run(link?.late_ms() ?? 0);
+    if (mine()) link?.beat();
+  }, BEAT_MS);
+  setInterval(() => link?.echo(), ECHO_MS);
+  await opened.subscribe([...drawn], HZ);
+  try {
+    events.past((await opened.ask("events")).events);
+  } catch (error) {
+    events.noPast(said(error));
   }
 }
 begin();

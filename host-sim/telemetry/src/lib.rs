@@ -60,6 +60,6 @@ pub use registry::{ChannelDef, FieldDef, FieldType, Layer, Sample, Wire, Written
 pub use samples::{
     BehaviourSample, BodySample, BusSample, EventSample, FootSample, JointSample, LinkSample,
     MasterSample, ProvenanceSample, ServerSample, SessionSample, StateSample, SupplySample,
-    WheelSample, channels,
+    WheelSample, channel_index, channels,
 };
 pub use sink::{OwnedSample, SampleRef, Sink, Taken};

@@ -447,11 +447,11 @@ samples! {
 
     /// What a live robot was given, at the simulated time up to which it had been simulated then; beats are left out. Not in the hash.
     SessionSample = "wheeleg.Session" {
-        /// Kind: command, stop, fault_begins, fault_ends, pace.
+        /// Kind: command, stop, fault_begins, fault_ends, pace, revoked.
         kind: String, "text", 0, Host;
         /// Code of the command, as in the master's table of commands; 0: none.
         command: u16, "code", 0, Host;
-        /// Client that takes the control with it; empty where it does not.
+        /// Client that takes or revokes the control with it; empty where it does not.
         by: String, "text", 0, Host;
         /// Fault that begins or ends.
         fault: String, "text", 0, Host;
@@ -496,6 +496,12 @@ impl ChannelDef {
 #[must_use]
 pub fn channels() -> &'static [ChannelDef] {
     &CHANNELS
+}
+
+/// Place of a channel among [`channels`]; `None`: there is none of this topic.
+#[must_use]
+pub fn channel_index(topic: &str) -> Option<usize> {
+    CHANNELS.iter().position(|channel| channel.topic == topic)
 }
 
 /// Samples per second in the log for the fast channels. The recording in

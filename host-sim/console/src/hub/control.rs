@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
 use super::{Asked, Client, Inner, Pending, Role, TICKET};
-use crate::desk::{ClientId, Denied};
+use crate::desk::{ClientId, Denied, Ended};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use crate::reason::Reason;
@@ -16,6 +16,8 @@ const RELEASE: CommandCode = CommandCode::ReleaseControl;
 /// The holder of the control is told of one who asks for it so often at most: who asks without end
 /// fills no queue of theirs.
 const ASKED: Duration = Duration::from_secs(1);
+/// Time of the master in which it has answered what it accepted about the control: at its next cycle.
+const CONTROL_US: u64 = 1_000_000;
 
 impl Inner {
     pub(super) fn give(
@@ -44,15 +46,29 @@ impl Inner {
             }
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
+                // Its answers may come in another order than it may expect: what is released behind a
+                // grant would leave the master with a holder of whom nobody here knows.
+                if takes
+                    && self
+                        .pending
+                        .values()
+                        .any(|p| p.client == id && p.what.is_of_control())
+                {
+                    let text = "what was asked for the control before is not answered yet";
+                    return self.tell(id, &refused(n, Reason::Busy, text));
+                }
                 let who = (&*client.name, &*client.session);
                 match self.desk.ask(id, who, takes) {
                     Ok(()) => {}
+                    Err(Denied::Revoked) => {
+                        return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
+                    }
                     Err(Denied::Held) => {
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
                         if !told {
                             client.asked = Some(now);
                             let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
-                            if let Some(holder) = self.desk.holder() {
+                            if let Some(holder) = self.desk.holder().filter(|h| h.ended.is_none()) {
                                 self.tell(holder.client, &asked);
                             }
                         }
@@ -104,17 +120,21 @@ impl Inner {
                 };
                 (input, Asked::HandOver(heir))
             }
-            Order::Host(HostCommand::Revoke) => {
+            Order::Revoke => {
                 if !client.is_local {
                     let text = "control can be revoked only on the robot's own computer";
                     return self.tell(id, &refused(n, Reason::Role, text));
                 }
+                let by = client.name.clone();
+                let Some(holder) = self.desk.holder().map(|holder| holder.name.clone()) else {
+                    // Where nobody is in control there is nothing to take away.
+                    return self.tell_done(id, n);
+                };
                 let id = self.next_request;
-                let command = HostCommand::Revoke;
-                (Input::Host { id, command }, Asked::Revoke)
+                (Input::Revoked { id, holder, by }, Asked::Revoke)
             }
             Order::Host(command) => {
-                if self.desk.holder().is_some() && !holds {
+                if !self.desk.may_command_host(id) {
                     return self.tell(id, &self.held(n));
                 }
                 let what = match &command {
@@ -127,6 +147,7 @@ impl Inner {
             }
         };
         let takes = matches!(what, Asked::Take);
+        let revokes = matches!(what, Asked::Revoke);
         if self.robot.inputs.push(input).is_err() {
             if takes && !holds {
                 self.desk.withdraw(id);
@@ -136,11 +157,14 @@ impl Inner {
                 &refused(n, Reason::Busy, "the queue to the robot is full"),
             );
         }
+        if revokes {
+            self.revoke(id);
+        }
         let pending = Pending {
             client: id,
             n,
             since: now,
-            accepted: false,
+            accepted_us: None,
             what,
         };
         self.pending.insert(self.next_request, pending);
@@ -150,8 +174,11 @@ impl Inner {
     /// The answer to who wants what another holds.
     fn held(&self, n: u64) -> Value {
         let name = self.desk.name().unwrap_or_default();
-        let text = match self.desk.holder() {
-            Some(_) => format!("{name:?} has control"),
+        let text = match self.desk.holder().map(|holder| holder.ended) {
+            Some(None) => format!("{name:?} has control"),
+            Some(Some(_)) => format!(
+                "{name:?} is no longer in control, but its lease is not over: resume the clock if it is paused, then ask again"
+            ),
             None => format!("control is reserved for {name:?} for 2 s"),
         };
         let mut answer = refused(n, Reason::ControlHeld, &text);
@@ -173,27 +200,31 @@ impl Inner {
         };
         let (client, n) = (pending.client, pending.n);
         if matches!(answer, Answer::Accepted) {
-            pending.accepted = true;
+            pending.accepted_us = Some(time_us);
             return self.tell(
                 client,
                 &json!({ "op": "answer", "n": n, "status": "accepted" }),
             );
         }
         let pending = self.pending.remove(&id);
-        let message = outcome(n, time_us, &answer);
+        let mut message = outcome(n, time_us, &answer);
         let is_done = matches!(answer, Answer::Done);
         match pending.map(|p| p.what) {
             Some(Asked::Take) if is_done => {
-                self.desk.grant(client, time_us);
-                if let Some(holder) = self.desk.holder() {
+                if !self.desk.grant(client, time_us) {
+                    // The master has granted what was revoked here. Nobody beats for it.
+                    message = outcome(n, time_us, &Answer::Revoked);
+                }
+                if let Some(holder) = self.desk.holder().filter(|h| h.client == client) {
                     self.last_holder.clone_from(&holder.name);
-                    self.revoked_by = None;
+                    if holder.ended != Some(Ended::Revoked) {
+                        self.revoked_by = None;
+                    }
                 }
             }
             Some(Asked::Take) => self.desk.withdraw(client),
             Some(Asked::Release) if is_done => self.desk.release(client),
             Some(Asked::HandOver(heir)) if is_done => self.handed_over(client, heir),
-            Some(Asked::Revoke) if is_done => self.revoked(client),
             Some(Asked::Inject(fault)) if is_done => {
                 let lasts_us = (fault.kind.lasts_s(fault.value) * 1e6).round() as u64;
                 self.faults.push((fault, time_us.saturating_add(lasts_us)));
@@ -209,37 +240,56 @@ impl Inner {
     fn handed_over(&mut self, client: ClientId, heir: ClientId) {
         // Where one of them is gone by now, it is a release.
         self.desk.release(client);
-        let [from, to] = [client, heir].map(|id| Some(&*self.clients.get(&id)?.name));
+        let [from, to] = [client, heir].map(|id| self.clients.get(&id));
         let (Some(from), Some(to)) = (from, to) else {
             return;
         };
-        let offered = json!({ "op": "offered", "by": from });
-        self.desk.hand_over(client, (heir, to), Instant::now());
+        let offered = json!({ "op": "offered", "by": from.name });
+        let who = (&*to.name, &*to.session);
+        self.desk.hand_over(client, heir, who, Instant::now());
         self.tell(heir, &offered);
     }
 
-    fn revoked(&mut self, by: ClientId) {
-        let name = self.clients.get(&by).map(|client| client.name.clone());
-        let name = name.unwrap_or_default();
-        if let Some(holder) = self.desk.holder() {
-            let revoked = json!({ "op": "revoked", "by": name });
-            self.tell(holder.client, &revoked);
-            self.revoked_by = Some(name);
+    /// A client ends the control of whoever has it, or has asked for it: from now on nothing of theirs
+    /// reaches the robot, beats neither, so that the master ends the lease.
+    fn revoke(&mut self, by: ClientId) {
+        let Some(client) = self.clients.get(&by) else {
+            return;
+        };
+        let Some(holder) = self.desk.revoke(by, (&client.name, &client.session)) else {
+            return;
+        };
+        self.last_holder.clone_from(&holder.name);
+        self.revoked_by = Some(client.name.clone());
+        let (holder, revoked) = (holder.client, json!({ "op": "revoked", "by": client.name }));
+        self.tell(holder, &revoked);
+        // What it hands over is a release now: control is kept for another already.
+        for pending in self.pending.values_mut() {
+            if matches!(pending.what, Asked::HandOver(_)) {
+                pending.what = Asked::Release;
+            }
         }
     }
 
     pub(super) fn take_status(&mut self, status: Status) {
         self.desk
             .look(status.now_us, status.lease_seen_us.is_some());
+        self.desk.free(Instant::now());
         self.status = Some(status);
         self.faults.retain(|(_, over_us)| *over_us > status.now_us);
     }
 
     pub(super) fn tell_unknown(&mut self, now: Instant) {
+        let now_us = self.now_us();
+        let is_late = |pending: &Pending| match pending.accepted_us {
+            None => now - pending.since >= TICKET,
+            // A master that has died since does not answer.
+            Some(us) => pending.what.is_of_control() && now_us > us + CONTROL_US,
+        };
         let late: Vec<u32> = self
             .pending
             .iter()
-            .filter(|(_, pending)| !pending.accepted && now - pending.since >= TICKET)
+            .filter(|(_, pending)| is_late(pending))
             .map(|(id, _)| *id)
             .collect();
         for id in late {
@@ -256,9 +306,11 @@ impl Inner {
                 );
             }
         }
-        // Whoever asked is gone, and nobody else is told.
+        // Whoever asked is gone, and nobody else is told. What comes of a control that was asked for is
+        // waited for: the master may grant it yet.
         let clients = &self.clients;
-        self.pending
-            .retain(|_, p| clients.contains_key(&p.client) || now - p.since < TICKET);
+        self.pending.retain(|_, p| {
+            clients.contains_key(&p.client) || now - p.since < TICKET || p.what.is_of_control()
+        });
     }
 }

@@ -22,7 +22,17 @@ struct Kept {
     on_change: bool,
     next_ns: u64,
     bytes: usize,
+    /// Number of the oldest one, since power-up.
+    first: u64,
     samples: VecDeque<(u64, Bytes)>,
+}
+
+/// Who reads samples piece by piece: which comes next, and before which the last one was.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reader {
+    channel: u16,
+    next: u64,
+    end: u64,
 }
 
 /// Samples of all channels, each as a frame has it.
@@ -37,20 +47,16 @@ impl History {
         Self(channels().iter().map(|def| of(def.rate_hz == 0)).collect())
     }
 
-    /// Whether every sample of this channel is kept.
-    pub(super) fn keeps_all(&self, channel: u16) -> bool {
-        self.0[usize::from(channel)].on_change
-    }
-
-    /// Whether a sample of this time is to be kept.
-    pub(super) fn wants(&self, channel: u16, t_ns: u64) -> bool {
-        let kept = &self.0[usize::from(channel)];
-        kept.on_change || t_ns >= kept.next_ns
-    }
-
-    pub(super) fn keep(&mut self, channel: u16, t_ns: u64, sample: Bytes) {
+    /// Keeps a sample of this time, if it is one to be kept.
+    pub(super) fn see(&mut self, channel: u16, t_ns: u64, encode: impl FnOnce() -> Bytes) {
         let kept = &mut self.0[usize::from(channel)];
-        kept.next_ns = (t_ns / PERIOD_NS + 1) * PERIOD_NS;
+        if t_ns < kept.next_ns {
+            return;
+        }
+        if !kept.on_change {
+            kept.next_ns = (t_ns / PERIOD_NS + 1) * PERIOD_NS;
+        }
+        let sample = encode();
         kept.bytes += sample.len() + OVERHEAD;
         kept.samples.push_back((t_ns, sample));
         while let Some((old_ns, old)) = kept.samples.front()
@@ -58,47 +64,92 @@ impl History {
         {
             kept.bytes -= old.len() + OVERHEAD;
             kept.samples.pop_front();
+            kept.first += 1;
         }
     }
 
-    /// Samples from `from_ns` on, the oldest first.
-    pub(super) fn since(&self, channel: u16, from_ns: u64) -> Vec<Bytes> {
-        let samples = &self.0[usize::from(channel)].samples;
-        let first = samples.partition_point(|(t_ns, _)| *t_ns < from_ns);
-        let rest = samples.iter().skip(first);
-        rest.map(|(_, sample)| sample.clone()).collect()
+    /// A reader of the samples from `from_ns` until now.
+    pub(super) fn reader(&self, channel: u16, from_ns: u64) -> Reader {
+        let Kept { first, samples, .. } = &self.0[usize::from(channel)];
+        let before = samples.partition_point(|(t_ns, _)| *t_ns < from_ns);
+        Reader {
+            channel,
+            next: first + before as u64,
+            end: first + samples.len() as u64,
+        }
+    }
+
+    /// The next samples of a reader, at most so many, the oldest first; those that have gone meanwhile
+    /// are left out.
+    pub(super) fn read(&self, reader: &mut Reader, most: usize) -> Vec<Bytes> {
+        let Kept { first, samples, .. } = &self.0[usize::from(reader.channel)];
+        let begin = reader.next.max(*first);
+        let end = reader.end.min(begin + most as u64);
+        reader.next = end;
+        let count = end.saturating_sub(begin) as usize;
+        let piece = samples.iter().skip((begin - first) as usize).take(count);
+        piece.map(|(_, sample)| sample.clone()).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_telemetry::channel_index;
+
+    fn index(topic: &str) -> u16 {
+        channel_index(topic).expect("a channel") as u16
+    }
+
+    fn sample() -> Bytes {
+        Bytes::from_static(&[0; 100])
+    }
 
     #[test]
     fn a_minute_is_kept_at_50_a_second_and_events_one_by_one() {
-        let index = |topic| {
-            let index = channels().iter().position(|def| def.topic == topic);
-            index.expect("a channel") as u16
-        };
         let (joint, events) = (index("/joint/1"), index("/events"));
         let mut history = History::new();
-        assert!(!history.keeps_all(joint) && history.keeps_all(events));
-        let sample = Bytes::from_static(&[0; 100]);
         for ms in 0..90_000 {
-            let t_ns = ms * 1_000_000;
             for channel in [joint, events] {
-                if history.wants(channel, t_ns) {
-                    history.keep(channel, t_ns, sample.clone());
-                }
+                history.see(channel, ms * 1_000_000, sample);
             }
         }
-        let minute = history.since(joint, 0).len();
+        let since = |channel, from_ns| {
+            let mut reader = history.reader(channel, from_ns);
+            history.read(&mut reader, usize::MAX >> 1).len()
+        };
+        let minute = since(joint, 0);
         assert!((3_000..=3_001).contains(&minute), "{minute}");
-        assert_eq!(history.since(joint, 89_980_000_000).len(), 1);
-        assert_eq!(history.since(joint, 89_981_000_000).len(), 0);
+        assert_eq!(since(joint, 89_980_000_000), 1);
+        assert_eq!(since(joint, 89_981_000_000), 0);
         // Without a rate memory is the limit: the oldest go.
-        let kept = history.since(events, 0).len();
-        assert_eq!(kept, BYTES_MAX / (100 + OVERHEAD));
-        assert_eq!(history.since(events, 89_999_000_000).len(), 1);
+        assert_eq!(since(events, 0), BYTES_MAX / (100 + OVERHEAD));
+        assert_eq!(since(events, 89_999_000_000), 1);
+    }
+
+    /// What it has not read goes as it does without it; it gets what was there when it began.
+    #[test]
+    fn a_slow_reader_keeps_nothing_and_comes_to_an_end() {
+        let events = index("/events");
+        let mut history = History::new();
+        let see = |history: &mut History, s: u64| {
+            history.see(events, s * 1_000_000_000, || Bytes::from(vec![s as u8; 8]));
+        };
+        (0..10).for_each(|s| see(&mut history, s));
+        let mut reader = history.reader(events, 2_000_000_000);
+        let mut read = |history: &History, most| -> Vec<u8> {
+            let piece = history.read(&mut reader, most);
+            piece.iter().map(|sample| sample[0]).collect()
+        };
+        assert_eq!(read(&history, 3), [2, 3, 4]);
+        see(&mut history, 67);
+        // 5 and 6 are older than a minute by now; 67 came after its begin.
+        assert_eq!(read(&history, 2), [7, 8]);
+        assert_eq!(read(&history, 64), [9]);
+        assert!(read(&history, 64).is_empty());
+        let mut late = history.reader(events, 0);
+        see(&mut history, 200);
+        assert_eq!(history.read(&mut late, 64).len(), 0);
+        assert_eq!(history.read(&mut late, 64).len(), 0);
     }
 }

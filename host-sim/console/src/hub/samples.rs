@@ -55,7 +55,7 @@ impl Inner {
             if let OwnedSample::Event(event) = &moving.sample {
                 let lost = event.code == EventCode::Hold
                     && event.detail == hold_name(&HoldReason::OperatorLost);
-                let mut event = event_json(moving.t_ns, event);
+                let mut event = event_json(moving.number, moving.t_ns, event);
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();
                     if let Some(by) = &self.revoked_by {
@@ -77,20 +77,16 @@ impl Inner {
                 moving.sample.pack(&mut arrived.batch);
                 arrived.count += 1;
             }
-            if self.history.keeps_all(moving.channel) {
-                self.history
-                    .keep(moving.channel, moving.t_ns, encode(&moving));
-            }
-            if some || self.history.wants(moving.channel, moving.t_ns) {
+            self.history
+                .see(moving.channel, moving.t_ns, || encode(&moving));
+            if some {
                 newest.insert(moving.channel, moving);
             }
         }
         let mut encoded: BTreeMap<u16, Bytes> = BTreeMap::new();
         for (channel, moving) in &newest {
-            self.viewers.show(*channel, moving.t_ns, &moving.sample);
-            if !self.history.keeps_all(*channel) && self.history.wants(*channel, moving.t_ns) {
-                let sample = encoded.entry(*channel).or_insert_with(|| encode(moving));
-                self.history.keep(*channel, moving.t_ns, sample.clone());
+            if self.viewers.want_sample(*channel) {
+                self.viewers.show(*channel, moving.t_ns, &moving.sample);
             }
         }
         for client in self.clients.values_mut() {

@@ -6,6 +6,7 @@ use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::phase;
 
 use super::Inner;
+use crate::desk::Ended;
 use crate::messages::rounded;
 use crate::record::inputs::fault_name;
 
@@ -28,8 +29,11 @@ impl Inner {
         };
         let holder = self.desk.holder().filter(|h| h.granted_us.is_some());
         let control = holder.map(|holder| {
-            json!({ "holder": holder.name, "session": holder.session, "age_ms": self.age_ms() })
+            let ended = holder.ended.map(Ended::name);
+            json!({ "holder": holder.name, "session": holder.session, "age_ms": self.age_ms(), "ended": ended })
         });
+        let kept_for = self.desk.heir();
+        let kept_for = kept_for.map(|heir| json!({ "name": heir.name, "session": heir.session }));
         let boards = (1..).zip(&status.boards).map(|(address, board): (u8, _)| {
             let faults = board.faults.iter().map(|fault| {
                 json!({
@@ -62,6 +66,7 @@ impl Inner {
             "simulated": status.simulated,
             "failure": self.failure,
             "control": control,
+            "kept_for": kept_for,
             "pace": {
                 "speed": pace.speed,
                 "paused": pace.paused,

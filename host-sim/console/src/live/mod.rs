@@ -135,6 +135,15 @@ pub(crate) enum Input {
         /// The command.
         command: HostCommand,
     },
+    /// The control was revoked, at the hub. The robot notices nothing; its recording does.
+    Revoked {
+        /// Number of the request at the hub.
+        id: u32,
+        /// Name of the client that was in control, or had asked for it.
+        holder: String,
+        /// Name of the client that has revoked it.
+        by: String,
+    },
 }
 
 /// What the robot tells the hub.
@@ -181,7 +190,7 @@ pub(crate) enum Answer {
     SeenInFuture,
     /// The computer was suspended since the sender saw the robot.
     Suspended,
-    /// The control was taken away from the sender.
+    /// The control was revoked, and the sender's lease is not over.
     Revoked,
     /// The master is dead.
     NoMaster,

@@ -61,12 +61,18 @@ impl Pace {
     /// Lets the clock stand, or go on.
     pub(super) fn pause(&mut self, paused: bool, now: Instant) {
         self.status.paused = paused;
+        if paused {
+            self.status.factor = 0.0;
+        }
         self.rebase(now);
     }
 
-    /// The next cycle is due now: nothing of what was missed is made up for.
+    /// The next cycle is due now: nothing of what was missed is made up for, and the second that is
+    /// looked at begins anew.
     pub(super) fn rebase(&mut self, now: Instant) {
         self.due = now;
+        self.late_ms.clear();
+        (self.since, self.cycles) = (now, 0);
     }
 
     /// How long to wait for the next cycle; zero: it is due.
@@ -193,6 +199,24 @@ mod tests {
         }
         let factor = pace.status().factor;
         assert!((factor - 2.0).abs() < 0.02, "{factor}");
+    }
+
+    /// Nor does one in which the clock stood count as a slow one.
+    #[test]
+    fn after_a_pause_the_pace_is_measured_anew() {
+        let start = Instant::now();
+        let mut pace = Pace::new(CYCLE, Some(1.0), false, start);
+        for n in 0..50 {
+            pace.begin(start + CYCLE * n);
+        }
+        let [paused, resumed] = [1, 100].map(|s| start + Duration::from_secs(s));
+        pace.pause(true, paused);
+        assert_eq!(pace.status().factor, 0.0);
+        pace.pause(false, resumed);
+        let told = (0..=100).find_map(|n| pace.begin(resumed + CYCLE * n));
+        assert!(told.is_some_and(|second| second.max_ms < 1.0), "{told:?}");
+        let factor = pace.status().factor;
+        assert!((factor - 1.0).abs() < 0.02, "{factor}");
     }
 
     #[test]

@@ -118,7 +118,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
             stops: 0,
             seen_us: 0,
             listened: awake(),
-            deaf: None,
+            deaf: false,
             failed: false,
         }
         .run();
@@ -149,15 +149,6 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
     })
 }
 
-/// Why an operator who was in control is not heard again.
-#[derive(Debug, Clone, Copy)]
-enum Deaf {
-    /// The computer was suspended under them.
-    Suspended,
-    /// Their control was taken away.
-    Revoked,
-}
-
 struct Loop {
     machine: Machine,
     recorder: Recorder<'static>,
@@ -179,8 +170,9 @@ struct Loop {
     seen_us: u64,
     /// When it listened last.
     listened: Duration,
-    /// Why the operator is not heard again: the master ends the lease, and all axes hold.
-    deaf: Option<Deaf>,
+    /// The computer was suspended under the operator, who is not heard again: the master ends the
+    /// lease, and all axes hold.
+    deaf: bool,
     /// The simulation cannot go on.
     failed: bool,
 }
@@ -275,10 +267,9 @@ impl Loop {
         let now = awake();
         let stood = now.saturating_sub(self.listened) > BLIND;
         self.listened = now;
-        self.deaf = self.deaf.or(stood.then_some(Deaf::Suspended));
-        self.deaf = self.deaf.filter(|_| self.is_held());
+        self.deaf = (self.deaf || stood) && self.is_held();
         let seen_us = self.signals.seen_us.load(Ordering::Acquire);
-        if seen_us != self.seen_us && self.deaf.is_none() {
+        if seen_us != self.seen_us && !self.deaf {
             self.seen_us = seen_us;
             self.machine.beat(seen_us);
             self.given(Given::Beat(seen_us));
@@ -306,6 +297,10 @@ impl Loop {
                     (id, self.request(request, seen_us, spoken, by))
                 }
                 Input::Host { id, command } => (id, self.host(id, command)),
+                Input::Revoked { id, holder, by } => {
+                    self.given(Given::Revoked { holder, by });
+                    (id, Answer::Done)
+                }
             };
             self.answer(id, answer);
         }
@@ -358,10 +353,8 @@ impl Loop {
         if seen_us > now_us {
             return Answer::SeenInFuture;
         }
-        match self.deaf {
-            Some(Deaf::Suspended) => return Answer::Suspended,
-            Some(Deaf::Revoked) => return Answer::Revoked,
-            None => {}
+        if self.deaf {
+            return Answer::Suspended;
         }
         let too_fast = pace.speed.is_none_or(|speed| speed > SPEED_OF_CONTROL);
         if too_fast && request.command.code() == CommandCode::TakeControl {
@@ -424,11 +417,6 @@ impl Loop {
                     .borrow_mut()
                     .end(Some(id), self.recorded_us(), hash);
                 return recorded(ended);
-            }
-            HostCommand::Revoke => {
-                // Where nobody is in control there is nothing to take away.
-                self.deaf = self.is_held().then_some(Deaf::Revoked);
-                return Answer::Done;
             }
         }
         self.given_pace();

@@ -38,6 +38,9 @@ pub(crate) enum Input {
     FaultEnds(String),
     /// The clock goes otherwise. The robot does not notice; it stands here for who reads.
     Pace(PaceInput),
+    /// The control was revoked. What comes of it the robot does by itself, as nobody beats; it stands
+    /// here for who reads.
+    Revoked(RevokedInput),
     /// Hash of everything until now.
     Hash(String),
 }
@@ -65,6 +68,15 @@ pub(crate) struct PaceInput {
     pub(crate) paused: bool,
 }
 
+/// Whose control was revoked.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RevokedInput {
+    /// Name of the client that was in control, or had asked for it.
+    pub(crate) holder: String,
+    /// Name of the client that has revoked it.
+    pub(crate) by: String,
+}
+
 /// A fault without its time: it begins now, and ends where it is ended.
 pub(crate) fn fault_name(fault: &FaultSpec) -> String {
     let text = fault.to_string();
@@ -90,6 +102,7 @@ impl Line {
             Given::Fault(fault, true) => Input::FaultBegins(fault_name(&fault)),
             Given::Fault(fault, false) => Input::FaultEnds(fault_name(&fault)),
             Given::Pace { speed, paused } => Input::Pace(PaceInput { speed, paused }),
+            Given::Revoked { holder, by } => Input::Revoked(RevokedInput { holder, by }),
             Given::Hash(hash) => Input::Hash(hash),
         };
         Self { ms, input }
@@ -126,6 +139,10 @@ mod tests {
             Given::Pace {
                 speed: None,
                 paused: true,
+            },
+            Given::Revoked {
+                holder: "tablet".to_owned(),
+                by: "ctl".to_owned(),
             },
             Given::Hash("ab".to_owned()),
         ];

@@ -145,6 +145,13 @@ pub(crate) enum Given {
         /// It stands.
         paused: bool,
     },
+    /// The control was revoked; the robot notices that its operator beats no more.
+    Revoked {
+        /// Name of the client that was in control, or had asked for it.
+        holder: String,
+        /// Name of the client that has revoked it.
+        by: String,
+    },
     /// Hash of everything until now: where a repetition is compared.
     Hash(String),
 }

@@ -42,6 +42,11 @@ impl Given {
                 };
                 (kind, format!("{} {what}", sample.fault))
             }
+            Self::Revoked { holder, by } => {
+                sample.by.clone_from(by);
+                let text = format!("{by} has revoked control from {holder}");
+                ("revoked", text)
+            }
             Self::Pace { .. } if pace.paused => ("pace", "the clock is paused".to_owned()),
             Self::Pace { speed, .. } => {
                 let text = match speed {
@@ -87,6 +92,12 @@ mod tests {
         assert_eq!(fault.kind, "fault_ends");
         assert_eq!(fault.fault, "supply-sag=3.25");
         assert_eq!(of(Given::Stop(1)).kind, "stop");
+        let revoked = of(Given::Revoked {
+            holder: "tablet".to_owned(),
+            by: "ctl".to_owned(),
+        });
+        assert_eq!((&*revoked.kind, &*revoked.by), ("revoked", "ctl"));
+        assert!(revoked.text.contains("tablet"), "{}", revoked.text);
         assert!(Given::Beat(1).sample(&pace).is_none());
         assert!(Given::Hash(String::new()).sample(&pace).is_none());
     }

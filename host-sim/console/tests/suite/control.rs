@@ -486,8 +486,16 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
         (&event["holder"], &event["revoked_by"]),
         (&json!("driver"), &json!("owner"))
     );
-    // Whoever looks at the robot may take it anew, and has to clear what happened.
+    // For a while whoever revoked alone may take it; where they do not, everybody.
+    let kept_for = &state["kept_for"];
+    assert_eq!(kept_for["name"], "owner", "{state}");
     look(&mut driver, "state");
+    assert_eq!(
+        refusal(&mut driver, "TakeControl", &nothing),
+        "control_held"
+    );
+    until_driven(&rig, &mut driver, |state| state["kept_for"].is_null());
+    // Whoever looks at the robot may take it anew, and has to clear what happened.
     done(&mut driver, "TakeControl");
     assert_eq!(refusal(&mut driver, "Arm", &nothing), "latched");
     done(&mut driver, "ClearFault");
@@ -498,4 +506,155 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     until_driven(&rig, &mut driver, |state| state["control"].is_null());
     done(&mut local, "Revoke");
     done(&mut driver, "TakeControl");
+}
+
+/// The lease ends in the time of the master, which stands.
+#[test]
+fn who_pauses_and_leaves_keeps_the_clock_from_nobody() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let mut other = rig.control("other");
+    let nothing = json!({});
+    done(&mut driver, "Pause");
+    look(&mut other, "state");
+    assert_eq!(refusal(&mut other, "Resume", &nothing), "control_held");
+    drop(driver);
+    let state = rig.until("gone", |state| state["control"]["ended"] == "gone");
+    assert_eq!(state["control"]["holder"], "driver");
+    assert_eq!(refusal(&mut other, "TakeControl", &nothing), "control_held");
+    done(&mut other, "Resume");
+    let state = until_driven(&rig, &mut other, |state| state["control"].is_null());
+    assert_eq!(state["hold"], "operator_lost");
+    done(&mut other, "TakeControl");
+}
+
+#[test]
+fn control_is_revoked_while_the_clock_stands() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let mut owner = rig.control("owner");
+    let nothing = json!({});
+    done(&mut driver, "Pause");
+    look(&mut owner, "state");
+    done(&mut owner, "Revoke");
+    assert_eq!(look(&mut driver, "revoked")["by"], "owner");
+    let state = rig.state();
+    assert_eq!(
+        (&state["control"]["holder"], &state["control"]["ended"]),
+        (&json!("driver"), &json!("revoked"))
+    );
+    assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
+    // However long the clock stands, the control is kept for whoever revoked.
+    std::thread::sleep(Duration::from_millis(2_500));
+    done(&mut owner, "Resume");
+    let state = until_driven(&rig, &mut owner, |state| state["control"].is_null());
+    assert_eq!(
+        (&state["hold"], &state["kept_for"]["name"]),
+        (&json!("operator_lost"), &json!("owner"))
+    );
+    done(&mut owner, "TakeControl");
+}
+
+/// The master grants it all the same, at its next cycle; nobody has it with that.
+#[test]
+fn control_that_is_only_asked_for_is_revoked_as_well() {
+    let rig = TestRig::new();
+    rig.until("ready", |state| state["ready"] == true);
+    let mut owner = rig.control("owner");
+    let mut asker = rig.control("asker");
+    look(&mut owner, "state");
+    // A cycle takes 100 ms now: the time to revoke what is not granted yet.
+    let slow = json!({ "speed": 0.1 });
+    let outcome = owner.carry_out("Speed", &slow, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    let mut refused = None;
+    for _ in 0..10 {
+        rig.until("free", |state| {
+            state["control"].is_null() && state["kept_for"].is_null()
+        });
+        look(&mut asker, "state");
+        look(&mut owner, "state");
+        let n = asker.give("TakeControl", &json!({}), 1_000).expect("sent");
+        assert_eq!(look(&mut asker, "answer")["status"], "accepted");
+        done(&mut owner, "Revoke");
+        if let Outcome::Refused { reason, .. } = asker.outcome(n) {
+            refused = Some(reason);
+            break;
+        }
+    }
+    assert_eq!(refused.as_deref(), Some("revoked"));
+    assert_eq!(refusal(&mut asker, "Arm", &json!({})), "revoked");
+    let state = rig.until("over", |state| state["control"].is_null());
+    assert_eq!(state["armed"], false);
+}
+
+/// The master has accepted it, and dies before its next cycle.
+#[test]
+fn a_master_that_dies_with_what_it_accepted_leaves_the_control_free() {
+    let rig = TestRig::new();
+    let mut asker = rig.control("asker");
+    let mut outcome = Outcome::Done;
+    for _ in 0..5 {
+        rig.until("ready and free", |state| {
+            state["ready"] == true && state["control"].is_null()
+        });
+        look(&mut asker, "state");
+        // A cycle takes 100 ms now: the time for both.
+        asker
+            .give("Speed", &json!({ "speed": 0.1 }), 500)
+            .expect("sent");
+        let n = asker.give("TakeControl", &json!({}), 1_000).expect("sent");
+        for (name, args) in [
+            ("Inject", json!({ "fault": "master-reset=100" })),
+            ("Speed", json!({ "speed": 1.0 })),
+        ] {
+            asker.give(name, &args, 500).expect("sent");
+        }
+        outcome = asker.outcome(n);
+        if outcome != Outcome::Done {
+            break;
+        }
+    }
+    assert_eq!(outcome, Outcome::Unknown);
+    let mut other = rig.control("other");
+    look(&mut other, "state");
+    done(&mut other, "TakeControl");
+}
+
+/// The master would grant it again to who has just handed it over.
+#[test]
+fn who_hands_over_does_not_take_it_back_in_the_same_breath() {
+    let rig = TestRig::new();
+    let mut first = rig.driver("first");
+    let mut second = rig.control("second");
+    look(&mut second, "state");
+    let nothing = json!({});
+    assert_eq!(
+        refusal(&mut second, "TakeControl", &nothing),
+        "control_held"
+    );
+    let to = json!({ "to": look(&mut first, "asked")["session"] });
+    let over = first.give("HandOver", &to, 500).expect("sent");
+    let back = first.give("TakeControl", &nothing, 500).expect("sent");
+    let mut answers = std::collections::BTreeMap::new();
+    while answers.len() < 2 {
+        let answer = look(&mut first, "answer");
+        if answer["status"] != "accepted" {
+            answers.insert(answer["n"].as_u64().expect("a number"), answer);
+        }
+    }
+    assert_eq!(answers[&over]["status"], "done");
+    let reason = answers[&back]["reason"].as_str();
+    // The second: the release was over when it came.
+    assert!(
+        matches!(reason, Some("busy" | "control_held")),
+        "{answers:?}"
+    );
+    assert_eq!(look(&mut second, "offered")["by"], "first");
+    done(&mut second, "TakeControl");
+    second.keep_control(true);
+    let state = until_driven(&rig, &mut second, |state| {
+        state["control"]["holder"] == "second"
+    });
+    assert_eq!(state["hold"], json!(null));
 }

@@ -309,6 +309,42 @@ fn every_channel_fits_its_schema_and_every_frame_is_a_link_of_the_robot() {
     }
 }
 
+/// Also where somebody at the console wants the newest of them.
+#[test]
+fn a_viewer_is_told_an_event_once() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let mut looker = rig.view();
+    let newest = json!({ "op": "subscribe", "channels": ["/events"], "hz": 50 });
+    let n = looker.send(newest).expect("sent");
+    assert_eq!(looker.outcome(n), Outcome::Done);
+    let mut viewer = Viewer::view(&rig);
+    viewer.subscribe_all();
+    let events = viewer.channels.iter().find(|c| c["topic"] == "/events");
+    let events = events.and_then(|c| c["id"].as_u64()).expect("a channel") + 100;
+    // It hears what it wants from now on.
+    viewer.until("samples", |heard| {
+        matches!(heard, Heard::Data { .. }).then_some(())
+    });
+    done(&mut driver, "Disarm");
+    let mut told = Vec::new();
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(1) {
+        if let Some(Heard::Data {
+            subscription,
+            t_ns,
+            payload,
+        }) = viewer.read()
+            && u64::from(subscription) == events
+        {
+            told.push((t_ns, String::from_utf8(payload).expect("JSON")));
+        }
+    }
+    assert!(!told.is_empty(), "no event");
+    let different: BTreeSet<&(u64, String)> = told.iter().collect();
+    assert_eq!(different.len(), told.len(), "{told:?}");
+}
+
 #[test]
 fn without_a_key_or_from_a_foreign_page_nobody_looks() {
     let rig = TestRig::new();

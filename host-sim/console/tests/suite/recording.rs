@@ -117,6 +117,36 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     assert!(told.compared >= 2, "{told:?}");
 }
 
+/// Who revoked whose control stands in the recording, and on `/session`.
+#[test]
+fn a_revoked_control_is_recorded_and_repeats() {
+    let rig = TestRig::recorded(1.0);
+    let driver = rig.driver("driver");
+    let mut owner = rig.control("owner");
+    done(&mut owner, "Revoke");
+    let state = rig.until("over", |state| state["control"].is_null());
+    assert_eq!(state["hold"], "operator_lost");
+    let query = "samples?channel=/session";
+    let (_, told) = http(&rig.url, "GET", query, &rig.keys.view).expect("an answer");
+    let rows = told["rows"].as_array().expect("a list");
+    let row = rows.iter().find(|row| row[1] == "revoked").expect("a row");
+    assert_eq!(row[3], "owner", "{row}");
+    let text = row[row.as_array().map_or(0, Vec::len) - 1].as_str();
+    assert!(text.is_some_and(|text| text.contains("driver")), "{row}");
+    drop((driver, owner));
+    let folder = folder(&rig, "0001");
+    let TestRig { server, home, .. } = rig;
+    drop(server);
+    let inputs = fs::read_to_string(folder.join("inputs.jsonl")).expect("inputs");
+    assert!(
+        inputs.contains(r#""revoked":{"holder":"driver","by":"owner"}"#),
+        "{inputs}"
+    );
+    let told = repeated(&folder);
+    assert!(told.is_same(), "{told:?}");
+    drop(home);
+}
+
 #[test]
 fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
     let rig = TestRig::new();

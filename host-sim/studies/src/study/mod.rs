@@ -9,6 +9,8 @@
 mod progress;
 pub mod schema;
 mod stop;
+#[cfg(unix)]
+mod suspend;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -26,6 +28,8 @@ pub use progress::STACK;
 pub use progress::{Ended, Progress};
 pub use schema::Summary;
 pub use stop::{Signal, Stop, outlive_file_limit};
+#[cfg(unix)]
+pub use suspend::Suspend;
 
 use crate::StudyError;
 

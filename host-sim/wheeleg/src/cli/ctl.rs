@@ -188,7 +188,7 @@ fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
         word(&state["phase"]),
         state["step"],
         word(&state["hold"]),
-        word(&state["control"]["holder"]),
+        holder(&state).unwrap_or_else(|| "none".to_owned()),
         pace,
         state["pace"]["paused"],
     );
@@ -231,45 +231,65 @@ fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
     }
 }
 
-/// Time within which the master ends a lease that was taken away, and is seen to.
+/// Who is in control, or for whom control is reserved; none: control is free.
+fn holder(state: &Value) -> Option<String> {
+    let control = &state["control"];
+    if let Some(name) = control["holder"].as_str() {
+        let ended = control["ended"].as_str();
+        let ended = ended.map(|why| format!(" ({why}, lease not over)"));
+        return Some(format!("{}{}", plain(name), ended.unwrap_or_default()));
+    }
+    let name = state["kept_for"]["name"].as_str()?;
+    Some(format!("reserved for {}", plain(name)))
+}
+
+/// Time within which the master ends a lease that was revoked, and is seen to.
 const ENDS: Duration = Duration::from_secs(3);
 
-/// Takes the control away, and waits until its holder has it no more.
+/// Revokes control, and waits until the lease of its holder is over, or the clock stands.
 fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     let mut client = reach.control()?;
-    let holder = match control(&mut client, |_| true) {
-        Ok(holder) => holder,
+    let before = match state_when(&mut client, |_| true) {
+        Ok(state) => state,
         Err(unknown) => return reach.print_outcome(&unknown),
     };
-    if holder.is_null() {
-        tell("nobody is in control");
-        return reach.print_outcome(&Outcome::Done);
-    }
+    // Also where nobody is in control yet: somebody may have asked for it.
     let end = client.carry_out("Revoke", &json!({}), 1_000);
     let end = end.map_err(refused)?;
     if end != Outcome::Done {
         return reach.print_outcome(&end);
     }
-    if let Err(unknown) = control(&mut client, |now| now["session"] != holder["session"]) {
-        tell("the control is still held: the simulation may be paused");
-        return reach.print_outcome(&unknown);
-    }
-    let name = holder["holder"].as_str().unwrap_or_default();
+    let holder = &before["control"];
+    let Some(name) = holder["holder"].as_str() else {
+        tell("nobody is in control");
+        return reach.print_outcome(&Outcome::Done);
+    };
+    let is_over = |state: &Value| {
+        let now = &state["control"];
+        let stands = state["pace"]["paused"] == true;
+        now["session"] != holder["session"] || (stands && now["ended"] == "revoked")
+    };
+    let after = match state_when(&mut client, is_over) {
+        Ok(state) => state,
+        Err(unknown) => return reach.print_outcome(&unknown),
+    };
     tell(&plain(&format!("{name:?} is no longer in control")));
+    if after["control"]["session"] == holder["session"] {
+        tell(
+            "the clock is paused: after `wheeleg ctl resume` the lease ends, and an armed robot holds",
+        );
+    }
     reach.print_outcome(&Outcome::Done)
 }
 
-/// Who is in control, as soon as the server reports that as it is wanted. [`Outcome::Unknown`]: it has not
-/// within [`ENDS`]; [`Outcome::Lost`]: the connection has ended.
-fn control(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, Outcome> {
+/// The state, as soon as the server reports it as wanted. [`Outcome::Unknown`]: it has not within
+/// [`ENDS`]; [`Outcome::Lost`]: the connection has ended.
+fn state_when(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, Outcome> {
     let begin = Instant::now();
     while begin.elapsed() < ENDS {
         match client.read() {
-            Some(Incoming::Json(mut state)) if state["op"] == "state" => {
-                let control = state["control"].take();
-                if wanted(&control) {
-                    return Ok(control);
-                }
+            Some(Incoming::Json(state)) if state["op"] == "state" && wanted(&state) => {
+                return Ok(state);
             }
             Some(Incoming::Closed { .. }) => return Err(Outcome::Lost),
             _ => {}

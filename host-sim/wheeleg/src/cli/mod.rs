@@ -208,12 +208,14 @@ fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
 
 /// Ctrl-C, TERM and HUP stop a study, which finishes its files.
 fn stop_on_signals() -> Result<Stop, StudyError> {
-    Stop::on_signals().map_err(|e| {
-        StudyError::refused(
-            format!("cannot install a signal handler: {e}"),
-            "please report this",
-        )
-    })
+    Stop::on_signals().map_err(|e| no_handler(&e))
+}
+
+fn no_handler(why: &std::io::Error) -> StudyError {
+    StudyError::refused(
+        format!("cannot install a signal handler: {why}"),
+        "please report this",
+    )
 }
 
 /// Prints what came of a study and what of it could not be written, and gives its exit code: that

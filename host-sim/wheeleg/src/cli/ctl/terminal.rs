@@ -29,6 +29,8 @@ pub(super) enum Key {
     Escape,
     /// Ctrl-C, which is a key while the terminal is ours.
     Interrupt,
+    /// Ctrl-Z, which is a key as well.
+    Suspend,
     /// A letter.
     Letter(char),
 }
@@ -42,7 +44,12 @@ pub(super) struct Line {
 }
 
 /// The terminal, until it is dropped.
-pub(super) struct Terminal(());
+pub(super) struct Terminal {
+    /// How it was.
+    before: Termios,
+    /// How it is while it is ours.
+    raw: Termios,
+}
 
 impl Terminal {
     /// Takes the terminal; `None`: there is none that can be drawn on.
@@ -56,7 +63,7 @@ impl Terminal {
         let mut raw = before.clone();
         raw.make_raw();
         if let Ok(mut place) = BEFORE.lock() {
-            *place = Some(before);
+            *place = Some(before.clone());
         }
         let then = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
@@ -64,10 +71,31 @@ impl Terminal {
             give_back();
             then(panic);
         }));
-        let terminal = Self(());
-        tcsetattr(&input, OptionalActions::Now, &raw).ok()?;
-        write(ENTER).ok()?;
+        let terminal = Self { before, raw };
+        terminal.enter().ok()?;
         Some(terminal)
+    }
+
+    /// It is ours.
+    ///
+    /// # Errors
+    /// What the operating system says: the terminal is gone.
+    fn enter(&self) -> std::io::Result<()> {
+        tcsetattr(std::io::stdin(), OptionalActions::Now, &self.raw)?;
+        write(ENTER)
+    }
+
+    /// It is as it was before while `suspended` lasts, then ours again.
+    ///
+    /// # Errors
+    /// What the operating system says: the terminal is gone, or the program cannot be suspended.
+    pub(super) fn lend(
+        &self,
+        suspended: impl FnOnce() -> std::io::Result<()>,
+    ) -> std::io::Result<()> {
+        leave(&self.before);
+        suspended()?;
+        self.enter()
     }
 
     /// Columns and rows.
@@ -125,9 +153,13 @@ fn give_back() {
     let Some(before) = BEFORE.lock().ok().and_then(|mut place| place.take()) else {
         return;
     };
-    // A terminal that is gone needs nothing.
+    leave(&before);
+}
+
+/// The terminal is as it was. One that is gone needs nothing.
+fn leave(before: &Termios) {
     let _ = write(LEAVE);
-    let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, &before);
+    let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, before);
 }
 
 fn write(text: &str) -> std::io::Result<()> {
@@ -141,6 +173,7 @@ fn write(text: &str) -> std::io::Result<()> {
 fn keys(bytes: &[u8]) -> Vec<Key> {
     const ESCAPE: u8 = 0x1b;
     const INTERRUPT: u8 = 0x03;
+    const SUSPEND: u8 = 0x1a;
     let mut keys = Vec::new();
     let mut rest = bytes;
     while let [first, tail @ ..] = rest {
@@ -153,6 +186,7 @@ fn keys(bytes: &[u8]) -> Vec<Key> {
             }
             ESCAPE => keys.push(Key::Escape),
             INTERRUPT => keys.push(Key::Interrupt),
+            SUSPEND => keys.push(Key::Suspend),
             letter if letter.is_ascii_graphic() => keys.push(Key::Letter(letter.into())),
             _ => {}
         }
@@ -171,7 +205,7 @@ mod tests {
         assert_eq!(keys(b"\x1b[A\x1bOP\x1b[15~"), []);
         assert_eq!(keys(b"\x1b[Aq"), [Key::Letter('q')]);
         assert_eq!(keys(b"\x1b["), []);
-        assert_eq!(keys(b"\x03"), [Key::Interrupt]);
+        assert_eq!(keys(b"\x03\x1a"), [Key::Interrupt, Key::Suspend]);
         assert_eq!(keys(b"q\xc3\xa9\x1b"), [Key::Letter('q'), Key::Escape]);
     }
 }

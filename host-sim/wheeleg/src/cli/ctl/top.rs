@@ -7,13 +7,15 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 use wheeleg_console::Key as AccessKey;
 use wheeleg_console::client::{Client, Incoming};
+use wheeleg_sim::unmeasured;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Suspend;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
 
 use super::super::exit::LOST;
 use super::super::serve::refused;
-use super::super::{stop_on_signals, tell};
+use super::super::{no_handler, stop_on_signals, tell};
 use super::reach::Reach;
 use super::sample;
 use super::terminal::{Key, Line, Terminal};
@@ -56,16 +58,9 @@ struct Seen {
 
 /// Draws until somebody leaves, or the connection ends.
 pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&reach.url(), "view", "top", key).map_err(refused)?;
-    let topics = (1..=6).map(|n| format!("/joint/{n}"));
-    let others = WHEELS
-        .iter()
-        .chain(&FEET)
-        .map(|(topic, _)| (*topic).to_owned());
-    let topics: Vec<String> = topics.chain(others).collect();
-    let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
-    client.send(frame).map_err(refused)?;
+    let mut client = connect(reach, key)?;
     let stop = stop_on_signals()?;
+    let suspend = Suspend::on_signals().map_err(|e| no_handler(&e))?;
     // From here on a signal ends the loop, which gives the terminal back.
     stop.begin();
     let Some(terminal) = Terminal::take() else {
@@ -85,17 +80,31 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
             }
             None => {}
         }
-        let mut leaves = false;
+        let (mut leaves, mut suspends) = (false, suspend.is_asked());
         for key in terminal.keys() {
             match key {
                 // Of a connection that has ended, nothing is confirmed.
                 Key::Escape => seen.stop(client.send(json!({ "op": "stop" })).unwrap_or_default()),
                 Key::Interrupt | Key::Letter('q') => leaves = true,
+                Key::Suspend => suspends = true,
                 Key::Letter(_) => {}
             }
         }
         if leaves || stop.is_asked() {
             break Ok(stop.signal());
+        }
+        if suspends || suspend.was_continued() {
+            let stop = || if suspends { suspend.stop() } else { Ok(()) };
+            if terminal.lend(stop).is_err() {
+                break Err(());
+            }
+            // The server may have given up a client that read nothing; what it sent before is old.
+            client = connect(reach, key)?;
+            seen = Seen {
+                unconfirmed: seen.unconfirmed || seen.stopping.is_some(),
+                ..Seen::default()
+            };
+            (heard, drawn) = (Instant::now(), None);
         }
         if drawn.is_none_or(|drawn| drawn.elapsed() >= DRAWN) {
             drawn = Some(Instant::now());
@@ -125,6 +134,20 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
             Ok(ExitCode::from(LOST))
         }
     }
+}
+
+/// A client that looks at what is drawn.
+fn connect(reach: &Reach, key: &AccessKey) -> Result<Client, StudyError> {
+    let mut client = Client::connect(&reach.url(), "view", "top", key).map_err(refused)?;
+    let topics = (1..=6).map(|n| format!("/joint/{n}"));
+    let others = WHEELS
+        .iter()
+        .chain(&FEET)
+        .map(|(topic, _)| (*topic).to_owned());
+    let topics: Vec<String> = topics.chain(others).collect();
+    let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
+    client.send(frame).map_err(refused)?;
+    Ok(client)
 }
 
 impl Seen {
@@ -173,12 +196,22 @@ impl Seen {
         self.unconfirmed || waits.is_some_and(|waits| waits > UNCONFIRMED)
     }
 
-    /// A value of the newest sample of a channel; `-`: none has come, or nobody tells it.
+    /// A value of the newest sample of a channel; none: no sample has come, or no real board measures
+    /// it: what is sent in its place is no value.
+    fn value(&self, topic: &str, field: &str) -> Option<f64> {
+        if self.state["simulated"] != true {
+            let def = channels().iter().find(|def| def.topic == topic)?;
+            let mut unmeasured = unmeasured().iter();
+            if unmeasured.any(|(schema, fields)| *schema == def.schema && fields.contains(&field)) {
+                return None;
+            }
+        }
+        self.samples.get(topic)?.get(field)?.as_f64()
+    }
+
+    /// The same as a text; `-`: none.
     fn number(&self, topic: &str, field: &str, decimals: usize) -> String {
-        let value = self
-            .samples
-            .get(topic)
-            .and_then(|values| values[field].as_f64());
+        let value = self.value(topic, field);
         value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
     }
 
@@ -251,10 +284,7 @@ impl Seen {
             (_, Some(factor)) => format!("x{factor:.2}"),
             _ => "-".to_owned(),
         };
-        let holder = match &state["control"]["holder"] {
-            Value::String(name) => plain(name),
-            _ => "free".to_owned(),
-        };
+        let holder = super::holder(state).unwrap_or_else(|| "free".to_owned());
         let t_s = state["master_us"].as_f64().unwrap_or(0.0) * 1e-6;
         format!(
             " Esc STOP | {mode} | {} | {of} {clock} | {}, step {} | control: {holder} | {t_s:.2} s | q leave ",
@@ -273,8 +303,7 @@ impl Seen {
 
     fn joint(&self, n: usize, name: &str) -> String {
         let topic = format!("/joint/{n}");
-        let values = self.samples.get(topic.as_str());
-        let value = |field: &str| values.and_then(|values| values[field].as_f64());
+        let value = |field: &str| self.value(&topic, field);
         let error = value("commanded_mm").zip(value("sensed_mm"));
         let error = error.map_or_else(
             || "-".to_owned(),
@@ -391,6 +420,26 @@ mod tests {
         // Before anything has come, nothing is made up.
         let empty = text(&Seen::default().screen(Duration::ZERO, 24));
         assert!(!empty.contains("0.0 "), "{empty}");
+    }
+
+    /// Of real boards nobody knows the valves: in their place 0 is sent, which would be "shut".
+    #[test]
+    fn what_no_board_measures_is_shown_as_unknown() {
+        let joint = |simulated: bool| {
+            let mut seen = seen();
+            seen.state["simulated"] = json!(simulated);
+            let values = json!({ "commanded_mm": 90.0, "sensed_mm": 88.0, "pressure_a_bar": null, "valves_open": 2 });
+            let Value::Object(values) = values else {
+                panic!("an object");
+            };
+            seen.samples.insert("/joint/1", values);
+            seen.joint(1, "left yaw")
+        };
+        let simulated = joint(true);
+        assert!(simulated.contains(" .A- . ."), "{simulated}");
+        let real = joint(false);
+        assert!(real.contains("88.0"), "{real}");
+        assert!(real.ends_with("       -  -         hold"), "{real}");
     }
 
     #[test]

@@ -1,0 +1,53 @@
+//! A program that has changed its terminal, and is suspended: Ctrl-Z and `kill -TSTP`, until `fg`.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use signal_hook::consts::{SIGCONT, SIGTSTP};
+use signal_hook::{flag, low_level};
+
+/// Whether the program is to be suspended, or was.
+#[derive(Debug)]
+pub struct Suspend {
+    asked: Arc<AtomicBool>,
+    continued: Arc<AtomicBool>,
+}
+
+impl Suspend {
+    /// From here on a request to suspend the program (SIGTSTP) waits until the program looks.
+    ///
+    /// # Errors
+    /// What the operating system says if a handler cannot be set.
+    pub fn on_signals() -> std::io::Result<Self> {
+        let suspend = Self {
+            asked: Arc::default(),
+            continued: Arc::default(),
+        };
+        flag::register(SIGTSTP, Arc::clone(&suspend.asked))?;
+        flag::register(SIGCONT, Arc::clone(&suspend.continued))?;
+        Ok(suspend)
+    }
+
+    /// Whether it was asked for since the last look.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.asked.swap(false, Ordering::SeqCst)
+    }
+
+    /// Whether the program was continued since the last look: it may have been stopped without being
+    /// asked (SIGSTOP).
+    #[must_use]
+    pub fn was_continued(&self) -> bool {
+        self.continued.swap(false, Ordering::SeqCst)
+    }
+
+    /// Stops this program until somebody continues it.
+    ///
+    /// # Errors
+    /// What the operating system says if it cannot be stopped.
+    pub fn stop(&self) -> std::io::Result<()> {
+        low_level::emulate_default_handler(SIGTSTP)?;
+        self.continued.store(false, Ordering::SeqCst);
+        Ok(())
+    }
+}
