@@ -313,7 +313,7 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
         .collect();
     let mut boards: Vec<Transport<Qemu>> = (1..=8)
         .map(|address| {
-            board(if address <= 6 {
+            started(if address <= 6 {
                 "qemu-joint"
             } else {
                 "qemu-wheel"
