@@ -37,7 +37,7 @@ fn image(name: &str) -> PathBuf {
     Path::new(&folder).join(name)
 }
 
-fn board(name: &str) -> Transport<Qemu> {
+fn started(name: &str) -> Transport<Qemu> {
     let mut board = Qemu::transport(&QemuOptions::new(image(name))).expect("QEMU starts");
     let hello = board.hello().expect("the image answers");
     assert_eq!(format!("qemu-{}", hello.image.name), name);
@@ -51,14 +51,14 @@ fn said(error: &RemoteError) -> String {
 
 #[test]
 fn the_loop_closed_by_the_emulated_board_is_that_of_the_host_bit_for_bit() {
-    let mut board = board("qemu-joint");
+    let mut board = started("qemu-joint");
     closed_loop_as_the_host(|request| board.ask(request).expect("the image answers"));
 }
 
 #[test]
 fn two_runs_are_equal_down_to_the_stack() {
     let run = || {
-        let mut board = board("qemu-joint");
+        let mut board = started("qemu-joint");
         let mut replies = Vec::new();
         let _ = closed_loop(1_100, |request| {
             let reply = board.ask(request).expect("the image answers");
@@ -122,7 +122,7 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
         assert_eq!(ask(&predictive()), Reply::Done);
         script(&SCRIPT, 3_000, ask)
     };
-    let mut board = board("qemu-joint");
+    let mut board = started("qemu-joint");
     let there = run(&mut |request| board.ask(request).expect("the image answers"));
     let pins = JointPins::default();
     let mut session = Session::<RemoteJoint<'_>>::new(&pins, "this process", 0);
@@ -135,7 +135,7 @@ fn the_predictive_law_on_the_emulated_board_is_that_of_the_host_bit_for_bit() {
 
     let mut life = eventful_life(3, 4_000, 99);
     life.insert(0, predictive());
-    let mut board = board("qemu-joint");
+    let mut board = started("qemu-joint");
     for (i, (request, here)) in life.iter().zip(answers_here(3, &life)).enumerate() {
         let there = without_figures(board.ask(request).expect("the image answers"));
         assert!(
@@ -313,7 +313,7 @@ fn eight_boards_in_lock_step_answer_an_eventful_life_as_the_host_does() {
         .collect();
     let mut boards: Vec<Transport<Qemu>> = (1..=8)
         .map(|address| {
-            board(if address <= 6 {
+            started(if address <= 6 {
                 "qemu-joint"
             } else {
                 "qemu-wheel"
@@ -429,7 +429,7 @@ fn a_wheel_that_lost_its_supply_counts_from_zero_again() {
 
 #[test]
 fn parameters_reach_the_image_and_impossible_ones_are_refused() {
-    let mut board = board("qemu-joint");
+    let mut board = started("qemu-joint");
     let store = |bytes: &[u8]| {
         Request::Store(Nonvolatile {
             offset: 0,
@@ -470,7 +470,7 @@ fn a_missing_emulator_or_image_is_named_with_the_command_that_brings_it() {
 #[test]
 fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
     // Killed from outside.
-    let mut board = board("qemu-joint");
+    let mut board = started("qemu-joint");
     board.ask(&power_up(1)).expect("answer");
     let id = board.stream().id();
     let killed = Command::new("kill").args(["-9", &id.to_string()]).status();
@@ -497,7 +497,7 @@ fn an_emulator_that_dies_or_hangs_is_an_error_and_none_is_left_behind() {
     assert!(!Path::new(&format!("/proc/{id}")).exists(), "still there");
 
     // Dropped in mid-session.
-    let board = board("qemu-wheel");
+    let board = started("qemu-wheel");
     let id = board.stream().id();
     assert!(Path::new(&format!("/proc/{id}")).exists());
     drop(board);

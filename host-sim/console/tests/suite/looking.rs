@@ -195,7 +195,7 @@ fn clients_that_never_read_cost_the_holder_nothing() {
             }
             Err(e) => {
                 let text = e.to_string();
-                assert!(text.contains("503") || text.contains("places"), "{text}");
+                assert!(text.contains("503") || text.contains("slots"), "{text}");
             }
         }
     }
