@@ -64,7 +64,8 @@ fn main() {
     let begun = Instant::now();
     let large = plan(500_000);
     let cases = Cases::new(&large).expect("a plan");
-    let store = Store::create(folder.path(), PlanFile::of(&large, 10.0)).expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&large, 10.0), &Stop::default())
+        .expect("a folder");
     run(&store, &cases, &options(1), &computed).expect("it runs");
     println!(
         "first row of {} cases: {:.3} s, {:.0} MB",
@@ -83,7 +84,8 @@ fn main() {
     let small = plan(ROWS / 2);
     let cases = Cases::new(&small).expect("a plan");
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Store::create(folder.path(), PlanFile::of(&small, 10.0)).expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&small, 10.0), &Stop::default())
+        .expect("a folder");
     let begun = Instant::now();
     run(&store, &cases, &options(ROWS), &computed).expect("it runs");
     let each_ms = begun.elapsed().as_secs_f64() * 1e3 / ROWS as f64;

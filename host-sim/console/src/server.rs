@@ -116,9 +116,18 @@ impl Server {
     /// Powers the robot up and lets clients in.
     ///
     /// # Errors
+    /// As [`Self::start_with`].
+    pub fn start(options: Options) -> Result<Self, ConsoleError> {
+        Self::start_with(options, || ())
+    }
+
+    /// The same; `begins` is called before the first file is written, and after the last one that is
+    /// given was read.
+    ///
+    /// # Errors
     /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
     /// not there, the robot cannot be built, or the recording's folder cannot be made.
-    pub fn start(options: Options) -> Result<Self, ConsoleError> {
+    pub fn start_with(options: Options, begins: impl FnOnce()) -> Result<Self, ConsoleError> {
         let Options {
             live,
             recordings,
@@ -205,6 +214,7 @@ impl Server {
         };
         let (contact_sink, contacts) = foxglove::contacts();
         let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
+        begins();
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
         let recorded = Arc::clone(&shared);
