@@ -320,6 +320,42 @@ fn a_run_with_very_many_events_has_a_page_that_opens() {
     }
 }
 
+/// Of very many injected faults the first twenty are listed, and how many more.
+#[test]
+fn a_run_with_very_many_faults_lists_a_few() {
+    let place = Place::new();
+    let faults: Vec<String> = (0..3_000)
+        .map(|k| {
+            let from_s = f64::from(k / 6) * 3e-3;
+            let joint = 1 + k % 6;
+            let until_s = from_s + 2e-3;
+            format!("\"pot-noisy:joint{joint}=1@{from_s:.4} s .. {until_s:.4} s\"")
+        })
+        .collect();
+    let scenario = format!(
+        "name = \"many\"\ndescription = \"\"\nrobot = \"wheeleg-2003\"\nduration = \"2 s\"\nseed = 1\n\
+         targets = \"none\"\nfaults = [{}]\n[motion]\nkind = \"stand\"\n",
+        faults.join(", ")
+    );
+    place.write("faults.toml", &scenario);
+    let (code, text) = place.said(&["run", "faults.toml", "--out", "faults"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(
+        text.matches("fault   pot-noisy:joint").count(),
+        20,
+        "{text}"
+    );
+    assert!(
+        text.contains("fault   2980 more are in summary.json"),
+        "{text}"
+    );
+    let page = fs::read_to_string(place.path("faults/report.html")).expect("a page");
+    assert!(page.contains("2980 more are in"));
+    assert!(page.matches("<th>fault</th>").count() == 21);
+    let summary = fs::read_to_string(place.path("faults/summary.json")).expect("a summary");
+    assert_eq!(summary.matches("\"pot-noisy:joint").count(), 3_000);
+}
+
 /// What is read as it comes says that standard output is full, and is done without a word where
 /// nobody reads on.
 #[cfg(target_os = "linux")]

@@ -164,6 +164,69 @@ fn memory_does_not_grow_with_simulated_time() {
     assert!(slope_kb_s < 8.0, "{short} MB, then {long} MB");
 }
 
+/// A walk of 6 s over low blocks, 100 mm apart, and as many `far` ones beyond where it gets to.
+fn over_blocks(folder: &Path, far: usize) -> PathBuf {
+    use std::fmt::Write as _;
+    let path = folder.join(format!("blocks-{far}.toml"));
+    let mut text = String::from(
+        "name = \"blocks\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"6 s\"\nseed = 1\n\
+         targets = \"none\"\n[motion]\nkind = \"walk\"\nspeed = \"120 mm/s\"\nturn = \"0 rad/s\"\n\
+         pattern = \"alternate\"\nlift = \"60 mm\"\nnose = \"-20 mm\"\n\
+         [[bars]]\nmeasure = \"distance\"\ninfo = true\n",
+    );
+    let mut block = |x_m: f64, y_m: f64| {
+        let _ = write!(
+            text,
+            "[[terrain]]\nkind = \"block\"\nx = {{ value = [{x_m:.3}, {:.3}], unit = \"m\" }}\n\
+             y = {{ value = [{y_m:.3}, {:.3}], unit = \"m\" }}\nheight = \"3 mm\"\n",
+            x_m + 0.02,
+            y_m + 0.02
+        );
+    };
+    for i in 0..2_000 {
+        let x_m = 0.25 + f64::from(i / 40) * 0.1;
+        // None below the feet at the start.
+        if !(0.6..0.95).contains(&x_m) {
+            block(x_m, f64::from(i % 40) * 0.1 - 2.0);
+        }
+    }
+    for i in 0..far {
+        block(20.0 + (i / 40) as f64 * 0.1, (i % 40) as f64 * 0.1 - 2.0);
+    }
+    fs::write(&path, text).expect("written");
+    path
+}
+
+/// Of 2,000 parts of the ground and of 100,000 the robot meets the same ones. That a step looks at the near
+/// ones alone is counted where they are looked up, in the plant.
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+fn parts_of_the_ground_that_are_far_away_change_nothing() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let way_mm = [0, 98_000].map(|far| {
+        let begun = Instant::now();
+        let scenario = over_blocks(dir.path(), far);
+        let run = begin(&scenario, &dir.path().join(format!("out-{far}")));
+        let output = run.wait_with_output().expect("ended");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{far}: {stderr}");
+        let summary = json(&output);
+        println!(
+            "{far} far ones: {:.1} s, {:.1} s of them simulating",
+            begun.elapsed().as_secs_f64(),
+            summary["wall_s"].as_f64().expect("a number")
+        );
+        assert_eq!(summary["complete"], true, "{far}");
+        let targets = summary["targets"].as_array().expect("a list");
+        let distance = targets.iter().find(|t| t["unit"] == "m").expect("one");
+        1e3 * distance["value"].as_f64().expect("a number")
+    });
+    println!("{way_mm:?} mm");
+    assert!(way_mm[0] > 200.0, "{way_mm:?}");
+    // Their sums may be rounded in another order.
+    assert!((way_mm[0] - way_mm[1]).abs() < 1.0, "{way_mm:?}");
+}
+
 #[test]
 fn the_log_of_a_killed_run_is_recovered() {
     let dir = tempfile::tempdir().expect("temporary folder");

@@ -299,6 +299,66 @@ fn every_long_command_can_be_stopped_at_any_time() {
     assert!(3 * stopped >= started, "{stopped} of {started}");
 }
 
+/// Bytes of the finished parts of a campaign.
+fn parts(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let names = files_below(out).into_iter().filter(|name| {
+        let parts = name.strip_prefix("parts/");
+        parts.is_some_and(|name| name.len() == "000000.parquet".len())
+    });
+    let read = |name: String| {
+        let bytes = fs::read(out.join(&name)).expect("readable");
+        (name, bytes)
+    };
+    let mut parts: Vec<_> = names.map(read).collect();
+    parts.sort();
+    parts
+}
+
+/// From the instant at which a campaign makes its folder on: what a signal ends leaves nothing, or a
+/// folder with its plan, with which the same command goes on to the same parts.
+#[test]
+fn a_campaign_that_is_stopped_has_written_nothing_or_goes_on() {
+    use std::os::unix::process::ExitStatusExt as _;
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let plan = folder.path().join("plan.toml");
+    let text = "name = \"two\"\nroot = 7\nblock = 1\nsamples = 2\n[base]\nscenario = \"stand\"\n\
+                [factor.droop]\nparameter = \"robot.supply.droop\"\n\
+                uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
+    fs::write(&plan, text).expect("written");
+    let arguments = ["campaign", "run", &plan.to_string_lossy()].map(str::to_owned);
+    let arguments = arguments.each_ref().map(String::as_str);
+    let whole = folder.path().join("whole");
+    assert!(end(start(&whole, &arguments, Stdio::null)).status.success());
+    let whole = parts(&whole);
+    assert_eq!(whole.len(), 2);
+    let mut stopped = 0;
+    for instant in 0..tries(6, 40) {
+        let out = folder.path().join(format!("out{instant}"));
+        let mut child = start(&out, &arguments, Stdio::piped);
+        // No sleep: the first file is there within a millisecond of the folder.
+        while !out.exists() && child.try_wait().expect("status").is_none() {
+            std::hint::spin_loop();
+        }
+        std::thread::sleep(Duration::from_micros(300 * instant as u64));
+        signal(&child, ["TERM", "HUP"][instant % 2]);
+        let output = end(child);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        if output.status.signal().is_some() {
+            assert!(!out.exists(), "{:?} {stderr}", files_below(&out));
+            continue;
+        }
+        let code = output.status.code();
+        assert!(matches!(code, Some(0 | 75)), "{instant}: {code:?} {stderr}");
+        assert!(out.join("plan.json").exists(), "{instant}: {stderr}");
+        let again = end(start(&out, &arguments, Stdio::piped));
+        let stderr = String::from_utf8_lossy(&again.stderr);
+        assert!(again.status.success(), "{instant}: {stderr}");
+        assert!(parts(&out) == whole, "{instant}: other parts");
+        stopped += u32::from(code == Some(75));
+    }
+    assert!(stopped > 0, "none was stopped on its way");
+}
+
 /// Paths of all files below a folder, from it.
 pub(crate) fn files_below(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();

@@ -69,7 +69,8 @@ fn main() {
     let begun = Instant::now();
     let large = plan(500_000);
     let cases = Cases::new(&large).expect("a plan");
-    let store = Store::create(folder.path(), PlanFile::of(&large, 10.0)).expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&large, 10.0), &Stop::default())
+        .expect("a folder");
     run(&store, &cases, &options(1), &computed).expect("it runs");
     println!(
         "first row of {} cases: {:.3} s, {:.0} MB",
@@ -88,7 +89,8 @@ fn main() {
     let small = plan(rows / 2);
     let cases = Cases::new(&small).expect("a plan");
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Store::create(folder.path(), PlanFile::of(&small, 10.0)).expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&small, 10.0), &Stop::default())
+        .expect("a folder");
     let begun = Instant::now();
     run(&store, &cases, &options(rows), &computed).expect("it runs");
     let each_ms = begun.elapsed().as_secs_f64() * 1e3 / rows as f64;

@@ -55,7 +55,7 @@ impl<'a> Cases<'a> {
     ///
     /// # Errors
     /// [`CampaignError::Config`] if one of them is wrong, [`CampaignError::Refused`] if the
-    /// sampler cannot draw so many factors.
+    /// sampler cannot draw so many factors, or the table would have too many columns.
     pub fn new(plan: &'a Plan) -> Result<Self, CampaignError> {
         let resolver = Resolver::new(plan)?;
         let columns = Columns::of(plan, &resolver)?;

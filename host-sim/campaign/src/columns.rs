@@ -2,10 +2,11 @@
 //! same.
 
 use serde::{Deserialize, Serialize};
-use wheeleg_config::plan::{Factor, Plan, Resolver, Sets, Value, Values};
+use wheeleg_config::plan::{Distribution, Factor, Plan, Resolver, Sets, Value, Values};
 use wheeleg_studies::analysis::Analyser;
 
 use crate::CampaignError;
+use crate::pages::{MOST_COLUMNS, NAMES_MOST};
 
 /// Key of the columns in what a file says of itself.
 pub(crate) const FACT: &str = "wheeleg.columns";
@@ -129,7 +130,8 @@ impl Columns {
     /// Those of a plan. Targets are those of all its scenarios.
     ///
     /// # Errors
-    /// [`CampaignError::Config`] if a scenario or robot is wrong.
+    /// [`CampaignError::Config`] if a scenario or robot is wrong, [`CampaignError::Refused`] if there are
+    /// too many columns, or names that are too long.
     pub fn of(plan: &Plan, resolver: &Resolver<'_>) -> Result<Self, CampaignError> {
         let plain = |list: &[(&str, Kind, &str, &str)]| -> Vec<Column> {
             let columns = list.iter();
@@ -165,11 +167,41 @@ impl Columns {
             }
         }
         let factors = plan.factors.iter().map(|f| f.name.clone()).collect();
-        Ok(Self {
+        let columns = Self {
             all,
             factors,
             targets,
-        })
+        };
+        columns.ensure_readable(plan)?;
+        Ok(columns)
+    }
+
+    /// A table that nobody could read is not begun.
+    fn ensure_readable(&self, plan: &Plan) -> Result<(), CampaignError> {
+        let file = &plan.sources.plan.file;
+        let count = self.all.len();
+        if count > MOST_COLUMNS {
+            return Err(CampaignError::refused(
+                format!(
+                    "the plan {file} makes a table of {count} columns, for {} factors and {} targets with \
+                     two each: allowed are up to {MOST_COLUMNS}",
+                    self.factors.len(),
+                    self.targets.len()
+                ),
+                "leave out factors, or share them out to several plans",
+            ));
+        }
+        let names: usize = plan.factors.iter().map(longest_name).sum();
+        if names > NAMES_MOST {
+            return Err(CampaignError::refused(
+                format!(
+                    "the plan {file} puts names of up to {names} bytes into one row of its table: allowed \
+                     are up to {NAMES_MOST}"
+                ),
+                "give its names and paths in fewer characters: a path may begin in the folder of the plan",
+            ));
+        }
+        Ok(())
     }
 
     /// Those of a file, by their order.
@@ -212,6 +244,20 @@ fn factor_column(factor: &Factor) -> Column {
         }
     };
     Column::new(&name, kind, &factor.unit, &meaning)
+}
+
+/// Bytes of the longest name that a factor gives a row; 0 where its values are none.
+fn longest_name(factor: &Factor) -> usize {
+    let name = |value: &Value| match value {
+        Value::Text(name) => name.len(),
+        Value::Number(_) | Value::Flag(_) => 0,
+    };
+    let longest = match &factor.values {
+        Values::Grid(list) => list.iter().map(name).max(),
+        Values::Drawn(Distribution::Choice(list)) => list.iter().map(|c| name(&c.value)).max(),
+        Values::Drawn(_) => None,
+    };
+    longest.unwrap_or(0)
 }
 
 /// Values at which each scenario and each robot is seen once, the other factors in their middle.

@@ -76,6 +76,15 @@ fn table_of(
         ));
     };
     for store in &stores {
+        if store.owns(out) {
+            return Err(CampaignError::refused(
+                format!(
+                    "`{}` would take the place of a file of the campaign itself",
+                    out.display()
+                ),
+                "give another file with --out FILE",
+            ));
+        }
         if store.plan().hash != first.plan().hash || store.plan().program != first.plan().program {
             return Err(CampaignError::refused(
                 format!(
@@ -348,7 +357,8 @@ mod tests {
         let sources = Sources::load(&file.to_string_lossy()).expect("read");
         let plan = Plan::of(sources).expect("a plan");
         let columns = Cases::new(&plan).expect("cases").columns().clone();
-        let store = Store::create(folder.path(), PlanFile::of(&plan, 1.0)).expect("a folder");
+        let store = Store::create(folder.path(), PlanFile::of(&plan, 1.0), &Stop::default())
+            .expect("a folder");
         let write = |path: &Path, cases: std::ops::Range<u64>| {
             let rows: Vec<Row> = cases.map(|index| row(index, &columns)).collect();
             let bytes = part::bytes(&columns, &store.plan().hash, &rows);

@@ -12,8 +12,14 @@ use wheeleg_config::plan::MOST_IN_BLOCK;
 pub(crate) const GROUP_ROWS: usize = 65_536;
 /// Most rows of a row group that is read: earlier programs ended a group after the block that filled it.
 const MOST_ROWS: u64 = GROUP_ROWS as u64 - 1 + MOST_IN_BLOCK;
-/// Cells for each byte of a file. A row has some 40 bytes that do not pack: its case and its seed.
+/// Cells for each byte of a file.
 const CELLS_PER_BYTE: u64 = 32;
+/// Bytes of a row that do not pack: its case, with its length.
+const ROW_BYTES: u64 = 32;
+/// Most columns of a table: one of empty cells has as many for each byte as can be read.
+pub(crate) const MOST_COLUMNS: usize = (CELLS_PER_BYTE * ROW_BYTES) as usize;
+/// Most bytes of the names that a plan puts into one row.
+pub(crate) const NAMES_MOST: usize = 1500;
 /// Snappy packs 64 bytes in 3 at best.
 const MOST_PACKED: usize = 22;
 /// Plain, two names of a dictionary, and runs: no value is made of others.

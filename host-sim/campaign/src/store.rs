@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
+use wheeleg_studies::study::Stop;
 
 use crate::part::NotAPart;
 use crate::row::Row;
@@ -227,12 +228,14 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates the folder, or goes on with one of the same plan and program.
+    /// Creates the folder, or goes on with one of the same plan and program. From here on there is
+    /// something to finish: a signal that ends the program before it finds nothing written.
     ///
     /// # Errors
     /// [`CampaignError::Refused`] if it is one of another plan or program, which is named;
     /// [`CampaignError::Output`] if it cannot be written.
-    pub fn create(folder: &Path, plan: PlanFile) -> Result<Self, CampaignError> {
+    pub fn create(folder: &Path, plan: PlanFile, stop: &Stop) -> Result<Self, CampaignError> {
+        stop.begin();
         for name in ["parts", "attempts"] {
             let path = folder.join(name);
             fs::create_dir_all(&path)
@@ -282,6 +285,21 @@ impl Store {
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Whether a path is that of one of its own files, or would be among them.
+    pub(crate) fn owns(&self, path: &Path) -> bool {
+        let one = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => false,
+        };
+        let parent = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let mut own = ["parts", "attempts"].into_iter();
+        one(path, &self.folder.join(PLAN_FILE))
+            || own.any(|name| one(parent, &self.folder.join(name)))
     }
 
     /// Its plan.

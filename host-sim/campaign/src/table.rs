@@ -22,7 +22,7 @@ use crate::panics::caught;
 use crate::{CampaignError, pages};
 
 /// Bytes of text for each byte of a file: many rows may share one. A row has some 40 bytes that do not
-/// pack, and its texts are cut ([`crate::row::ERROR_MOST`]) or those of a plan, which have an end.
+/// pack, and its texts are cut ([`crate::row::ERROR_MOST`]) or those of a plan ([`crate::pages::NAMES_MOST`]).
 const TEXT_PER_BYTE: u64 = 64;
 
 /// Values of one column; `None` is null.
@@ -449,6 +449,38 @@ fn read_column<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pages::{MOST_COLUMNS, NAMES_MOST};
+    use crate::row::ERROR_MOST;
+
+    /// The widest table and the longest names that a plan may have, with nothing else in its rows: what is
+    /// written is read.
+    #[test]
+    fn the_widest_table_is_read() {
+        const ROWS: u128 = 5_000;
+        let column = |i: usize| {
+            let kind = if i < 2 { Kind::Text } else { Kind::Number };
+            Column::new(&format!("c{i}"), kind, "", "")
+        };
+        let columns: Vec<Column> = (0..MOST_COLUMNS).map(column).collect();
+        let case = |n: u128| {
+            let hash = blake3::hash(&n.to_le_bytes()).to_hex();
+            Some(hash[..32].to_owned())
+        };
+        let mut data = vec![Data::Text((0..ROWS).map(case).collect())];
+        let text = "n".repeat(NAMES_MOST + ERROR_MOST + 100);
+        data.push(Data::Text(vec![Some(text); ROWS as usize]));
+        let blank = Data::Number(vec![None; ROWS as usize]);
+        data.resize(MOST_COLUMNS, blank);
+        let table = Table { columns, data };
+        let described = serde_json::to_string(&table.columns).expect("JSON");
+        let facts = [(crate::columns::FACT, described.as_str())];
+        let file = tempfile::tempfile().expect("a file");
+        let mut writer = TableWriter::new(file, &table.columns, &facts).expect("a writer");
+        writer.write(&table).expect("written");
+        let file = writer.finish().expect("finished");
+        let read = TableReader::new(file).and_then(|reader| reader.read());
+        assert!(read.expect("a table") == table);
+    }
 
     /// Names, texts and what else a file says come back as they were, whatever they hold.
     #[test]

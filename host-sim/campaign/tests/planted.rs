@@ -101,7 +101,7 @@ fn run_in(
     simulate: &(dyn Fn(&Case) -> Option<Outcome> + Sync),
 ) {
     let cases = Cases::new(plan).expect("a plan");
-    let store = Store::create(folder, PlanFile::of(plan, 1.0)).expect("a folder");
+    let store = Store::create(folder, PlanFile::of(plan, 1.0), &Stop::default()).expect("a folder");
     run(&store, &cases, options, simulate).expect("it runs");
 }
 

@@ -7,6 +7,7 @@ use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
 use super::error::{ConfigError, Problem, word};
+pub use super::source::Source;
 use super::terrain::Files;
 use super::{RobotConfig, Scenario, closest};
 
@@ -45,15 +46,6 @@ pub const DATA: &[(&str, &[u8])] = &[(
     "height-map.csv",
     include_bytes!("../../scenarios/height-map.csv"),
 )];
-
-/// A file before it is read: its name, for messages, and its text.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Source {
-    /// Name of the file.
-    pub file: String,
-    /// What stands in it.
-    pub text: String,
-}
 
 /// The text of a scenario, by built-in name or path.
 ///

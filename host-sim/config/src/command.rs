@@ -3,7 +3,7 @@
 
 use fixed::types::I16F16;
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits, Value};
-use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given, TABLE};
+use wheeleg_master::command::{ArgumentError, Command, CommandCode, CommandInfo, Given, TABLE};
 
 use super::error::ConfigError;
 use super::node;
@@ -75,6 +75,20 @@ pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Opt
     }
     match Command::build(code, &given) {
         Ok(command) => Some(command),
+        Err(ArgumentError::Relation(error)) => {
+            let fields: Vec<String> = error
+                .arguments()
+                .map(|argument| entry.field_path(argument.name))
+                .collect();
+            let fields: Vec<&str> = fields.iter().map(String::as_str).collect();
+            let ranges = error
+                .arguments()
+                .map(|argument| format!("`{}`: {}", argument.name, argument.range()));
+            let ranges: Vec<String> = ranges.collect();
+            let help = format!("each for itself may be {}", ranges.join(", "));
+            r.contradiction(&fields, &error.to_string(), &help, Vec::new());
+            None
+        }
         Err(error) => {
             let message = format!("`{}`: {error}", entry.path);
             r.problem(Some(entry.span.clone()), message, "in this section", None);

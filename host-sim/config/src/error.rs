@@ -106,6 +106,7 @@ pub struct Problem {
     span: Option<Range<usize>>,
     help: Option<String>,
     advice: Vec<Vec<Advised>>,
+    relation: Option<&'static str>,
 }
 
 impl Problem {
@@ -130,6 +131,7 @@ impl Problem {
             span: shown.then_some(span),
             help: help.map(shortened),
             advice: Vec::new(),
+            relation: None,
         }
     }
 
@@ -144,6 +146,7 @@ impl Problem {
             span: None,
             help: help.map(shortened),
             advice: Vec::new(),
+            relation: None,
         }
     }
 
@@ -168,8 +171,18 @@ impl Problem {
         &self.advice
     }
 
+    /// Name of the relation that does not hold ([`RELATIONS`](crate::RELATIONS)), if it is one.
+    #[must_use]
+    pub fn relation(&self) -> Option<&'static str> {
+        self.relation
+    }
+
     pub(crate) fn advise(&mut self, advice: Vec<Vec<Advised>>) {
         self.advice = advice;
+    }
+
+    pub(crate) fn breaks(&mut self, relation: &'static str) {
+        self.relation = Some(relation);
     }
 
     pub(crate) fn position(&self) -> usize {

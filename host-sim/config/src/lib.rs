@@ -38,6 +38,7 @@ mod relations;
 mod relief;
 mod robot;
 mod scenario;
+mod source;
 mod suggest;
 pub mod terrain;
 pub mod timing;
@@ -61,5 +62,7 @@ pub use relief::Relief;
 pub use robot::{
     BusParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,
 };
-pub use scenario::{EventAction, LegChoice, Motion, Scenario, ScenarioEvent, TARGETS, TargetSet};
+pub use scenario::{
+    EventAction, LegChoice, Motion, Origin, Scenario, ScenarioEvent, TARGETS, TargetSet,
+};
 pub use suggest::closest;

@@ -1,7 +1,7 @@
 //! The ground around the start as heights on a grid, for drawings that need no more.
 
 use serde::Serialize;
-use wheeleg_plant::terrain::Terrain;
+use wheeleg_plant::terrain::{Index, Surface as _, Terrain};
 
 /// Distance between heights \[m\].
 const STEP_M: f64 = 0.05;
@@ -28,9 +28,15 @@ impl Relief {
         let [[x0, x1], [y0, y1]] = EXTENT_M;
         let count = |from: f64, to: f64| ((to - from) / STEP_M).round() as usize + 1;
         let (columns, rows) = (count(x0, x1), count(y0, y1));
+        let index = Index::new(&terrain.parts);
         let height = |row: usize, column: usize| {
             let [x, y] = [(x0, column), (y0, row)].map(|(from, k)| from + k as f64 * STEP_M);
-            terrain.height_m(x, y).map(|z| (z * 1e3).round() as i32)
+            let mut top_m = None;
+            index.above([x, y], |part| {
+                let part_m = terrain.parts[part as usize].shape.height_m(x, y);
+                top_m = part_m.into_iter().chain(top_m).reduce(f64::max);
+            });
+            top_m.map(|z| (z * 1e3).round() as i32)
         };
         let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
         Self {

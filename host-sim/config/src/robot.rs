@@ -1,6 +1,7 @@
 //! A robot: everything about the machine that a run needs, in SI units.
 
 use wheeleg_master::config::UniqueId;
+use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_plant::dynamics::floating::FloatingParams;
 use wheeleg_plant::{Plant, PlantParams};
 use wheeleg_protocol::link::{BAUD, CYCLE_US};
@@ -159,6 +160,29 @@ impl RobotConfig {
     #[must_use]
     pub fn floating_params(&self) -> FloatingParams {
         self.plant.floating()
+    }
+
+    /// Dimensions as the master is told them. It cannot be told strokes: its commands are limited to
+    /// those of the paper's leg.
+    #[must_use]
+    pub fn walk_geometry(&self) -> WalkGeometry {
+        let single = |m: f64| m as f32;
+        let plant = &self.plant;
+        let [hip_x_m, hip_y_m, _] = plant.body.o4_m.map(single);
+        let mut geometry = WalkGeometry {
+            hip_x_m,
+            hip_y_m,
+            track_m: single(plant.spatial.track_m),
+            nail_m: single(plant.contacts.foot.nails.length_m),
+            ..WalkGeometry::default()
+        };
+        let (leg, told) = (&mut geometry.leg, plant.leg_parameters(0));
+        leg.crank_m = single(told.crank_m);
+        leg.p4_m = told.p4_m.map(single);
+        leg.stroke_zero_m = told.stroke_zero_m.map(single);
+        leg.min_foot_radius_m = single(told.min_foot_radius_m);
+        leg.min_cos_theta3 = single(told.min_cos_theta3);
+        geometry
     }
 
     /// Fingerprint of all parameters: BLAKE3 over name, value and unit, in the

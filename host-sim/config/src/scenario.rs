@@ -1,5 +1,7 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
+use std::sync::Arc;
+
 use wheeleg_master::argument;
 use wheeleg_master::behaviour::{Behaviour, Behaviours};
 use wheeleg_master::command::{Command, CommandCode};
@@ -12,6 +14,7 @@ use super::keys;
 use super::params::{FieldSpec, ParameterInfo};
 use super::quantity::{Dimension, pretty};
 use super::reader::{Entry, Reader};
+use super::source::Source;
 use super::terrain::{self, Files, Ground};
 use crate::faults::FaultSpec;
 
@@ -49,6 +52,17 @@ pub enum Motion {
     },
 }
 
+impl Motion {
+    /// The leg that moves; the left one where it does not say.
+    #[must_use]
+    pub const fn stepping_leg(&self) -> LegChoice {
+        match self {
+            Self::SquareWave { leg } | Self::Sinusoid { leg, .. } => *leg,
+            Self::Stand | Self::Walk(_) => LegChoice::Left,
+        }
+    }
+}
+
 /// What happens at a stated time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EventAction {
@@ -62,6 +76,16 @@ pub enum EventAction {
     Command(Command),
 }
 
+/// Where something is from; two things that differ in it alone are equal.
+#[derive(Debug, Clone, Default)]
+pub struct Origin<T>(pub T);
+
+impl<T> PartialEq for Origin<T> {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// A timed event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenarioEvent {
@@ -69,6 +93,8 @@ pub struct ScenarioEvent {
     pub at_s: f64,
     /// What.
     pub action: EventAction,
+    /// Its place among the events of its file; `None`: it is from no file.
+    pub place: Origin<Option<usize>>,
 }
 
 /// Which of the paper's and the project's targets a run is held against.
@@ -120,6 +146,8 @@ pub struct Scenario {
     pub targets: TargetSet,
     /// What its way over the ground is held against, beside the targets.
     pub bars: Vec<Bar>,
+    /// The file that it was read from.
+    pub source: Origin<Arc<Source>>,
 }
 
 const TOP: [&str; 12] = keys::names(&keys::TOP);
@@ -170,12 +198,16 @@ impl Scenario {
     ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
-        let scenario = read(&mut r, files);
+        let source = Source {
+            file: file.to_owned(),
+            text: text.to_owned(),
+        };
+        let scenario = read(&mut r, files, Origin(Arc::new(source)));
         r.finish(&what, scenario)
     }
 }
 
-fn read(r: &mut Reader, files: &Files<'_>) -> Option<Scenario> {
+fn read(r: &mut Reader, files: &Files<'_>, source: Origin<Arc<Source>>) -> Option<Scenario> {
     let top = r.table("")?;
     r.reject_unknown(&top, &TOP);
     let name = r.name(&top, "name");
@@ -208,7 +240,13 @@ fn read(r: &mut Reader, files: &Files<'_>) -> Option<Scenario> {
     let mut events: Vec<ScenarioEvent> = Vec::new();
     for i in 0..r.array_len("events") {
         let entry = r.entry("events", i);
-        events.extend(event(r, &entry, duration));
+        events.extend(
+            event(r, &entry, duration).map(|(at_s, action)| ScenarioEvent {
+                at_s,
+                action,
+                place: Origin(Some(i)),
+            }),
+        );
     }
     events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let ground = terrain::read(r, &TOP, files);
@@ -236,6 +274,7 @@ fn read(r: &mut Reader, files: &Files<'_>) -> Option<Scenario> {
         faults,
         targets: targets?,
         bars,
+        source,
     })
 }
 
@@ -329,7 +368,7 @@ enum ActionKind {
     Command,
 }
 
-fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<ScenarioEvent> {
+fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<(f64, EventAction)> {
     let latest = duration_s.unwrap_or(MAX_DURATION_S);
     let at = FieldSpec::scalar(
         "at",
@@ -370,8 +409,5 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<Scena
             _ => EventAction::ClearFault,
         }
     };
-    Some(ScenarioEvent {
-        at_s: at_s?,
-        action,
-    })
+    Some((at_s?, action))
 }

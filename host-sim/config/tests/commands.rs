@@ -244,8 +244,18 @@ fn gait_parameters_that_contradict_each_other_are_refused_on_reading() {
     assert_told(
         &event(row, Some(("period", "\"1 s\""))),
         &[
-            "my.toml:9: `events[0]`: `push` is 2 s and must be less than `period`, which is 1 s",
-            "allowed: ",
+            "my.toml:14: `events[0].period` = 1 s (line 14) and `events[0].push` = 2 s (line 18) do not",
+            "`push` is 2 s and must be less than `period`, which is 1 s; allowed: ",
+            "`period`: 0.5 to 60 s, `push`: 0 to 60 s",
+        ],
+    );
+    assert_told(
+        &event(row, Some(("touchdown_speed", "\"10 mm/s\""))),
+        &[
+            "my.toml:27: `events[0].touchdown_speed` = 10 mm/s (line 27), `events[0].lower` = 1 s (line 17) ",
+            "and `events[0].push` = 2 s (line 18) do not fit together",
+            "the last 15 mm of the lowering take 1.5 s, but from `lower` to `push` there are 1 s",
+            "allowed: `touchdown_speed` 0, or `push` more than 1.5 s after `lower`",
         ],
     );
 }

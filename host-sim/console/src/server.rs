@@ -116,14 +116,27 @@ impl Server {
     /// Powers the robot up and lets clients in.
     ///
     /// # Errors
+    /// As [`Self::start_with`].
+    pub fn start(options: Options) -> Result<Self, ConsoleError> {
+        Self::start_with(options, || ())
+    }
+
+    /// The same; `begins` is called before the first file is written, and after the last one that is
+    /// given was read.
+    ///
+    /// # Errors
     /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
     /// not there, the robot cannot be built, or the recording's folder cannot be made.
-    pub fn start(options: Options) -> Result<Self, ConsoleError> {
-        Self::start_among(options, |peer| peer.ip())
+    pub fn start_with(options: Options, begins: impl FnOnce()) -> Result<Self, ConsoleError> {
+        Self::start_among(options, |peer| peer.ip(), begins)
     }
 
     /// The same, where `address_of` says which address a client has.
-    fn start_among(options: Options, address_of: AddressOf) -> Result<Self, ConsoleError> {
+    fn start_among(
+        options: Options,
+        address_of: AddressOf,
+        begins: impl FnOnce(),
+    ) -> Result<Self, ConsoleError> {
         let Options {
             live,
             recordings,
@@ -210,6 +223,7 @@ impl Server {
         };
         let (contact_sink, contacts) = foxglove::contacts();
         let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
+        begins();
         let (feed, recordings) = record::start(&recordings, about, record)?;
         let shared = Arc::clone(&recordings.shared);
         let recorded = Arc::clone(&shared);
@@ -485,7 +499,7 @@ mod tests {
             viewer_pages: Vec::new(),
             viewers_write: false,
         };
-        let server = Server::start_among(options, address_of).expect("it starts");
+        let server = Server::start_among(options, address_of, || ()).expect("it starts");
         let url = Url::parse(&server.address().to_string()).expect("an address");
         let connect = |name| Client::connect(&url, "control", name, &keys.control).expect("let in");
         let (mut driver, mut other) = (connect("driver"), connect("other"));

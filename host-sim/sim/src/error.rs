@@ -2,6 +2,7 @@
 
 use miette::Diagnostic;
 use thiserror::Error;
+use wheeleg_config::ConfigError;
 use wheeleg_remote_host::RemoteError;
 use wheeleg_telemetry::LogError;
 
@@ -37,6 +38,11 @@ pub enum SimError {
         /// The parameters that most likely did it.
         help: String,
     },
+
+    /// The robot cannot do what the scenario asks for.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Config(#[from] Box<ConfigError>),
 
     /// A board elsewhere failed.
     #[error(transparent)]

@@ -68,7 +68,8 @@ impl Session {
     /// Powers the robot up in the start pose of the scenario.
     ///
     /// # Errors
-    /// [`SimError`] if a part refuses its parameters or a fault that is built in cannot be.
+    /// [`SimError`] if the robot cannot do what the scenario asks for, a part refuses its parameters, or
+    /// a fault that is built in cannot be.
     pub fn new(
         boards: Boards,
         scenario: &Scenario,
@@ -86,6 +87,7 @@ impl Session {
         seed: u64,
         live: bool,
     ) -> Result<Self, SimError> {
+        scenario.check_with(robot).map_err(Box::new)?;
         let plant = setup::plant(scenario, robot);
         let master = setup::master(scenario, robot);
         let nodes = boards.nodes.clone();

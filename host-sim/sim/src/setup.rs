@@ -8,7 +8,6 @@ use wheeleg_master::config::{SwitchFrame, WheelDrive};
 use wheeleg_master::layer0::odometry::WheelGeometry;
 use wheeleg_master::layer1::homing::HomingConfig;
 use wheeleg_master::layer1::params::Pattern;
-use wheeleg_master::layer1::walk::WalkGeometry;
 use wheeleg_node::parameters::JointParameters;
 use wheeleg_plant::PlantParams;
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -26,14 +25,6 @@ const WALK_S5_M: f64 = 0.165;
 /// Places of a leg's cylinders.
 const YAW: usize = 0;
 const VERTICAL: usize = 2;
-
-/// The leg that moves; the left one where the scenario does not say.
-fn stepping_leg(scenario: &Scenario) -> LegChoice {
-    match scenario.motion {
-        Motion::SquareWave { leg } | Motion::Sinusoid { leg, .. } => leg,
-        Motion::Stand | Motion::Walk(_) => LegChoice::Left,
-    }
-}
 
 fn millimetres(m: f64) -> PositionMm {
     PositionMm::from_f64(m * 1e3)
@@ -77,7 +68,7 @@ pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
             }
             (feet_out, feet_out)
         }
-        _ if stepping_leg(scenario) == LegChoice::Left => (home, held),
+        _ if scenario.motion.stepping_leg() == LegChoice::Left => (home, held),
         _ => (held, home),
     };
     plant.initial_stroke_m[..3].copy_from_slice(&left);
@@ -96,7 +87,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
     MasterConfig {
         gait: robot
             .gait
-            .of_master(Pattern::Single(side(stepping_leg(scenario)))),
+            .of_master(Pattern::Single(side(scenario.motion.stepping_leg()))),
         homing: HomingConfig {
             slew_mm_s: VelocityMmS::from_f64(robot.homing.slew_m_s * 1e3),
             tolerance_mm: millimetres(robot.homing.tolerance_m),
@@ -113,7 +104,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         } else {
             WheelDrive::Profile
         },
-        walk: walk_geometry(robot),
+        walk: robot.walk_geometry(),
         // The plant's soles name left and right as the robot looks, on both legs.
         switch_frame: SwitchFrame::Robot,
         behaviours: scenario.behaviours,
@@ -121,28 +112,6 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
         parameters: sums(robot),
         ..MasterConfig::default()
     }
-}
-
-/// Dimensions as the master is told them. It cannot be told strokes: its commands are limited to
-/// those of the paper's leg.
-fn walk_geometry(robot: &RobotConfig) -> WalkGeometry {
-    let single = |m: f64| m as f32;
-    let plant = &robot.plant;
-    let [hip_x_m, hip_y_m, _] = plant.body.o4_m.map(single);
-    let mut geometry = WalkGeometry {
-        hip_x_m,
-        hip_y_m,
-        track_m: single(plant.spatial.track_m),
-        nail_m: single(plant.contacts.foot.nails.length_m),
-        ..WalkGeometry::default()
-    };
-    let (leg, told) = (&mut geometry.leg, plant.leg_parameters(0));
-    leg.crank_m = single(told.crank_m);
-    leg.p4_m = told.p4_m.map(single);
-    leg.stroke_zero_m = told.stroke_zero_m.map(single);
-    leg.min_foot_radius_m = single(told.min_foot_radius_m);
-    leg.min_cos_theta3 = single(told.min_cos_theta3);
-    geometry
 }
 
 /// Sample time of the wheel boards with the robot's parameters, µs: both ends count speeds per

@@ -16,7 +16,7 @@ use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
 use wheeleg_report::output::Folder;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_scene::urdf;
-use wheeleg_sim::SimError;
+use wheeleg_sim::{Boards, Session, SimError};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::suite::TestRig;
 use wheeleg_studies::axis_sim::{Kind, Node, design, plant_check};
@@ -181,6 +181,18 @@ fn robots(folder: &Path, all: &mut Vec<Driven>) {
     let no_file = wheeleg_console::ConsoleError::from(no_file);
     let words = vec!["none.toml"];
     all.push(("ConsoleError::Config", Box::new(no_file), words));
+    let mut short = robot();
+    for cylinder in &mut short.plant.cylinders {
+        cylinder.stroke_m = 0.17;
+    }
+    let walk = builtin::scenario("walk").expect("built in");
+    let asked = Session::new(Boards::default(), &walk, &short, 1).err();
+    let words = vec!["`motion.kind`", "`cylinder.stroke`", "into their stops"];
+    all.push((
+        "SimError::Config",
+        Box::new(asked.expect("too short")),
+        words,
+    ));
     let (scenario, exploding) = crate::explosion::drives_without_torque();
     let exploded = failure(&scenario, &exploding, &folder.join("exploded"));
     let words = vec![
@@ -272,7 +284,7 @@ fn campaigns(folder: &Path, all: &mut Vec<Driven>) {
     ));
     let plan = Plan::load("three-step-spread").expect("built in");
     let file = || PlanFile::of(&plan, 10.0);
-    let full = Store::create(Path::new(NO_FOLDER), file()).err();
+    let full = Store::create(Path::new(NO_FOLDER), file(), &Stop::default()).err();
     let words = vec![NO_FOLDER];
     all.push((
         "CampaignError::Output",
@@ -289,7 +301,7 @@ fn campaigns(folder: &Path, all: &mut Vec<Driven>) {
         words,
     ));
     let kept: PathBuf = folder.join("kept");
-    let store = Store::create(&kept, file()).expect("made");
+    let store = Store::create(&kept, file(), &Stop::default()).expect("made");
     let none = Submission::new(&store, "x", Path::new("wheeleg"), 0, 10.0);
     let words = vec!["0 shards"];
     all.push((

@@ -208,6 +208,12 @@ fn commands(all: &mut Vec<Reason>) {
     };
     let times = vec!["`period`", "2 s", "1 s", "allowed: "];
     add("ParamError::PushTooLong", push, times);
+    let slow = ParamError::TouchdownTooSlow {
+        needs_us: 2_000_000,
+        has_us: 1_000_000,
+    };
+    let times = vec!["`touchdown_speed`", "15 mm", "2 s", "1 s", "allowed: "];
+    add("ParamError::TouchdownTooSlow", slow, times);
     let endless = ParamError::NotFinite(&argument::TRAVEL);
     let allowed = vec!["`travel`", "allowed: "];
     add("ParamError::NotFinite", endless, allowed.clone());

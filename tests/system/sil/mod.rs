@@ -6,7 +6,8 @@
 use std::ops::ControlFlow;
 
 use wheeleg_config::{
-    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
+    EventAction, LegChoice, Motion, Origin, RobotConfig, Scenario, ScenarioEvent, TargetSet,
+    builtin,
 };
 use wheeleg_protocol::param::JointParam;
 use wheeleg_remote_host::{Nodes, PilSummary};
@@ -54,6 +55,7 @@ fn with_events(motion: Motion, duration_s: f64, events: &[(f64, EventAction)]) -
             .map(|(at_s, action)| ScenarioEvent {
                 at_s: *at_s,
                 action: action.clone(),
+                place: Origin::default(),
             })
             .collect(),
         targets: TargetSet::None,

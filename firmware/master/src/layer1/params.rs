@@ -5,6 +5,7 @@ use core::fmt;
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
+use super::square::GUARD_MM;
 use crate::argument::{self, Argument, OutOfRange, Seconds, Value};
 use crate::contact::Side;
 
@@ -123,6 +124,13 @@ pub enum ParamError {
         /// Time available, µs.
         has_us: u32,
     },
+    /// The slow part of the lowering alone takes as long as there is until the push.
+    TouchdownTooSlow {
+        /// Time needed, µs.
+        needs_us: u32,
+        /// Time available, µs.
+        has_us: u32,
+    },
     /// A number is not finite.
     NotFinite(
         /// Which.
@@ -154,6 +162,13 @@ impl ParamError {
                 Some(&argument::STEP_STROKE),
                 Some(&argument::PUSH_SPEED),
                 Some(&argument::PUSH_ACCELERATION),
+            ],
+            Self::TouchdownTooSlow { .. } => [
+                Some(&argument::TOUCHDOWN_SPEED),
+                Some(&argument::LOWER),
+                Some(&argument::PUSH),
+                None,
+                None,
             ],
             Self::OutOfReach { .. } => [
                 Some(&argument::FORWARD),
@@ -191,6 +206,16 @@ impl fmt::Display for ParamError {
                 "with this `stroke`, `push_speed` and `push_acceleration` the push takes {} s, \
                  but from `push` to the end of the `period` there are {} s; allowed: `period` at \
                  least {} s after `push`",
+                Seconds(needs_us),
+                Seconds(has_us),
+                Seconds(needs_us)
+            ),
+            Self::TouchdownTooSlow { needs_us, has_us } => write!(
+                f,
+                "with this `touchdown_speed` the last {} mm of the lowering take {} s, but from `lower` \
+                 to `push` there are {} s; allowed: `touchdown_speed` 0, or `push` more than {} s after \
+                 `lower`",
+                GUARD_MM.get(),
                 Seconds(needs_us),
                 Seconds(has_us),
                 Seconds(needs_us)
@@ -254,7 +279,10 @@ impl GaitParams {
             then,
             then_us,
         });
-        ranges.chain(order).chain(self.push_too_long())
+        ranges
+            .chain(order)
+            .chain(self.push_too_long())
+            .chain(self.touchdown_too_slow())
     }
 
     /// The values that have a range of their own.
@@ -305,6 +333,22 @@ impl GaitParams {
         );
         let needs_us = super::units::seconds_to_us(push.duration_s());
         (needs_us > has_us).then_some(ParamError::PushTooLong { needs_us, has_us })
+    }
+
+    /// Whether a foot would still be coming down slowly when the push begins. The fast way before
+    /// the slow one ends where a piston arrives, which takes time that nobody knows here.
+    fn touchdown_too_slow(&self) -> Option<ParamError> {
+        let has_us = self
+            .push_us
+            .checked_sub(self.lower_us)
+            .filter(|us| *us > 0)?;
+        let speed_mm_s = self.touchdown_speed_mm_s.get().to_num::<f32>();
+        // At 0 the reference jumps.
+        if speed_mm_s <= 0.0 {
+            return None;
+        }
+        let needs_us = super::units::seconds_to_us(GUARD_MM.get().to_num::<f32>() / speed_mm_s);
+        (needs_us >= has_us).then_some(ParamError::TouchdownTooSlow { needs_us, has_us })
     }
 
     /// Leg that steps in step `k`.

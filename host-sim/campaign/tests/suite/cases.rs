@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use wheeleg_campaign::{Case, Cases, Options, PlanFile, Shard, Store, run, status};
-use wheeleg_config::plan::{Plan, Value};
+use wheeleg_campaign::{CampaignError, Case, Cases, Options, PlanFile, Shard, Store, run, status};
+use wheeleg_config::plan::{Factor, Plan, Value};
 use wheeleg_config::{RobotConfig, builtin};
 use wheeleg_studies::analysis::{Analyser, LegIndices};
+use wheeleg_studies::study::Stop;
 
 use crate::common::{BASE, HEAD, SPREAD, computed, options, plan_of, spread};
 
@@ -223,6 +224,52 @@ fn a_case_that_cannot_be_says_why() {
     assert!(wrong > 0);
 }
 
+/// What could be written and never read is refused with the plan: its columns and its names.
+#[test]
+fn a_plan_whose_table_nobody_could_read_is_refused() {
+    let told = |plan: &Plan| match Cases::new(plan) {
+        Ok(cases) => Err(cases.columns().all.len()),
+        Err(CampaignError::Refused { what, .. }) => Ok(what),
+        Err(other) => panic!("{other}"),
+    };
+    let mut plan = plan_of(&format!("{HEAD}{BASE}{SPREAD}"));
+    let others = told(&plan).expect_err("accepted") - plan.factors.len();
+    let one = plan.factors[0].clone();
+    let many = |count: usize| -> Vec<Factor> {
+        let named = |i| Factor {
+            name: format!("f{i}"),
+            ..one.clone()
+        };
+        (0..count).map(named).collect()
+    };
+    plan.factors = many(1024 - others);
+    assert_eq!(told(&plan), Err(1024));
+    plan.factors = many(1025 - others);
+    let said = told(&plan).expect("too wide");
+    assert!(
+        said.contains("plan.toml makes a table of 1025 columns")
+            && said.contains("allowed are up to 1024"),
+        "{said}"
+    );
+
+    let described = |bytes: usize| {
+        plan_of(&format!(
+            "{HEAD}{BASE}[factor.d]\nparameter = \"scenario.description\"\ngrid = [\"{}\"]\n",
+            "d".repeat(bytes)
+        ))
+    };
+    let mut plan = described(500);
+    let one = plan.factors[0].clone();
+    plan.factors = vec![one.clone(); 3];
+    assert!(told(&plan).is_err());
+    plan.factors.extend(described(1).factors);
+    let said = told(&plan).expect("too long");
+    assert!(
+        said.contains("names of up to 1501 bytes") && said.contains("allowed are up to 1500"),
+        "{said}"
+    );
+}
+
 /// A campaign of as many cases as a plan may have is begun, and its state told, in a moment.
 #[test]
 fn the_largest_plan_is_begun_and_told_in_a_moment() {
@@ -231,7 +278,8 @@ fn the_largest_plan_is_begun_and_told_in_a_moment() {
     let plan = plan_of(text);
     let begun = std::time::Instant::now();
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Store::create(folder.path(), PlanFile::of(&plan, 20.0)).expect("a folder");
+    let store = Store::create(folder.path(), PlanFile::of(&plan, 20.0), &Stop::default())
+        .expect("a folder");
     assert_eq!(store.blocks(), 1_000_000);
     let cases = Cases::new(&plan).expect("a plan");
     let pilot = Options {

@@ -77,7 +77,7 @@ pub(crate) fn run_in(
     simulate: &(dyn Fn(&Case) -> Option<Outcome> + Sync),
 ) -> (Result<Ran, CampaignError>, usize) {
     let cases = Cases::new(plan).expect("a plan");
-    let store = Store::create(folder, PlanFile::of(plan, 1.0)).expect("a folder");
+    let store = Store::create(folder, PlanFile::of(plan, 1.0), &Stop::default()).expect("a folder");
     let count = AtomicUsize::new(0);
     let ran = run(&store, &cases, options, &|case| {
         count.fetch_add(1, Ordering::Relaxed);

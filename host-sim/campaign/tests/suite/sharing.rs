@@ -147,7 +147,7 @@ fn a_pilot_is_taken_up() {
     let complete = merge(&[folder.path().to_owned()], &table, &Stop::default());
     assert!(matches!(complete, Err(CampaignError::Incomplete { .. })));
     let empty = tempfile::tempdir().expect("a folder");
-    Store::create(empty.path(), PlanFile::of(&plan, 1.0)).expect("a folder");
+    Store::create(empty.path(), PlanFile::of(&plan, 1.0), &Stop::default()).expect("a folder");
     let nothing = merge_partial(&[empty.path().to_owned()], &table, &Stop::default());
     assert!(matches!(nothing, Err(CampaignError::Incomplete { .. })));
     let (ran, count) = run_in(folder.path(), &plan, &options(2), &|case| {
@@ -156,6 +156,31 @@ fn a_pilot_is_taken_up() {
     let ran = ran.expect("it runs");
     assert_eq!((ran.found, ran.computed, count), (10, 190, 190));
     assert_eq!(merged(folder.path()), whole(&plan).1);
+}
+
+/// A table takes no place of a part or of the plan.
+#[test]
+fn a_table_is_no_file_of_its_campaign() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = spread(4);
+    let (ran, _) = run_in(folder.path(), &plan, &options(1), &|case| {
+        Some(computed(case))
+    });
+    ran.expect("it runs");
+    let folders = [folder.path().to_owned()];
+    let before = crate::common::parts(folder.path());
+    for name in ["plan.json", "parts/000000.parquet", "parts/x.parquet"] {
+        let told = merge(&folders, &folder.path().join(name), &Stop::default());
+        let told = told.expect_err("refused").to_string();
+        assert!(
+            told.contains(name) && told.contains("of the campaign itself"),
+            "{told}"
+        );
+    }
+    assert_eq!(crate::common::parts(folder.path()), before);
+    let beside = folder.path().join("table.parquet");
+    let merged = merge(&folders, &beside, &Stop::default()).expect("merged");
+    assert_eq!(merged.expect("not stopped").rows, 8);
 }
 
 /// A block is about a minute of work on one core, a start-up of each case included: a thousand short
@@ -173,10 +198,11 @@ fn another_plan_is_refused_and_the_difference_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let plan = spread(4);
     let file = PlanFile::of(&plan, 1.0);
-    Store::create(folder.path(), file.clone()).expect("a folder");
-    Store::create(folder.path(), file.clone()).expect("the same again");
+    Store::create(folder.path(), file.clone(), &Stop::default()).expect("a folder");
+    Store::create(folder.path(), file.clone(), &Stop::default()).expect("the same again");
     let refused = |file: PlanFile| {
-        let error = Store::create(folder.path(), file).expect_err("another campaign");
+        let error =
+            Store::create(folder.path(), file, &Stop::default()).expect_err("another campaign");
         assert_eq!(error.exit_code(), 2);
         error.to_string()
     };

@@ -314,12 +314,13 @@ impl ValueSpec {
 
 fn times(text: &str) -> Result<(f64, Option<f64>), String> {
     let seconds = |t: &str| -> Result<f64, String> {
-        let number = t
+        let trimmed = t.trim();
+        let number = trimmed
             .strip_suffix("ms")
             .map(|n| (n, 1e-3))
-            .or_else(|| t.strip_suffix('s').map(|n| (n, 1.0)));
+            .or_else(|| trimmed.strip_suffix('s').map(|n| (n, 1.0)));
         number
-            .and_then(|(n, unit)| Some(n.parse::<f64>().ok()? * unit))
+            .and_then(|(n, unit)| Some(n.trim_end().parse::<f64>().ok()? * unit))
             .filter(|s| s.is_finite() && *s >= 0.0)
             .ok_or_else(|| format!("`{t}` is not a time from 0 on in s or ms"))
     };

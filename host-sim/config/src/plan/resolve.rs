@@ -171,6 +171,7 @@ impl<'a> Resolver<'a> {
         let (scenario, _) =
             Scenario::parse_with(&scenario.file, &scenario_text.to_string(), &files)?;
         let robot = RobotConfig::parse(&robot.file, &robot_text.to_string())?;
+        scenario.check_with(&robot)?;
         Ok(Resolved {
             robot_json: robot_json(&robot),
             scenario,

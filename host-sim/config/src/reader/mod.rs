@@ -141,19 +141,38 @@ impl Reader {
         help: &str,
         advice: Vec<Vec<Advised>>,
     ) {
-        let mut shown = Vec::new();
-        for path in fields {
-            let listed = self.parameters.iter().find(|p| p.path == *path);
-            let value = listed.map_or(String::new(), |p| {
-                format!(" = {}{}", p.value_text(), suffix(&p.unit))
-            });
-            let line = self.span_of(path).map_or(String::new(), |span| {
-                format!(" (line {})", self.lines.of_byte(span.start))
-            });
-            shown.push(format!("`{path}`{value}{line}"));
-        }
+        let shown: Vec<String> = fields.iter().map(|path| self.shown(path)).collect();
         // A board's parameter may be left at its default.
         let first = fields.iter().find_map(|path| self.span_of(path));
+        self.contradiction_at(first, &shown, (why, help), advice);
+    }
+
+    /// A field with its value and its line, for a message.
+    pub(crate) fn shown(&self, path: &str) -> String {
+        let listed = self.parameters.iter().rev().find(|p| p.path == *path);
+        let value = match (listed, self.item(path)) {
+            (Some(p), _) => format!(" = {}{}", p.value_text(), suffix(&p.unit)),
+            (None, Some(item)) if item.is_str() => format!(" = {}", item.to_string().trim()),
+            _ => String::new(),
+        };
+        format!("`{path}`{value}{}", self.line_of(path))
+    }
+
+    /// The line of a field in brackets, behind a space; empty where the file has no such field.
+    pub(crate) fn line_of(&self, path: &str) -> String {
+        self.span_of(path).map_or(String::new(), |span| {
+            format!(" (line {})", self.lines.of_byte(span.start))
+        })
+    }
+
+    /// The same of fields as they are `shown`, some of which may be those of another file.
+    pub(crate) fn contradiction_at(
+        &mut self,
+        first: Option<Range<usize>>,
+        shown: &[String],
+        (why, help): (&str, &str),
+        advice: Vec<Vec<Advised>>,
+    ) {
         let (last, others) = match shown.split_last() {
             Some((last, others)) if !others.is_empty() => (last.clone(), others.join(", ")),
             _ => (String::new(), shown.concat()),
@@ -165,6 +184,13 @@ impl Reader {
         self.problem(first, message, "not with the others", Some(help.to_owned()));
         if let Some(problem) = self.problems.last_mut() {
             problem.advise(advice);
+        }
+    }
+
+    /// The last problem is that this relation does not hold.
+    pub(crate) fn breaks(&mut self, relation: &'static str) {
+        if let Some(problem) = self.problems.last_mut() {
+            problem.breaks(relation);
         }
     }
 
@@ -199,7 +225,7 @@ impl Reader {
     }
 
     /// Position of the field at a dotted path.
-    fn span_of(&self, path: &str) -> Option<Range<usize>> {
+    pub(crate) fn span_of(&self, path: &str) -> Option<Range<usize>> {
         let (table, key) = path.rsplit_once('.').unwrap_or(("", path));
         let item = self.item(table)?.as_table_like()?;
         let key = item.key(key)?;
@@ -211,8 +237,15 @@ impl Reader {
         if path.is_empty() {
             return Some(item);
         }
-        for key in path.split('.') {
+        for part in path.split('.') {
+            let (key, index) = match overlay::split_index(part) {
+                Some((key, index)) => (key, Some(index)),
+                None => (part, None),
+            };
             item = item.as_table_like()?.get(key)?;
+            if let Some(index) = index {
+                item = item.get(index)?;
+            }
         }
         Some(item)
     }

@@ -168,18 +168,22 @@ impl<'a> Search<'a> {
     pub(super) fn accepted(&self, broken: &Found, relations: usize) -> Vec<Vec<Offer>> {
         self.left.set(self.all_left.get().div_ceil(relations));
         let offers = &broken.broken.offers;
+        let mut begun = Vec::new();
         let (single, several): (Vec<_>, Vec<_>) = offers.iter().partition(|set| set.len() == 1);
         for sets in [single, several] {
-            let mut sets: Vec<Vec<Offer>> = sets.into_iter().cloned().collect();
-            sets.retain(|set| matches!(self.answer(broken, set), Answer::Accepted));
-            if !sets.is_empty() {
-                return sets;
+            let mut accepted = Vec::new();
+            for set in sets {
+                match self.answer(broken, set) {
+                    Answer::Accepted => accepted.push(set.clone()),
+                    Answer::Broken(next) => begun.push((set.clone(), next)),
+                    Answer::Refused => {}
+                }
+            }
+            if !accepted.is_empty() {
+                return accepted;
             }
         }
-        (2..=TOGETHER)
-            .find_map(|most| self.together(broken, &[], offers, most))
-            .into_iter()
-            .collect()
+        self.together(broken, begun).into_iter().collect()
     }
 
     fn answer(&self, broken: &Found, set: &[Offer]) -> Answer {
@@ -209,36 +213,46 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Some of these added to others, and what the relations ask for that are broken by it.
-    fn together(
-        &self,
-        broken: &Found,
-        begun: &[Offer],
-        sets: &[Vec<Offer>],
-        most: usize,
-    ) -> Option<Vec<Offer>> {
-        for set in sets {
-            let mut whole = begun.to_vec();
-            for offer in set {
-                whole.retain(|other| other.advised.path != offer.advised.path);
-                whole.push(offer.clone());
-            }
-            if whole.len() > most {
-                continue;
-            }
-            match self.answer(broken, &whole) {
-                Answer::Accepted => return Some(whole),
-                Answer::Broken(next) if whole.len() < most => {
-                    let found = self.together(broken, &whole, &next.broken.offers, most);
-                    if found.is_some() {
-                        return found;
-                    }
+    /// Sets that break other relations, with what those ask for: the smallest sets first, and each once.
+    fn together(&self, broken: &Found, mut begun: Vec<(Vec<Offer>, Found)>) -> Option<Vec<Offer>> {
+        let mut tried: BTreeSet<Vec<(String, u64)>> =
+            broken.broken.offers.iter().map(|set| key(set)).collect();
+        while let Some(smallest) = (0..begun.len()).min_by_key(|at| begun[*at].0.len()) {
+            let (set, next) = begun.remove(smallest);
+            for more in &next.broken.offers {
+                let mut whole = set.clone();
+                for offer in more {
+                    whole.retain(|other| other.advised.path != offer.advised.path);
+                    whole.push(offer.clone());
                 }
-                Answer::Broken(_) | Answer::Refused => {}
+                if whole.len() > TOGETHER || !tried.insert(key(&whole)) {
+                    continue;
+                }
+                match self.answer(broken, &whole) {
+                    Answer::Accepted => return Some(whole),
+                    Answer::Broken(next) => begun.push((whole, next)),
+                    Answer::Refused => {}
+                }
             }
         }
         None
     }
+}
+
+/// What a set puts into a file.
+fn key(set: &[Offer]) -> Vec<(String, u64)> {
+    let of = |Offer { advised, .. }: &Offer| (advised.path.clone(), advised.value.to_bits());
+    let mut key: Vec<_> = set.iter().map(of).collect();
+    key.sort();
+    key
+}
+
+/// The same sets for a file that has the fields elsewhere.
+pub(super) fn renamed(mut sets: Vec<Vec<Offer>>, path: impl Fn(&str) -> String) -> Vec<Vec<Offer>> {
+    for offer in sets.iter_mut().flatten() {
+        offer.advised.path = path(&offer.advised.path);
+    }
+    sets
 }
 
 /// The values of some sets, one of which is to be taken.

@@ -89,8 +89,8 @@ pub(super) fn begin(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// A push ends within its step, as the master has it.
-pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+/// What the master refuses of the gait.
+fn refused(f: &Facts<'_>) -> Option<impl Iterator<Item = ParamError> + use<>> {
     let value = |spec: &FieldSpec| match spec.dimension {
         Dimension::Flag => Some(vec![0.0]),
         _ => Some(vec![f.si(&format!("gait.{}", spec.key))?]),
@@ -99,11 +99,15 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let mut values = values?.into_iter();
     let gait = GaitParams::build(&mut || values.next().unwrap_or_default());
     // The longest push; which leg steps does not matter.
-    let mut found = gait.of_master(Pattern::Single(Side::Left)).violations();
-    let error = found.find(|error| matches!(error, ParamError::PushTooLong { .. }))?;
-    let ParamError::PushTooLong { needs_us, has_us } = error else {
-        return None;
-    };
+    Some(gait.of_master(Pattern::Single(Side::Left)).violations())
+}
+
+/// A push ends within its step, as the master has it.
+pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let (needs_us, has_us) = refused(f)?.find_map(|error| match error {
+        ParamError::PushTooLong { needs_us, has_us } => Some((needs_us, has_us)),
+        _ => None,
+    })?;
     let seconds = |us: u32| pretty(f64::from(us) * 1e-6);
     let [period, push, stroke, speed, acceleration] = [0, 1, 2, 3, 4].map(|i| it.fields[i]);
     let (period_s, push_s) = (f.si(period)?, f.si(push)?);
@@ -130,16 +134,12 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The slow way of a foot down to the ground ends before the push begins. The fast way down to it takes
-/// time of its own, which depends on the air.
+/// The slow way of a foot down to the ground ends before the push begins, as the master has it.
 pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [speed, lower, push] = [0, 1, 2].map(|i| it.fields[i]);
+    refused(f)?.find(|error| matches!(error, ParamError::TouchdownTooSlow { .. }))?;
     let (speed_m_s, lower_s, push_s) = (f.si(speed)?, f.si(lower)?, f.si(push)?);
     let (has_s, slow_way_m) = (push_s - lower_s, GUARD_MM.to_f64() * 1e-3);
-    // At 0 the reference jumps; a push before the lowering is told as such.
-    if speed_m_s <= 0.0 || has_s <= 0.0 || slow_way_m / speed_m_s < has_s {
-        return None;
-    }
     let needs_s = slow_way_m / speed_m_s;
     let offers = vec![
         Offer::new(f, speed, Bound::Above, slow_way_m / has_s),

@@ -7,6 +7,7 @@
 //! which nobody tries.
 
 mod advice;
+mod asked;
 mod board;
 mod laws;
 mod moved;
@@ -218,13 +219,12 @@ impl Relation {
         }
     }
 
-    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) {
+    /// Why it does not hold, and what is allowed.
+    fn told(&self, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) -> (String, String) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
         };
-        let mut fields = self.fields.to_vec();
-        fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         let allowed = match (advice::text(accepted), broken.words.as_str()) {
             (offers, "") if offers.is_empty() && untried => {
                 "what is allowed depends on other fields: mend what else is wrong first".to_owned()
@@ -236,7 +236,15 @@ impl Relation {
             (offers, "") => offers,
             (offers, words) => format!("{offers}; {words}"),
         };
+        (why, allowed)
+    }
+
+    fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) {
+        let (why, allowed) = self.told(broken, accepted, untried);
+        let mut fields = self.fields.to_vec();
+        fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         r.contradiction(&fields, &why, &allowed, advice::values(accepted));
+        r.breaks(self.name);
     }
 }
 

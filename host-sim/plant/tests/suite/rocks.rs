@@ -241,6 +241,54 @@ fn the_index_misses_nothing_and_gives_nothing_twice() {
     assert!(found > 1000, "{found}");
 }
 
+/// Parts that are all very long and thin, along one axis or both, and a crowd with a few far away: each is
+/// found where it is.
+#[test]
+fn long_thin_and_far_parts_are_found() {
+    let part = |centre: [f64; 2], radii: [f64; 3]| {
+        let centre = Vector3::new(centre[0], centre[1], 0.0);
+        Part {
+            shape: Shape::Ellipsoid(Ellipsoid::new(centre, Vector3::from(radii), 0.0)),
+            material: Material::ROUGH,
+        }
+    };
+    let along_y = |k: u32| part([0.1 * f64::from(k), 0.0], [0.002, 40.0, 0.01]);
+    let along_x = |k: u32| part([0.0, 0.1 * f64::from(k)], [40.0, 0.002, 0.01]);
+    let small = |k: u32| {
+        let place = [0.1 * f64::from(k % 20), 0.1 * f64::from(k / 20)];
+        part(place, [0.02, 0.02, 0.01])
+    };
+    let far = [900.0, -900.0].map(|far| part([far, far], [0.02, 0.02, 0.01]));
+    let grounds: [Vec<Part>; 4] = [
+        (0..50).map(along_y).collect(),
+        (0..50).map(along_x).collect(),
+        (0..50).flat_map(|k| [along_x(k), along_y(k)]).collect(),
+        (0..400).map(small).chain(far).collect(),
+    ];
+    for (number, parts) in grounds.iter().enumerate() {
+        let index = Index::new(parts);
+        let mut found = 0;
+        for k in 0..400 {
+            let at = Vector3::new(0.0137 * f64::from(k % 100), 0.0071 * f64::from(k), 0.02);
+            let (mut given, mut above) = (Vec::new(), Vec::new());
+            index.near(&at, 0.1, |part| given.push(part));
+            index.above([at.x, at.y], |part| above.push(part));
+            for (place, part) in (0..).zip(parts) {
+                let times = given.iter().filter(|other| **other == place).count();
+                if part.shape.to_point(&at).distance_m < 0.1 {
+                    assert_eq!(times, 1, "ground {number}, part {place} at {at}");
+                    found += 1;
+                }
+                assert!(times < 2, "ground {number}, part {place} at {at}");
+                if part.shape.height_m(at.x, at.y).is_some() {
+                    assert!(above.contains(&place), "ground {number}, {place} at {at}");
+                }
+            }
+        }
+        assert!(found > 100, "ground {number}: {found}");
+    }
+}
+
 /// A search that narrows as it finds gives the same least distance from fewer parts.
 #[test]
 fn a_search_that_narrows_finds_the_nearest_part() {

@@ -19,8 +19,8 @@ use crate::study::Progress;
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{
-    EventAction, LegChoice, Motion, RobotConfig, Scenario, ScenarioEvent, TargetSet, builtin,
-    raw_of,
+    EventAction, LegChoice, Motion, Origin, RobotConfig, Scenario, ScenarioEvent, TargetSet,
+    builtin, raw_of,
 };
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults::check;
@@ -136,7 +136,11 @@ impl Robots {
         let duration_s = self.duration_s(row);
         let mut scenario = self.scenario(stands(row.phase), duration_s);
         scenario.faults.clone_from(&faults);
-        let event = |at_s: f64, action| ScenarioEvent { at_s, action };
+        let event = |at_s: f64, action| ScenarioEvent {
+            at_s,
+            action,
+            place: Origin::default(),
+        };
         if row.estop {
             scenario
                 .events

@@ -169,6 +169,8 @@ fn run_with(
     let scene = Scene::new(robot, scenario)?;
     if boards.are_here() {
         ensure_possible(scenario, robot, seed)?;
+    } else {
+        scenario.check_with(robot)?;
     }
     let job = Job::begin(&scenario.name, settings)?;
     announce(scenario.duration_s);
@@ -268,11 +270,17 @@ fn keep(scenario: &Scenario) -> Keep {
     }
 }
 
+/// About how large the log of a run of so many seconds is, bytes.
+#[must_use]
+pub fn log_bytes(duration_s: f64) -> f64 {
+    LOG_BYTES_PER_S * duration_s
+}
+
 /// Tells of the disk that a long run takes.
 fn announce(duration_s: f64) {
     if duration_s > LONG_S {
-        let bytes = |per_s: f64| per_s * duration_s * 1e-9;
-        let (log, tables) = (bytes(LOG_BYTES_PER_S), bytes(TABLE_BYTES_PER_S));
+        let log = log_bytes(duration_s) * 1e-9;
+        let tables = TABLE_BYTES_PER_S * duration_s * 1e-9;
         let told = format!(
             "{duration_s:.0} s to simulate: about {log:.2} GB of log and {tables:.2} GB of tables"
         );

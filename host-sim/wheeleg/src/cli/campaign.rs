@@ -12,8 +12,9 @@ use wheeleg_campaign::{
     CampaignError, Cases, Options, PlanFile, SAVE_EVERY, Shard, Store, Submission, isolated, merge,
     merge_partial, replay, run, simulate, status,
 };
-use wheeleg_config::plan::Plan;
+use wheeleg_config::plan::{KeepLogs, Plan};
 use wheeleg_studies::StudyError;
+use wheeleg_studies::run::log_bytes;
 use wheeleg_studies::study::Signal;
 
 use super::exit::{self, CANNOT_WRITE, FAILED, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
@@ -229,10 +230,10 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     cases.ensure_possible()?;
     let out = args.out.clone();
     let out = out.unwrap_or_else(|| Path::new("runs").join(&plan.name));
-    let store = Store::create(&out, file)?;
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    announce(&cases, args.first);
     let stop = stop_on_signals()?;
-    stop.begin();
+    let store = Store::create(&out, file, &stop)?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let options = Options {
         shard,
         threads: args.threads.map_or(cores, |n| n as usize),
@@ -270,14 +271,41 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// From so much on the program says how much disk the logs of a campaign take, bytes.
+const MUCH_BYTES: f64 = 1e9;
+
+/// Tells of the disk that logs take, where every case keeps its own.
+fn announce(cases: &Cases<'_>, first: Option<u64>) {
+    let plan = cases.plan();
+    if plan.keep != KeepLogs::All {
+        return;
+    }
+    let count = plan.cases().min(first.unwrap_or(u64::MAX));
+    let bytes = count as f64 * log_bytes(cases.duration_s());
+    if bytes > MUCH_BYTES {
+        let gigabytes = bytes * 1e-9;
+        tell(&format!(
+            "`keep` = \"all\": the logs of {count} cases take about {gigabytes:.0} GB"
+        ));
+    }
+}
+
 fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
     let (plan, file) = plan_of(&args.plan)?;
     let cases = Cases::new(&plan)?;
     cases.ensure_possible()?;
-    let store = Store::create(&args.out, file)?;
+    let stop = stop_on_signals()?;
+    let store = Store::create(&args.out, file, &stop)?;
     let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("wheeleg"));
     let duration_s = cases.duration_s();
     let submission = Submission::new(&store, &plan.name, &program, args.shards, duration_s)?;
+    if let Some(signal) = stop.signal() {
+        tell(&format!(
+            "{} before anything was submitted; run the same command again",
+            signal.label()
+        ));
+        return Ok(ExitCode::from(stopped_code(signal)));
+    }
     let text = if args.kubernetes {
         submission.kubernetes(&args.image, &args.claim)
     } else if args.dry_run {

@@ -244,8 +244,11 @@ fn run_text(finished: &Finished<Run>) -> String {
         out.push_str(&pil_text(pil));
     }
     let _ = writeln!(out, "robot   {}, parameters {:.16}", s.robot, s.robot_hash);
-    for fault in &s.faults {
+    for fault in s.faults.iter().take(FAULTS_SHOWN) {
         let _ = writeln!(out, "fault   {fault}");
+    }
+    if let Some(more @ 1..) = s.faults.len().checked_sub(FAULTS_SHOWN) {
+        let _ = writeln!(out, "fault   {more} more are in summary.json");
     }
     out.push_str(&messages_text(&s.messages));
     let _ = writeln!(out, "hash    {}", s.hash);
@@ -257,6 +260,9 @@ fn run_text(finished: &Finished<Run>) -> String {
     out.push_str(&place(&finished.report, 8));
     out
 }
+
+/// Injected faults that are listed; of more there is the number.
+const FAULTS_SHOWN: usize = 20;
 
 /// Least width of a column that is worth wrapping.
 const NARROW: usize = 24;

@@ -130,7 +130,7 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         port: args.port.as_deref().map(Port::parse).transpose()?,
         ..live
     };
-    let server = Server::start(Options {
+    let options = Options {
         live,
         recordings: args.recordings.clone(),
         record: args.record,
@@ -148,10 +148,9 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         page: args.page_dir.clone(),
         viewer_pages: args.allow_origin.clone(),
         viewers_write: args.foxglove_write,
-    })
-    .map_err(refused)?;
-    // Until here a signal ends the program at once: a file that is given may be a pipe.
-    stop.begin();
+    };
+    // Until there a signal ends the program at once: a file that is given may be a pipe.
+    let server = Server::start_with(options, || stop.begin()).map_err(refused)?;
     let url = server.url();
     let mut text = String::new();
     if server.is_look_only() {

@@ -1,0 +1,577 @@
+//! What the motion and the commands of a scenario ask of the robot that carries them out.
+//!
+//! A command brings values into a run of which the robot's file has others. Each relation of the table
+//! that such a value has a part in is judged again with it: of a gait at once, of a board's parameters
+//! where the board is armed with them. What a motion or a command asks of a cylinder or a leg is no
+//! field of the robot's file, and has no entry in the table.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::{replace, take};
+
+use wheeleg_master::command::Command;
+use wheeleg_master::contact::Side;
+use wheeleg_master::layer1::foot::{FootShape, FootTrajectory};
+use wheeleg_master::layer1::params::{GaitParams as MasterGait, ParamError, Pattern, STROKE_MM};
+use wheeleg_master::setpoint::{Cylinder, JointSetpoint, Setpoints};
+use wheeleg_node::acceptance::accepts;
+use wheeleg_protocol::Node;
+use wheeleg_protocol::param::JOINT_PARAMS;
+use wheeleg_units::PositionMm;
+
+use super::advice::{self, Search};
+use super::{Facts, Found, ROUNDING, Rule, Tried, broken, broken_whole};
+use crate::board_value::in_unit;
+use crate::error::ConfigError;
+use crate::gait::GaitParams;
+use crate::node::set;
+use crate::params::{ParameterInfo, Params as _};
+use crate::quantity::{pretty, suffix};
+use crate::reader::Reader;
+use crate::scenario::{EventAction, LegChoice, Motion, Scenario};
+use crate::{Advised, RobotConfig, command};
+
+/// Fields of a gait that make its start pose.
+const POSE: [&str; 4] = [
+    "gait.yaw_s2",
+    "gait.stroke",
+    "gait.held_leg_s5",
+    "gait.held_leg_s6",
+];
+/// Field of the stroke of all cylinders.
+const STROKE: &str = "cylinder.stroke";
+
+impl Scenario {
+    /// Whether this robot can do what the motion and the commands ask for.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with everything that it cannot: the fields of the scenario and of the robot, and
+    /// what is allowed.
+    pub fn check_with(&self, robot: &RobotConfig) -> Result<(), ConfigError> {
+        Judge::new(self, robot).all()
+    }
+}
+
+/// A joint board whose parameters a scenario writes.
+struct Board {
+    /// What it has, by number.
+    stored: Vec<(u16, i32)>,
+    /// The event that has written a parameter last.
+    writers: BTreeMap<u16, usize>,
+    judged: bool,
+}
+
+struct Judge<'a> {
+    scenario: &'a Scenario,
+    robot: &'a RobotConfig,
+    /// The scenario's file once more, where a value of it is needed, with what is wrong.
+    reader: Option<Reader>,
+    /// Of the robot, with the values of the gait that it has been given.
+    parameters: Vec<ParameterInfo>,
+    gait: MasterGait,
+    /// Poses in which it stands, by the bits of their fields.
+    poses: BTreeSet<[u64; POSE.len()]>,
+    boards: Vec<Board>,
+    disarmed: bool,
+}
+
+/// Field of a scenario that is in place of one of the robot, by the path of that, and what it is
+/// called beside its path.
+type Brought = BTreeMap<String, (String, String)>;
+
+impl<'a> Judge<'a> {
+    fn new(scenario: &'a Scenario, robot: &'a RobotConfig) -> Self {
+        let side = side(scenario.motion.stepping_leg());
+        let boards = robot.node.joints.iter().map(|stored| Board {
+            stored: stored.clone(),
+            writers: BTreeMap::new(),
+            judged: true,
+        });
+        let mut judge = Self {
+            scenario,
+            robot,
+            reader: None,
+            parameters: robot.parameters.clone(),
+            gait: robot.gait.of_master(Pattern::Single(side)),
+            poses: BTreeSet::new(),
+            boards: boards.collect(),
+            disarmed: false,
+        };
+        // Its file was refused otherwise.
+        judge.poses.insert(judge.pose());
+        judge
+    }
+
+    fn all(mut self) -> Result<(), ConfigError> {
+        self.motion()?;
+        for event in &self.scenario.events {
+            let (EventAction::Command(command), Some(at)) = (&event.action, event.place.0) else {
+                continue;
+            };
+            let path = format!("events[{at}]");
+            match *command {
+                Command::SetGait(gait) => self.set_gait(at, gait)?,
+                Command::JointReference { .. } => self.reference(at)?,
+                Command::FootTrajectory { side, shape } => {
+                    self.foot(&path, ["forward", "left", "height"], side, shape)?;
+                }
+                Command::Walk(_) => self.walk(&path, "command")?,
+                Command::WriteParameter { node, id, raw } => self.write(at, node, id, raw)?,
+                Command::Disarm => self.disarmed = true,
+                Command::Arm => self.arm()?,
+                _ => {}
+            }
+        }
+        self.arm()?;
+        let what = self.what();
+        match self.reader {
+            Some(reader) if !reader.is_clean() => Err(reader.refusal(&what)),
+            _ => Ok(()),
+        }
+    }
+
+    fn what(&self) -> String {
+        format!(
+            "the scenario file {} is not usable with the robot file {}",
+            self.scenario.source.0.file, self.robot.file
+        )
+    }
+
+    fn reader(&mut self) -> Result<&mut Reader, ConfigError> {
+        let reader = match self.reader.take() {
+            Some(reader) => reader,
+            None => {
+                let source = &self.scenario.source.0;
+                Reader::parse(&self.what(), &source.file, &source.text, false)?
+            }
+        };
+        Ok(self.reader.insert(reader))
+    }
+
+    /// The quantities of an event as they are written, by their keys.
+    fn written(&mut self, at: usize) -> Result<BTreeMap<String, ParameterInfo>, ConfigError> {
+        let reader = self.reader()?;
+        let entry = reader.entry("events", at);
+        let before = reader.parameters().len();
+        // It was accepted once.
+        let _ = command::read(reader, &entry, &[]);
+        let own = reader.parameters().iter().skip(before);
+        let own = own.filter_map(|info| {
+            let (_, key) = info.path.rsplit_once('.')?;
+            Some((key.to_owned(), info.clone()))
+        });
+        Ok(own.collect())
+    }
+
+    /// A field of the robot, for a message.
+    fn of_robot(&self, path: &str) -> String {
+        let info = self.robot.parameters.iter().find(|p| p.path == path);
+        let value = info.map_or(String::new(), |p| {
+            format!(" = {}{}", p.value_text(), suffix(&p.unit))
+        });
+        format!("`{path}`{value} of {}", self.robot.file)
+    }
+
+    /// Reports what these fields of the scenario ask and the robot's `path` does not allow.
+    fn refuse(
+        &mut self,
+        fields: &[String],
+        paths: &[&str],
+        (why, allowed): (&str, &str),
+        advice: Vec<Vec<Advised>>,
+    ) -> Result<(), ConfigError> {
+        let of_robot: Vec<String> = paths.iter().map(|path| self.of_robot(path)).collect();
+        let reader = self.reader()?;
+        let mut shown: Vec<String> = fields.iter().map(|field| reader.shown(field)).collect();
+        shown.extend(of_robot);
+        let first = fields.iter().find_map(|field| reader.span_of(field));
+        reader.contradiction_at(first, &shown, (why, allowed), advice);
+        Ok(())
+    }
+
+    fn motion(&mut self) -> Result<(), ConfigError> {
+        match self.scenario.motion {
+            Motion::Stand | Motion::SquareWave { .. } => Ok(()),
+            Motion::Walk(order) => {
+                self.walk("motion", "kind")?;
+                // It is set down with its nose as low as that.
+                let left_m = self.robot.gait.stroke_m + order.nose_mm.to_f64() * 1e-3;
+                if left_m >= -ROUNDING {
+                    return Ok(());
+                }
+                let least_mm = -self.robot.gait.stroke_m * 1e3;
+                let field = "motion.nose".to_owned();
+                let allowed = format!(
+                    "`{field}` is allowed from {} to 0 mm, `gait.stroke` below 0",
+                    pretty(least_mm)
+                );
+                let why = "the legs would be drawn in further than they are out";
+                let advice = vec![vec![Advised {
+                    path: field.clone(),
+                    value: least_mm,
+                    unit: "mm".to_owned(),
+                }]];
+                self.refuse(&[field], &["gait.stroke"], (why, &allowed), advice)
+            }
+            Motion::Sinusoid {
+                leg,
+                length_m,
+                height_m,
+                rate_rad_s,
+            } => {
+                let shape = FootShape::Arch {
+                    forward_mm: PositionMm::from_f64(length_m * 1e3),
+                    left_mm: PositionMm::ZERO,
+                    height_mm: PositionMm::from_f64(height_m * 1e3),
+                    rate_rad_s: rate_rad_s as f32,
+                };
+                self.foot("motion", ["length", "", "height"], side(leg), shape)
+            }
+        }
+    }
+
+    /// The shortest of the cylinders, m.
+    fn stroke_m(&self) -> f64 {
+        let strokes = self.robot.plant.cylinders.iter().map(|c| c.stroke_m);
+        strokes.fold(f64::INFINITY, f64::min)
+    }
+
+    /// A walk is planned with the strokes of the paper's leg.
+    fn walk(&mut self, path: &str, key: &str) -> Result<(), ConfigError> {
+        let least_m = STROKE_MM.to_f64() * 1e-3;
+        if self.stroke_m() >= least_m * (1.0 - ROUNDING) {
+            return Ok(());
+        }
+        let allowed = format!("`{STROKE}` is allowed from {} mm", pretty(least_m * 1e3));
+        let why = "a walk would drive the pistons into their stops";
+        self.refuse(
+            &[format!("{path}.{key}")],
+            &[STROKE],
+            (why, &allowed),
+            Vec::new(),
+        )
+    }
+
+    /// A reference that no piston reaches.
+    fn reference(&mut self, at: usize) -> Result<(), ConfigError> {
+        let most_m = self.stroke_m();
+        // What the command itself admits is less.
+        if most_m >= STROKE_MM.to_f64() * 1e-3 {
+            return Ok(());
+        }
+        let written = self.written(at)?;
+        let Some(stroke) = written.get("stroke") else {
+            return Ok(());
+        };
+        let factor = stroke.dimension.and_then(|d| d.factor(&stroke.unit));
+        let factor = factor.unwrap_or(1.0);
+        if stroke.value[0] * factor <= most_m * (1.0 + ROUNDING) {
+            return Ok(());
+        }
+        let most = most_m / factor;
+        let allowed = format!(
+            "`{}` is allowed up to {}{}",
+            stroke.path,
+            pretty(most),
+            suffix(&stroke.unit)
+        );
+        let advice = vec![vec![Advised {
+            path: stroke.path.clone(),
+            value: most,
+            unit: stroke.unit.clone(),
+        }]];
+        let why = "the piston would be driven into its stop";
+        self.refuse(
+            std::slice::from_ref(&stroke.path),
+            &[STROKE],
+            (why, &allowed),
+            advice,
+        )
+    }
+
+    /// Whether the foot of `side` can go so far forward, to the left and up, mm, from the start pose.
+    fn reaches(&self, side: Side, [forward, left, height]: [f64; 3], rate_rad_s: f32) -> bool {
+        let mut leg = self.robot.walk_geometry().leg;
+        let stroke_m = self.stroke_m() as f32;
+        leg.stroke_m = leg.stroke_m.map(|of_master_m| of_master_m.min(stroke_m));
+        let mut start = Setpoints::idle(0);
+        let cylinders = [Cylinder::Yaw, Cylinder::Horizontal, Cylinder::Vertical];
+        for (cylinder, reference_mm) in cylinders.into_iter().zip(self.gait.start_pose(side)) {
+            start.joints[side.joint(cylinder)] = Some(JointSetpoint {
+                reference_mm,
+                ..JointSetpoint::default()
+            });
+        }
+        let shape = FootShape::Arch {
+            forward_mm: PositionMm::from_f64(forward),
+            left_mm: PositionMm::from_f64(left),
+            height_mm: PositionMm::from_f64(height),
+            rate_rad_s,
+        };
+        let path = FootTrajectory::new(shape, leg, side, start, 0);
+        !matches!(path, Err(ParamError::OutOfReach { .. }))
+    }
+
+    /// A path that leaves the reach of its leg. `keys`: fields of the three lengths.
+    fn foot(
+        &mut self,
+        path: &str,
+        keys: [&str; 3],
+        side: Side,
+        shape: FootShape,
+    ) -> Result<(), ConfigError> {
+        let FootShape::Arch {
+            forward_mm,
+            left_mm,
+            height_mm,
+            rate_rad_s,
+        } = shape
+        else {
+            return Ok(());
+        };
+        let asked = [forward_mm, left_mm, height_mm].map(|mm| mm.to_f64());
+        if self.reaches(side, asked, rate_rad_s) {
+            return Ok(());
+        }
+        let mut fields = Vec::new();
+        let (mut allowed, mut advice) = (Vec::new(), Vec::new());
+        for (i, key) in keys.into_iter().enumerate() {
+            if key.is_empty() {
+                continue;
+            }
+            let field = format!("{path}.{key}");
+            if let Some(most) = self.farthest(side, asked, i, rate_rad_s) {
+                let word = if asked[i] < 0.0 { "from" } else { "up to" };
+                allowed.push(format!("`{field}` is allowed {word} {} mm", pretty(most)));
+                advice.push(vec![Advised {
+                    path: field.clone(),
+                    value: most,
+                    unit: "mm".to_owned(),
+                }]);
+            }
+            fields.push(field);
+        }
+        let allowed = match allowed.is_empty() {
+            true => "shorter ways are allowed: no one of them alone is enough".to_owned(),
+            false => allowed.join(", or "),
+        };
+        let why = "the foot would leave the reach of its leg";
+        let paths = ["gait.stroke", STROKE, "body.stroke_zero", "body.crank"];
+        self.refuse(&fields, &paths, (why, &allowed), advice)
+    }
+
+    /// The largest length in one direction with which the path is in reach, in tenths of a millimetre.
+    fn farthest(&self, side: Side, asked: [f64; 3], i: usize, rate_rad_s: f32) -> Option<f64> {
+        let with = |tenths: f64| {
+            let mut asked = asked;
+            asked[i] = (0.1 * tenths).copysign(asked[i]);
+            asked
+        };
+        let reaches = |tenths: f64| self.reaches(side, with(tenths), rate_rad_s);
+        let (mut within, mut beyond) = (0.0, (10.0 * asked[i].abs()).ceil());
+        if beyond == 0.0 || !reaches(within) {
+            return None;
+        }
+        while beyond - within > 1.0 {
+            let middle = (0.5 * (within + beyond)).floor();
+            if reaches(middle) {
+                within = middle;
+            } else {
+                beyond = middle;
+            }
+        }
+        Some(with(within)[i])
+    }
+
+    fn pose(&self) -> [u64; POSE.len()] {
+        let facts = facts(&self.parameters);
+        POSE.map(|path| facts.si(path).unwrap_or(f64::NAN).to_bits())
+    }
+
+    /// Another gait.
+    fn set_gait(&mut self, at: usize, gait: MasterGait) -> Result<(), ConfigError> {
+        if replace(&mut self.gait, gait) == gait {
+            return Ok(());
+        }
+        let written = self.written(at)?;
+        let mut brought = Brought::new();
+        for spec in GaitParams::FIELDS {
+            let path = format!("gait.{}", spec.key);
+            let own = self.parameters.iter_mut().find(|p| p.path == path);
+            if let (Some(own), Some(info)) = (own, written.get(spec.key)) {
+                brought.insert(path.clone(), (info.path.clone(), String::new()));
+                *own = ParameterInfo {
+                    path,
+                    ..info.clone()
+                };
+            }
+        }
+        let new_pose = self.poses.insert(self.pose());
+        let parameters = take(&mut self.parameters);
+        let judged = self.judge(&parameters, &brought, new_pose);
+        self.parameters = parameters;
+        judged
+    }
+
+    /// A parameter that a joint's board takes; what it refuses changes nothing.
+    fn write(&mut self, at: usize, node: u8, id: u16, raw: i32) -> Result<(), ConfigError> {
+        let index = usize::from(node).wrapping_sub(1);
+        let info = JOINT_PARAMS.iter().find(|info| info.id == id);
+        let (Some(board), Some(node), Some(info)) =
+            (self.boards.get_mut(index), Node::new(node), info)
+        else {
+            return Ok(());
+        };
+        if info.disarmed_only && !self.disarmed {
+            return Ok(());
+        }
+        let mut stored = board.stored.clone();
+        set(&mut stored, id, raw);
+        if !accepts(node.address(), &stored) {
+            return Ok(());
+        }
+        board.stored = stored;
+        board.writers.insert(id, at);
+        board.judged = false;
+        match self.disarmed {
+            true => Ok(()),
+            false => self.judge_board(index),
+        }
+    }
+
+    /// All boards are armed with what they have.
+    fn arm(&mut self) -> Result<(), ConfigError> {
+        self.disarmed = false;
+        (0..self.boards.len()).try_for_each(|index| self.judge_board(index))
+    }
+
+    fn judge_board(&mut self, index: usize) -> Result<(), ConfigError> {
+        let board = &mut self.boards[index];
+        if replace(&mut board.judged, true) {
+            return Ok(());
+        }
+        let mut parameters = self.parameters.clone();
+        let mut brought = Brought::new();
+        for (id, at) in &board.writers {
+            let info = JOINT_PARAMS.iter().find(|info| info.id == *id);
+            let value = board.stored.iter().find(|(stored, _)| stored == id);
+            let (Some(info), Some((_, raw))) = (info, value) else {
+                continue;
+            };
+            let path = format!("node.joint.{}", info.name);
+            if let Some(own) = parameters.iter_mut().find(|p| p.path == path) {
+                own.value = vec![in_unit(info, *raw)];
+            }
+            let called = format!(", the `{}` of board {}", info.name, index + 1);
+            brought.insert(path, (format!("events[{at}].value"), called));
+        }
+        self.judge(&parameters, &brought, false)
+    }
+
+    /// Judges the table with what the scenario has brought; `new_pose`: in another start pose, too.
+    fn judge(
+        &mut self,
+        parameters: &[ParameterInfo],
+        brought: &Brought,
+        new_pose: bool,
+    ) -> Result<(), ConfigError> {
+        let plant = &self.robot.plant;
+        let whole = |facts: &Facts<'_>| {
+            let judged = new_pose.then(|| broken_whole(facts, plant));
+            judged.flatten()
+        };
+        let facts = facts(parameters);
+        let mut found = broken(&facts);
+        if found.is_empty() {
+            found.extend(whole(&facts));
+        }
+        // The robot is what it is: values of the scenario's own fields alone would mend it.
+        let attempt = |values: &[Advised]| {
+            let mut tried = parameters.to_vec();
+            for Advised { path, value, .. } in values {
+                let own = tried.iter_mut().find(|p| p.path == *path)?;
+                let allowed = brought.contains_key(path) && (own.min..=own.max).contains(value);
+                allowed.then_some(())?;
+                own.value = vec![*value];
+            }
+            let facts = self::facts(&tried);
+            Some(Tried {
+                found: broken(&facts),
+                whole: whole(&facts).map(|found| found.relation.name),
+                others: 0,
+            })
+        };
+        let search = Search::new(&found, 0, &attempt);
+        let mut told = Vec::new();
+        for (at, one) in found.iter().enumerate() {
+            let accepted = search.accepted(one, found.len() - at);
+            let untried = search.is_cut_short() && found.len() > 1;
+            let renamed = advice::renamed(accepted, |path| {
+                let own = brought.get(path);
+                own.map_or(path, |(field, _)| field.as_str()).to_owned()
+            });
+            told.push((
+                one.relation.told(&one.broken, &renamed, untried),
+                advice::values(&renamed),
+            ));
+        }
+        for (one, ((why, allowed), advice)) in found.iter().zip(told) {
+            self.report(one, parameters, brought, (&why, &allowed), advice)?;
+        }
+        Ok(())
+    }
+
+    fn report(
+        &mut self,
+        found: &Found,
+        parameters: &[ParameterInfo],
+        brought: &Brought,
+        told: (&str, &str),
+        advice: Vec<Vec<Advised>>,
+    ) -> Result<(), ConfigError> {
+        let mut paths = found.relation.fields.to_vec();
+        if let Rule::AtRest(_) = found.relation.rule {
+            // What stands or is carried depends on the pose.
+            let missing = POSE
+                .iter()
+                .filter(|path| !found.relation.fields.contains(path));
+            paths.extend(missing);
+        }
+        let info = |path: &str| parameters.iter().find(|p| p.path == path);
+        paths.retain(|path| info(path).is_some());
+        let (own, others): (Vec<&str>, Vec<&str>) = paths
+            .into_iter()
+            .partition(|path| brought.contains_key(*path));
+        let of_robot: Vec<String> = others.iter().map(|path| self.of_robot(path)).collect();
+        let reader = self.reader()?;
+        let mut shown = Vec::new();
+        let mut first = None;
+        for path in own {
+            let (Some(info), Some((field, called))) = (info(path), brought.get(path)) else {
+                continue;
+            };
+            let (value, unit) = (info.value_text(), suffix(&info.unit));
+            let line = reader.line_of(field);
+            shown.push(format!("`{field}` = {value}{unit}{line}{called}"));
+            first = first.or_else(|| reader.span_of(field));
+        }
+        shown.extend(of_robot);
+        reader.contradiction_at(first, &shown, told, advice);
+        reader.breaks(found.relation.name);
+        Ok(())
+    }
+}
+
+fn facts(parameters: &[ParameterInfo]) -> Facts<'_> {
+    Facts {
+        parameters,
+        moved: None,
+        axis: None,
+    }
+}
+
+fn side(leg: LegChoice) -> Side {
+    match leg {
+        LegChoice::Left => Side::Left,
+        LegChoice::Right => Side::Right,
+    }
+}

@@ -1,0 +1,25 @@
+//! Robot and axis files with other values.
+
+/// A file with other values; a key that its section has not got is put below the heading.
+pub(crate) fn with(text: &str, path: &str, value: &str, unit: &str) -> String {
+    let (section, key) = path.rsplit_once('.').expect("a section and a key");
+    let heading = format!("[{section}]\n");
+    let begin = text.find(&heading).expect("the section") + heading.len();
+    let field = format!("{key} = {{ value = {value}, unit = \"{unit}\", source = \"ASSUMED\" }}");
+    let end = text[begin..]
+        .find("\n[")
+        .map_or(text.len(), |at| begin + at);
+    let line = text[begin..end].lines().find(|line| {
+        let (name, _) = line.split_once('=').unwrap_or_default();
+        name.trim() == key
+    });
+    let mut changed = text.to_owned();
+    match line {
+        Some(line) => {
+            let at = begin + text[begin..].find(line).expect("it stands there");
+            changed.replace_range(at..at + line.len(), &field);
+        }
+        None => changed.insert_str(begin, &(field + "\n")),
+    }
+    changed
+}
