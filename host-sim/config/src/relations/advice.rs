@@ -7,7 +7,7 @@
 use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
-use super::{Facts, Found};
+use super::{Facts, Found, Relation};
 use crate::quantity::{pretty, suffix};
 
 /// Files that are tried at most for all relations of a file: each is read as a whole.
@@ -170,8 +170,10 @@ impl<'a> Search<'a> {
         let offers = &broken.broken.offers;
         let (single, several): (Vec<_>, Vec<_>) = offers.iter().partition(|set| set.len() == 1);
         for sets in [single, several] {
-            let mut sets: Vec<Vec<Offer>> = sets.into_iter().cloned().collect();
-            sets.retain(|set| matches!(self.answer(broken, set), Answer::Accepted));
+            let sets: Vec<Vec<Offer>> = sets
+                .into_iter()
+                .filter_map(|set| self.narrowed(broken, set.clone()))
+                .collect();
             if !sets.is_empty() {
                 return sets;
             }
@@ -180,6 +182,24 @@ impl<'a> Search<'a> {
             .find_map(|most| self.together(broken, &[], offers, most))
             .into_iter()
             .collect()
+    }
+
+    /// The set, or a narrower limit for its only field where another relation asks for that.
+    fn narrowed(&self, broken: &Found, mut set: Vec<Offer>) -> Option<Vec<Offer>> {
+        for _ in 0..TOGETHER {
+            let next = match self.answer(broken, &set) {
+                Answer::Accepted => return Some(set),
+                Answer::Refused => return None,
+                Answer::Broken(next) => next,
+            };
+            let [only] = set.as_slice() else { return None };
+            let mut narrower = next.broken.offers.into_iter();
+            set = narrower.find(|offers| {
+                let own = |offer: &Offer| offer.advised.path == only.advised.path;
+                offers.len() == 1 && offers.iter().all(own)
+            })?;
+        }
+        None
     }
 
     fn answer(&self, broken: &Found, set: &[Offer]) -> Answer {
@@ -194,12 +214,22 @@ impl<'a> Search<'a> {
             return Answer::Refused;
         };
         let own = broken.relation.name;
+        // A relation that was broken before is another problem, unless these fields are its own, too.
         let new = |found: &Found| {
-            let name = found.relation.name;
-            name == own || !self.before.contains(name)
+            let Relation { name, fields, .. } = *found.relation;
+            let shares = || {
+                set.iter()
+                    .any(|offer| fields.iter().any(|path| *path == offer.advised.path))
+            };
+            name == own || !self.before.contains(name) || shares()
         };
-        if let Some(next) = tried.found.into_iter().find(new) {
-            return Answer::Broken(next);
+        let mut next: Vec<Found> = tried.found.into_iter().filter(new).collect();
+        if !next.is_empty() {
+            // One that knows what would mend it leads further.
+            let helpful = next
+                .iter()
+                .position(|found| !found.broken.offers.is_empty());
+            return Answer::Broken(next.swap_remove(helpful.unwrap_or(0)));
         }
         // What is as wrong without these values is not their fault.
         let before = || (self.attempt)(&[]).and_then(|tried| tried.whole);
