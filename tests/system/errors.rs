@@ -46,11 +46,24 @@ fn driven() -> Vec<Driven> {
     let template = page("{% if %}", ()).expect_err("no template");
     add("ReportError::Template", Box::new(template), vec!["report"]);
     let mcap = || mcap::McapError::Io(full());
-    add(
-        "LogError::Log",
-        Box::new(LogError::Log(mcap())),
-        vec!["the log"],
-    );
+    let log = LogError::Log {
+        path: path(),
+        reason: mcap(),
+    };
+    add("LogError::Log", Box::new(log), vec!["the log `a/file`"]);
+    let made = LogError::made(path(), mcap());
+    let help = made.help().map(|help| help.to_string());
+    assert!(help.is_some_and(|help| help.contains("--out") && !help.contains("recover")));
+    // `view`, `log recover` and `campaign merge` write a file.
+    let outputs: [Box<dyn Diagnostic>; 2] = [
+        Box::new(LogError::output("write", path(), full())),
+        Box::new(ReportError::output("write", path(), full())),
+    ];
+    for output in outputs {
+        let help = output.help().map(|help| help.to_string());
+        assert!(help.is_some_and(|help| help.contains("--out,")));
+    }
+    add("LogError::Made", Box::new(made), vec!["the log `a/file`"]);
     let tables = LogError::Tables {
         count: 3,
         path: path(),

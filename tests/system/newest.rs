@@ -65,7 +65,7 @@ const SERVE: [Case; 29] = [
     ),
 ];
 
-const OTHERS: [Case; 49] = [
+const OTHERS: [Case; 50] = [
     (
         &["serve", "--listen", "localhost:0"],
         &["'localhost:0'", "127.0.0.1:7450"],
@@ -129,11 +129,14 @@ const OTHERS: [Case; 49] = [
     ),
     (
         &["identify", "utf16.csv", "--axis", "bench-vq110u"],
-        &["UTF-8"],
+        &["line 1 is not UTF-8"],
     ),
     (
         &["identify", "semicolons.csv", "--axis", "bench-vq110u"],
-        &["parted by commas"],
+        &[
+            "line 1: the columns are parted by semicolons",
+            "parted by commas",
+        ],
     ),
     (
         &["identify", "note.csv", "--axis", "bench-vq110u"],
@@ -178,6 +181,10 @@ const OTHERS: [Case; 49] = [
     (
         &["view", "none", "--to", "-1"],
         &["from 0 s to -1 s", "--to after it"],
+    ),
+    (
+        &["view", "none", "--from", "-1"],
+        &["from -1 s to the end", "--from from 0 on"],
     ),
     (
         &["view", "none", "--from", "nan"],

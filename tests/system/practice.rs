@@ -503,7 +503,7 @@ fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("cannot write the log: File too large"),
+        said.contains("cannot write the log `out/log.mcap`: File too large"),
         "{said}"
     );
     assert!(folder.path().join("out/summary.json").is_file(), "{said}");

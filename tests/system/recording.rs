@@ -132,6 +132,46 @@ fn a_recording_repeats_after_term_and_after_a_kill() {
     }
 }
 
+/// Ctrl-C ends a walk as its own stop does: the next command is carried out, without a latched stop.
+#[test]
+fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
+    let served = Served::new("");
+    served.until("ready", |state| state["ready"] == true);
+    for command in ["Arm", "Stand"] {
+        let done = served.ctl(&["take", "--", command]);
+        assert!(done.status.success(), "{done:?}");
+    }
+    let walk = [
+        "speed=60",
+        "turn=0",
+        "pattern=alternate",
+        "lift=60",
+        "nose=-20",
+    ];
+    let driver = Command::new(program::path())
+        .args(["ctl", "--url", &served.address, "take", "--", "Walk"])
+        .args(walk)
+        .env("XDG_STATE_HOME", served.home.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("start");
+    served.until("walking", |state| state["phase"] == "walk");
+    let sent = Command::new("kill")
+        .args(["-INT", &driver.id().to_string()])
+        .status();
+    assert!(sent.expect("kill").success());
+    let ended = driver.wait_with_output().expect("ended");
+    assert_eq!(ended.status.code(), Some(130), "{ended:?}");
+    let state = served.state();
+    assert_eq!(state["hold"], Value::Null, "{state}");
+    assert_eq!(state["armed"], true, "{state}");
+    assert_eq!(state["control"], Value::Null, "{state}");
+    let next = served.ctl(&["take", "--", "JointReference", "joint=3", "stroke=120"]);
+    assert!(next.status.success(), "{next:?}");
+    assert_eq!(served.end("TERM").0, Some(143));
+}
+
 /// A computer that sleeps for a while under a walking robot: nobody has seen it meanwhile.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]

@@ -108,9 +108,10 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
             &format!("command = \"WriteParameter\"\n{of}\nvalue = 777"),
         ),
         event(1.1, &format!("command = \"ReadParameter\"\n{of}")),
+        // Within its own limits, and below the board's `stroke_min`: the board alone refuses it.
         event(
             1.2,
-            &format!("command = \"WriteParameter\"\n{of}\nvalue = 15"),
+            "command = \"WriteParameter\"\nboard = 1\nparameter = \"stroke_max\"\nvalue = -10",
         ),
     ];
     let scenario = scenario(folder.path(), 1.4, &events.concat());
@@ -135,7 +136,7 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
         .collect();
     assert_eq!(values, ["12345 counts", "777 counts", "12345 counts"]);
     assert!(events.contains("SaveParameters done"));
-    assert!(events.contains("WriteParameter refused: wheel 8: A value is outside"));
+    assert!(events.contains("WriteParameter refused: joint 1: A value is outside"));
     // Logs of the boards stand beside it.
     assert!(events.contains(" logs at "));
     let page = fs::read_to_string(out.join("report.html")).expect("report");

@@ -111,7 +111,7 @@ impl CampaignError {
             Self::Study(e)
                 if matches!(
                     **e,
-                    StudyError::Log(LogError::Output { .. } | LogError::Log(_))
+                    StudyError::Log(LogError::Output { .. } | LogError::Log { .. })
                 ) =>
             {
                 74

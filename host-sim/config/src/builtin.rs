@@ -178,19 +178,25 @@ const LARGEST: u64 = 64 << 20;
 /// The text of a file, in UTF-8.
 ///
 /// # Errors
-/// What the operating system says, or [`ErrorKind::FileTooLarge`] of a file that has more than
-/// 64 MiB: some, such as devices, have no end.
+/// What the operating system says, [`ErrorKind::FileTooLarge`] of a file that has more than
+/// 64 MiB: some, such as devices, have no end; or [`ErrorKind::InvalidData`] with the line that is
+/// not UTF-8.
 pub fn text_of(path: &Path) -> std::io::Result<String> {
     let file = std::fs::File::open(path)?;
-    let mut text = String::new();
+    let mut bytes = Vec::new();
     // One byte more tells a file that is too large.
     let mut part = file.take(LARGEST + 1);
-    let read = part.read_to_string(&mut text);
+    let read = part.read_to_end(&mut bytes);
     if part.limit() == 0 {
         let why = format!("it has more than {} MiB", LARGEST >> 20);
         return Err(std::io::Error::new(ErrorKind::FileTooLarge, why));
     }
-    read.map(|_| text)
+    read?;
+    String::from_utf8(bytes).map_err(|e| {
+        let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        std::io::Error::new(ErrorKind::InvalidData, format!("line {line} is not UTF-8"))
+    })
 }
 
 /// Longest path that is quoted whole, bytes: no file system has a longer one.

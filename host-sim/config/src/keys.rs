@@ -28,7 +28,11 @@ pub(crate) const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] 
 
 /// Before the first section, and the names of the sections.
 pub const TOP: [Key; 12] = [
-    key("name", "text", "part of the output folder; free"),
+    key(
+        "name",
+        "text",
+        "part of the output folder; 1 to 64 of `A-Z a-z 0-9 . _ -`",
+    ),
     key("description", "text", "one line"),
     key(
         "robot",

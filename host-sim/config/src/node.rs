@@ -4,7 +4,7 @@ use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
-use super::board_value::{in_unit, raw_of, scale};
+use super::board_value::{allowed_raw, allowed_values, in_unit, scale};
 use super::params::ParameterInfo;
 use super::quantity::{pretty, suffix};
 use super::reader::{Entry, Reader, range};
@@ -139,7 +139,7 @@ pub(super) fn parameter(r: &mut Reader, entry: &Entry) -> Option<&'static ParamI
 }
 
 /// Reads `value`, a number in the unit of the entry's `parameter`, as the raw number of its
-/// format. What is beyond its limits is refused by the board, which is there to do it.
+/// format.
 pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
     let name = entry.get("parameter")?.1;
     let info = params_at(board(entry)?)
@@ -158,7 +158,17 @@ pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
         r.problem(Some(span), message, "not a number", None);
         return None;
     };
-    Some(raw_of(info, value))
+    let raw = allowed_raw(info, value);
+    if raw.is_none() {
+        let message = format!(
+            "`{}` = {} is out of range: allowed {}",
+            entry.field_path("value"),
+            pretty(value),
+            allowed_values(info)
+        );
+        r.problem(Some(span), message, "out of range", None);
+    }
+    raw
 }
 
 /// Lists what the file leaves at the board's default, so that a listing of the

@@ -369,11 +369,11 @@ enum ActionKind {
 }
 
 fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<(f64, EventAction)> {
-    let latest = duration_s.unwrap_or(MAX_DURATION_S);
+    // The end of the scenario is a limit of its own, below: it is not allowed itself.
     let at = FieldSpec::scalar(
         "at",
         Dimension::Time,
-        [0.0, latest],
+        [0.0, MAX_DURATION_S],
         "time of the event, within the duration of the scenario",
     );
     let at_s = r.required(entry, &at);

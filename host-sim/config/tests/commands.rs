@@ -62,7 +62,7 @@ fn usual(argument: &Argument) -> String {
             let parameter = JOINT_PARAMS.iter().find(common).expect("there is one");
             format!("\"{}\"", parameter.name)
         }
-        ArgumentKind::Raw => "0.5".to_owned(),
+        ArgumentKind::Raw => "20".to_owned(),
         _ => "{ value = 60, unit = \"mm\" }".replace("mm", argument.kind.unit()),
     }
 }
@@ -395,6 +395,24 @@ fn arguments_arrive_in_the_units_of_the_master() {
         raw: 1 << 23,
     };
     assert_eq!(read(write).ok(), Some(wanted));
+    // What the board would refuse is refused before the run.
+    for (parameter, value, allowed) in [
+        ("proportional", "2100000", "allowed 0 to 4 1/mm"),
+        ("law", "9", "allowed whole numbers from 0 to "),
+        ("law", "0.5", "allowed whole numbers from 0 to "),
+    ] {
+        let write = format!(
+            "command = \"WriteParameter\"\nboard = 1\nparameter = \"{parameter}\"\nvalue = {value}\n"
+        );
+        let text = report(&read(&write).expect_err("out of range"));
+        assert_all(
+            &text,
+            &[
+                &format!("`events[0].value` = {value} is out of range"),
+                allowed,
+            ],
+        );
+    }
 }
 
 /// What would do nothing, and numbers as other countries write them.
@@ -410,6 +428,9 @@ fn an_event_at_the_end_and_a_decimal_comma_are_refused() {
         Scenario::parse("my.toml", &text).map_err(|error| report(&error))
     };
     assert!(told("2 s", "1.999 s").is_ok());
+    let late = told("2 s", "400 s").expect_err("beyond the end");
+    assert_all(&late, &["`events[0].at` = 400 s", "0 s to below 2 s"]);
+    assert!(!late.contains("0 to 2 s"), "{late}");
     for at in ["2 s", "2000 ms"] {
         let text = told("2 s", at).expect_err("does nothing");
         assert_all(

@@ -465,6 +465,15 @@ fn bare_values_and_missing_sources_are_refused() {
     assert_all(&text, &["`bus.baud` has no unit", "unit = \"bit/s\""]);
     let text = robot_with(
         "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
+        "baud  = \"1 Mbit/s\"",
+    );
+    assert_all(
+        &text,
+        &["`bus.baud` = \"1 Mbit/s\" has no source", "source = \"…\""],
+    );
+    assert!(!text.contains("has no unit"), "{text}");
+    let text = robot_with(
+        "baud  = { value = 1.0, unit = \"Mbit/s\", source = \"ASSUMED: RS-485, not in the paper\" }",
         "baud  = { value = 1.0, unit = \"Mbit/s\" }",
     );
     assert_all(&text, &["`bus.baud` has no source", "PAPER"]);
@@ -556,7 +565,7 @@ fn scenario_mistakes() {
     let text = report(
         &Scenario::parse("my.toml", &(SCENARIO.to_owned() + event)).expect_err("wrong event"),
     );
-    assert_all(&text, &["`events[0].at` = 12 s", "0 to 10 s"]);
+    assert_all(&text, &["`events[0].at` = 12 s", "0 s to below 10 s"]);
     assert_all(&text, &["\"kil-master\"", "did you mean \"kill-master\"?"]);
 }
 

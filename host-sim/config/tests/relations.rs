@@ -528,3 +528,33 @@ fn what_the_plant_cannot_follow_is_told_in_the_unit_of_the_file() {
     );
     assert!(said.trim_end().ends_with(" N/mm"), "{said}");
 }
+
+/// Each limit that is advised for a stroke that is too long is accepted as it stands, and so is the
+/// sensor that it is measured by.
+#[test]
+fn a_stroke_that_is_advised_is_accepted() {
+    for stroke_mm in ["184.8", "185.0", "187.0", "188.0", "200.0"] {
+        let text = with(ROBOT, "cylinder.stroke", stroke_mm, "mm");
+        let error = RobotConfig::parse("my.toml", &text).expect_err("too long");
+        let advised: Vec<&Advised> = error
+            .problems()
+            .iter()
+            .flat_map(|problem| problem.advice().iter().flatten())
+            .filter(|advised| advised.path == "cylinder.stroke")
+            .collect();
+        assert!(!advised.is_empty(), "{stroke_mm}: {}", report(&error));
+        for advised in advised {
+            assert!(advised.value >= 184.0, "{stroke_mm}: {advised:?}");
+            let text = with(
+                ROBOT,
+                "cylinder.stroke",
+                &format!("{:?}", advised.value),
+                "mm",
+            );
+            let accepted = RobotConfig::parse("my.toml", &text);
+            assert!(accepted.is_ok(), "{stroke_mm}: {advised:?}");
+        }
+    }
+    let text = with(ROBOT, "cylinder.stroke", "184.0", "mm");
+    assert!(RobotConfig::parse("my.toml", &text).is_ok());
+}

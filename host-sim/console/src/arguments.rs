@@ -3,7 +3,7 @@
 
 use fixed::types::I16F16;
 use serde_json::{Map, Value as Json};
-use wheeleg_config::{allowed_raw, allowed_values, closest};
+use wheeleg_config::{Dimension, allowed_raw, allowed_values, closest, pretty};
 use wheeleg_master::argument::{self, Argument, ArgumentKind, Value};
 use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given};
 use wheeleg_protocol::Node;
@@ -128,15 +128,32 @@ fn advice(argument: &Argument, json: &Json, args: &Map<String, Json>) -> String 
     };
     match argument.kind {
         ArgumentKind::Choice(words) => meant(text, words.iter().copied()),
-        _ => {
-            let is_part = |c: char| c.is_ascii_digit() || "+-.".contains(c);
-            let number = text.split(|c| !is_part(c)).next().unwrap_or_default();
-            match number.parse::<f64>() {
-                Ok(_) => format!(", without a unit: {number}"),
-                Err(_) => String::new(),
-            }
-        }
+        kind => without_unit(kind, text).map_or(String::new(), |number| {
+            format!(", without a unit: {number}")
+        }),
     }
+}
+
+/// What a number with a unit is in the unit of its argument; `None` where that is not known: a
+/// number in another unit would move the robot somewhere else.
+fn without_unit(kind: ArgumentKind, text: &str) -> Option<String> {
+    let is_part = |c: char| c.is_ascii_digit() || "+-.".contains(c);
+    let end = text.find(|c| !is_part(c)).unwrap_or(text.len());
+    let (number, unit) = (&text[..end], text[end..].trim());
+    let value: f64 = number.parse().ok()?;
+    if unit.is_empty() || unit == kind.unit() {
+        return Some(number.to_owned());
+    }
+    let dimension = match kind {
+        ArgumentKind::Length(_) => Dimension::Length,
+        ArgumentKind::Velocity(_) => Dimension::Velocity,
+        ArgumentKind::Acceleration(_) => Dimension::Acceleration,
+        ArgumentKind::Rate(_) => Dimension::AngularVelocity,
+        ArgumentKind::Time(_) => Dimension::Time,
+        _ => return None,
+    };
+    let factor = dimension.factor(unit)? / dimension.factor(kind.unit())?;
+    Some(pretty(value * factor))
 }
 
 /// The value of an argument; one of another kind where the JSON is of another kind, or where it is

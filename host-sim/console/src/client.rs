@@ -323,27 +323,33 @@ impl Client {
     }
 
     fn outcome_until(&mut self, n: u64, end: Option<Instant>) -> Outcome {
+        let is_over = || end.is_some_and(|end| Instant::now() >= end);
+        self.outcome_unless(n, &is_over).unwrap_or(Outcome::Unknown)
+    }
+
+    /// As [`Client::outcome`]; `None` as soon as `stop` says so.
+    pub fn outcome_unless(&mut self, n: u64, stop: &dyn Fn() -> bool) -> Option<Outcome> {
         loop {
-            if end.is_some_and(|end| Instant::now() >= end) {
-                return Outcome::Unknown;
+            if stop() {
+                return None;
             }
             let answer = match self.read() {
                 Some(Incoming::Json(answer)) if answer["op"] == "answer" && answer["n"] == n => {
                     answer
                 }
-                Some(Incoming::Closed { .. }) => return Outcome::Lost,
+                Some(Incoming::Closed { .. }) => return Some(Outcome::Lost),
                 _ => continue,
             };
             let word = |name: &str| answer[name].as_str().unwrap_or_default().to_owned();
             match answer["status"].as_str() {
-                Some("done") => return Outcome::Done,
+                Some("done") => return Some(Outcome::Done),
                 Some("refused") => {
-                    return Outcome::Refused {
+                    return Some(Outcome::Refused {
                         reason: word("reason"),
                         text: word("text"),
-                    };
+                    });
                 }
-                Some("unknown") => return Outcome::Unknown,
+                Some("unknown") => return Some(Outcome::Unknown),
                 _ => {}
             }
         }

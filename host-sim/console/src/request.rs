@@ -534,6 +534,21 @@ mod tests {
                 "without a unit: 120",
             ),
             (
+                "JointReference",
+                r#"{"joint":1,"stroke":"12cm"}"#,
+                "without a unit: 120",
+            ),
+            (
+                "JointReference",
+                r#"{"joint":1,"stroke":"0.12 m"}"#,
+                "without a unit: 120",
+            ),
+            (
+                "WheelReference",
+                r#"{"travel":"-0.5m"}"#,
+                "without a unit: -500",
+            ),
+            (
                 "ReadParameter",
                 r#"{"board":1,"parameter":268}"#,
                 "268 of this board is `settle_band`",
@@ -543,6 +558,12 @@ mod tests {
             let (_, text) = refused(cmd, args, 500);
             assert!(text.contains(advice), "{cmd} {args}: {text}");
         }
+        // What is in no unit of a length would be a wrong length.
+        let (_, text) = refused("JointReference", r#"{"joint":1,"stroke":"4in"}"#, 500);
+        assert!(
+            text.contains("0 to 180 mm") && !text.contains("without a unit"),
+            "{text}"
+        );
         for valid in [0, 1001] {
             let (_, text) = refused("Arm", "{}", valid);
             assert!(text.contains("valid_ms"), "{text}");

@@ -12,7 +12,7 @@ pub enum ReportError {
     #[error("cannot {action} `{}`: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::output),
-        help("choose another folder with --out DIR, or make this one writable")
+        help("choose another place with --out, or make this one writable")
     )]
     Output {
         /// What was tried, for example "create the folder".

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mcap::MessageStream;
+use mcap::{McapError, MessageStream};
 use serde_json::{Map, Value};
 
 use super::derived::Derived;
@@ -19,16 +19,20 @@ struct Logged {
 
 /// The messages of a log in the order in which they were written, without what follows from others,
 /// and without what a live robot alone has.
-fn messages(bytes: &[u8]) -> Result<impl Iterator<Item = Result<Logged, LogError>>, LogError> {
-    let stream = MessageStream::new(bytes)?;
+fn messages<'a>(
+    path: &'a Path,
+    bytes: &'a [u8],
+) -> Result<impl Iterator<Item = Result<Logged, LogError>>, LogError> {
+    let broken = move |e: McapError| LogError::read(path, std::io::Error::other(e.to_string()));
+    let stream = MessageStream::new(bytes).map_err(broken)?;
     let live = |topic: &str| {
         let mut live = channels().iter().filter(|def| def.written == Written::Live);
         live.any(|def| def.topic == topic)
     };
     let other = move |topic: &str| Derived::of_topic(topic).is_some() || live(topic);
     let own = stream.filter(move |m| !m.as_ref().is_ok_and(|m| other(&m.channel.topic)));
-    Ok(own.map(|message| {
-        let message = message?;
+    Ok(own.map(move |message| {
+        let message = message.map_err(broken)?;
         Ok(Logged {
             topic: message.channel.topic.clone(),
             t_ns: message.log_time,
@@ -78,11 +82,11 @@ fn message(here: Option<Logged>, there: Option<Logged>) -> String {
 /// differs.
 ///
 /// # Errors
-/// [`LogError::Read`] if a log cannot be read, [`LogError::Log`] if it is none.
+/// [`LogError::Read`] if a log cannot be read, or is none.
 pub fn first_difference(here: &Path, there: &Path) -> Result<Option<String>, LogError> {
     let read = |path: &Path| std::fs::read(path).map_err(|e| LogError::read(path, e));
-    let (here, there) = (read(here)?, read(there)?);
-    let (mut here, mut there) = (messages(&here)?, messages(&there)?);
+    let bytes = [read(here)?, read(there)?];
+    let (mut here, mut there) = (messages(here, &bytes[0])?, messages(there, &bytes[1])?);
     loop {
         let (a, b) = (here.next().transpose()?, there.next().transpose()?);
         match (a, b) {

@@ -12,7 +12,7 @@ pub enum LogError {
     #[error("cannot {action} `{}`: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::output),
-        help("choose another folder with --out DIR, or make this one writable")
+        help("choose another place with --out, or make this one writable")
     )]
     Output {
         /// What was tried, for example "create the folder".
@@ -37,14 +37,32 @@ pub enum LogError {
     },
 
     /// The log writer failed after the file had been opened.
-    #[error("cannot write the log: {}", message(.0))]
+    #[error("cannot write the log `{}`: {}", path.display(), message(.reason))]
     #[diagnostic(
         code(wheeleg::log),
         help(
             "the disk may be full; `wheeleg log recover` restores a complete log from what was written"
         )
     )]
-    Log(#[from] mcap::McapError),
+    Log {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        reason: mcap::McapError,
+    },
+
+    /// A log made from another one, which stays as it is, could not be written.
+    #[error("cannot write the log `{}`: {}", path.display(), message(.reason))]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("the disk may be full; write to another one with --out, or make room on this one")
+    )]
+    Made {
+        /// The new file.
+        path: PathBuf,
+        /// What went wrong.
+        reason: mcap::McapError,
+    },
 
     /// Tables that could not be written to their end.
     #[error("cannot finish {count} of the tables, the first is `{}`: {reason}", path.display())]
@@ -135,6 +153,22 @@ impl LogError {
     /// A log at `path` that could not be read.
     pub(crate) fn read(path: impl Into<PathBuf>, reason: std::io::Error) -> Self {
         Self::Read {
+            path: path.into(),
+            reason,
+        }
+    }
+
+    /// A log at `path` that could not be written, though it could be created.
+    pub(crate) fn log(path: impl Into<PathBuf>, reason: mcap::McapError) -> Self {
+        Self::Log {
+            path: path.into(),
+            reason,
+        }
+    }
+
+    /// A log at `path`, made from another one, that could not be written.
+    pub fn made(path: impl Into<PathBuf>, reason: mcap::McapError) -> Self {
+        Self::Made {
             path: path.into(),
             reason,
         }

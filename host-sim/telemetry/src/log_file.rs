@@ -64,7 +64,6 @@ pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), L
 
 /// Writes an MCAP log in compressed chunks.
 pub struct LogFile {
-    path: PathBuf,
     file: OpenLog,
     derive: Option<Box<dyn Derive + Send>>,
     payload: Vec<u8>,
@@ -72,6 +71,7 @@ pub struct LogFile {
 
 /// The file and what it takes to write into it.
 struct OpenLog {
+    path: PathBuf,
     /// `None` once it has failed.
     log: Option<mcap::Writer<BufWriter<File>>>,
     failed: Option<LogError>,
@@ -95,11 +95,13 @@ impl LogFile {
     pub fn create(path: &Path) -> Result<Self, LogError> {
         let file =
             File::create(path).map_err(|e| LogError::output("create the log file", path, e))?;
-        let begun = Self::begin(file, path);
-        begun.inspect_err(|_| discard(path))
+        Self::begin(file, path).map_err(|e| {
+            discard(path);
+            LogError::log(path, e)
+        })
     }
 
-    fn begin(file: File, path: &Path) -> Result<Self, LogError> {
+    fn begin(file: File, path: &Path) -> Result<Self, mcap::McapError> {
         let mut log = options().create(BufWriter::new(file))?;
         let mut headers = Vec::new();
         for def in channels() {
@@ -109,13 +111,13 @@ impl LogFile {
         }
         log.flush()?;
         let file = OpenLog {
+            path: path.to_owned(),
             log: Some(log),
             failed: None,
             headers,
             flushed_ns: 0,
         };
         Ok(Self {
-            path: path.to_owned(),
             file,
             derive: None,
             payload: Vec::with_capacity(1024),
@@ -127,12 +129,17 @@ impl LogFile {
     /// # Errors
     /// [`LogError::Log`] if they cannot be written.
     pub fn with(self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
-        let path = self.path.clone();
-        let with = self.with_derived(derive);
-        with.inspect_err(|_| discard(&path))
+        let path = self.file.path.clone();
+        self.with_derived(derive).map_err(|e| {
+            discard(&path);
+            LogError::log(&path, e)
+        })
     }
 
-    fn with_derived(mut self, derive: impl Derive + Send + 'static) -> Result<Self, LogError> {
+    fn with_derived(
+        mut self,
+        derive: impl Derive + Send + 'static,
+    ) -> Result<Self, mcap::McapError> {
         let Some(log) = self.file.log.as_mut() else {
             return Ok(self);
         };
@@ -174,7 +181,7 @@ impl OpenLog {
             result = result.and_then(|()| log.flush());
         }
         if let Err(e) = result {
-            self.failed = Some(LogError::Log(e));
+            self.failed = Some(LogError::log(&self.path, e));
             self.log = None;
         }
     }
@@ -221,8 +228,10 @@ impl Sink for LogFile {
             return Err(error);
         }
         if let Some(mut log) = self.file.log.take() {
-            log.finish()?;
-            log.into_inner().flush().map_err(mcap::McapError::Io)?;
+            let failed = |e| LogError::log(&self.file.path, e);
+            log.finish().map_err(failed)?;
+            let flushed = log.into_inner().flush();
+            flushed.map_err(|e| failed(mcap::McapError::Io(e)))?;
         }
         Ok(())
     }
@@ -232,7 +241,7 @@ impl Sink for LogFile {
 pub(crate) fn attach<W: Write + Seek>(
     log: &mut mcap::Writer<W>,
     file: Attached,
-) -> Result<(), LogError> {
+) -> Result<(), mcap::McapError> {
     let Attached {
         name,
         media_type,
@@ -244,8 +253,7 @@ pub(crate) fn attach<W: Write + Seek>(
         name,
         media_type,
         data: data.into(),
-    })?;
-    Ok(())
+    })
 }
 
 fn header(channel_id: u16) -> MessageHeader {
@@ -262,9 +270,9 @@ fn add_channel<W: Write + Seek>(
     topic: &str,
     (name, schema): (&str, &str),
     metadata: BTreeMap<String, String>,
-) -> Result<u16, LogError> {
+) -> Result<u16, mcap::McapError> {
     let schema_id = log.add_schema(name, "jsonschema", schema.as_bytes())?;
-    Ok(log.add_channel(schema_id, topic, "json", &metadata)?)
+    log.add_channel(schema_id, topic, "json", &metadata)
 }
 
 /// Rate of a channel in words.

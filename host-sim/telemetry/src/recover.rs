@@ -44,7 +44,7 @@ fn checked() -> LinearReaderOptions {
 /// # Errors
 /// [`LogError::Output`] if `to` exists or cannot be written, [`LogError::Read`] if `from` cannot be read;
 /// [`LogError::NotALog`] if `from` is none, [`LogError::Empty`] if it has no whole chunk;
-/// [`LogError::Log`] if the new file cannot be written, [`LogError::Unreadable`] and
+/// [`LogError::Made`] if the new file cannot be written, [`LogError::Unreadable`] and
 /// [`LogError::Unsound`] if it cannot be read back. `to` is not
 /// left behind then, and `from` is never changed.
 pub fn recover(
@@ -58,7 +58,7 @@ pub fn recover(
     source.rewind().map_err(unreadable)?;
     let target =
         File::create_new(to).map_err(|e| LogError::output("create the recovered log", to, e))?;
-    let recovered = copy(source, target, from, stop).and_then(|recovered| {
+    let recovered = copy(source, target, [from, to], stop).and_then(|recovered| {
         let Some(recovered) = recovered else {
             return Ok(None);
         };
@@ -82,12 +82,13 @@ pub fn recover(
 fn copy(
     source: File,
     target: File,
-    from: &Path,
+    [from, to]: [&Path; 2],
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Recovered>, LogError> {
-    let mut log = options().create(BufWriter::new(target))?;
+    let failed = |e| LogError::made(to, e);
+    let mut log = options().create(BufWriter::new(target)).map_err(failed)?;
     for file in attachments(from)? {
-        attach(&mut log, file)?;
+        attach(&mut log, file).map_err(failed)?;
     }
     let mut copy = Copy {
         log,
@@ -108,7 +109,7 @@ fn copy(
                 reader.notify_read(read.map_err(|e| LogError::read(from, e))?);
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
-                copy.take(opcode, data)?;
+                copy.take(opcode, data).map_err(failed)?;
                 if stop() {
                     return Ok(None);
                 }
@@ -126,12 +127,12 @@ fn copy(
     if recovered.messages == 0 {
         return Err(LogError::Empty { path: from.into() });
     }
-    log.finish()?;
+    log.finish().map_err(failed)?;
     let file = log
         .into_inner()
         .into_inner()
-        .map_err(|e| McapError::Io(e.into_error()))?;
-    file.sync_all().map_err(McapError::Io)?;
+        .map_err(|e| failed(McapError::Io(e.into_error())))?;
+    file.sync_all().map_err(|e| failed(McapError::Io(e)))?;
     Ok(Some(recovered))
 }
 

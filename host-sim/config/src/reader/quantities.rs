@@ -225,18 +225,21 @@ impl Reader {
             return Some(Entry { path, fields, span });
         }
         let Some(table) = item.as_table_like() else {
-            let message = match item.as_str() {
-                Some(text) if !self.source_required => {
-                    format!("`{path}` = \"{text}\" does not begin with a number; units: {units}")
+            let (message, label) = match item.as_str() {
+                Some(text) if !self.source_required => (
+                    format!("`{path}` = \"{text}\" does not begin with a number; units: {units}"),
+                    "a bare value",
+                ),
+                // The short form, which has no place for a source.
+                Some(text) if short(item, &span).is_some() => {
+                    (format!("`{path}` = \"{text}\" has no source"), "no source")
                 }
-                _ => format!("`{path}` has no unit; accepted: {units}"),
+                _ => (
+                    format!("`{path}` has no unit; accepted: {units}"),
+                    "a bare value",
+                ),
             };
-            self.problem(
-                Some(span),
-                message,
-                "a bare value",
-                Some(example.to_owned()),
-            );
+            self.problem(Some(span), message, label, Some(example.to_owned()));
             return None;
         };
         let inner = Entry {

@@ -7,7 +7,7 @@
 use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
-use super::{Facts, Found};
+use super::{Facts, Found, Relation};
 use crate::quantity::{pretty, suffix};
 
 /// Files that are tried at most for all relations of a file: each is read as a whole.
@@ -175,7 +175,10 @@ impl<'a> Search<'a> {
             for set in sets {
                 match self.answer(broken, set) {
                     Answer::Accepted => accepted.push(set.clone()),
-                    Answer::Broken(next) => begun.push((set.clone(), next)),
+                    Answer::Broken(next) => match self.narrowed(broken, set, &next) {
+                        Some(narrower) => accepted.push(narrower),
+                        None => begun.push((set.clone(), next)),
+                    },
                     Answer::Refused => {}
                 }
             }
@@ -184,6 +187,23 @@ impl<'a> Search<'a> {
             }
         }
         self.together(broken, begun).into_iter().collect()
+    }
+
+    /// A narrower limit for the only field of a set, where `next`, the relation that it breaks, asks for one.
+    fn narrowed(&self, broken: &Found, set: &[Offer], next: &Found) -> Option<Vec<Offer>> {
+        let [only] = set else { return None };
+        let is_own = |offers: &&Vec<Offer>| matches!(offers.as_slice(), [offer] if offer.advised.path == only.advised.path);
+        let mut narrower = next.broken.offers.iter().find(is_own)?.clone();
+        for _ in 1..TOGETHER {
+            match self.answer(broken, &narrower) {
+                Answer::Accepted => return Some(narrower),
+                Answer::Broken(next) => {
+                    narrower = next.broken.offers.iter().find(is_own)?.clone();
+                }
+                Answer::Refused => break,
+            }
+        }
+        None
     }
 
     fn answer(&self, broken: &Found, set: &[Offer]) -> Answer {
@@ -198,12 +218,22 @@ impl<'a> Search<'a> {
             return Answer::Refused;
         };
         let own = broken.relation.name;
+        // A relation that was broken before is another problem, unless these fields are its own, too.
         let new = |found: &Found| {
-            let name = found.relation.name;
-            name == own || !self.before.contains(name)
+            let Relation { name, fields, .. } = *found.relation;
+            let shares = || {
+                set.iter()
+                    .any(|offer| fields.iter().any(|path| *path == offer.advised.path))
+            };
+            name == own || !self.before.contains(name) || shares()
         };
-        if let Some(next) = tried.found.into_iter().find(new) {
-            return Answer::Broken(next);
+        let mut next: Vec<Found> = tried.found.into_iter().filter(new).collect();
+        if !next.is_empty() {
+            // One that knows what would mend it leads further.
+            let helpful = next
+                .iter()
+                .position(|found| !found.broken.offers.is_empty());
+            return Answer::Broken(next.swap_remove(helpful.unwrap_or(0)));
         }
         // What is as wrong without these values is not their fault.
         let before = || (self.attempt)(&[]).and_then(|tried| tried.whole);

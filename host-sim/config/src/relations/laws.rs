@@ -286,6 +286,8 @@ struct Calibrated {
     stroke_m: f64,
 }
 
+/// How far noise goes beyond its deviation.
+const NOISE_PEAKS: f64 = 6.0;
 /// Codes of the whole converter.
 const CODES: f64 = 65_536.0;
 
@@ -318,6 +320,12 @@ impl Calibrated {
     fn measured(&self, full_scale_mm: f64, zero: f64) -> [f64; 2] {
         self.shares()
             .map(|share| (share - zero / CODES) * full_scale_mm)
+    }
+
+    /// The stroke that a board measures as `measured_mm`.
+    fn stroke_at(&self, measured_mm: f64, full_scale_mm: f64, zero: f64) -> f64 {
+        let share = measured_mm / full_scale_mm + zero / CODES;
+        (share * self.electrical_m - self.offset_m) / self.gain
     }
 
     /// A board that measures what is.
@@ -358,14 +366,26 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);
     let (least, most) = (f.si(it.fields[6])?, f.si(it.fields[7])?);
-    if measured[0] >= least && measured[1] <= most {
+    let [nonlinearity, noise, bits] = [8, 9, 10].map(|i| f.si(it.fields[i]));
+    let off_mm = f.si(it.fields[4])? * (nonlinearity? + NOISE_PEAKS * noise? / bits?.exp2());
+    if measured[0] - off_mm >= least && measured[1] + off_mm <= most {
         return None;
     }
     let range = format!("{} to {} mm", pretty(least), pretty(most));
+    let mut offers = vec![sensor.calibrated(f, it)];
+    // Rounded to what people write; from a stop that is measured too low nothing follows.
+    let stroke_m = sensor.stroke_at(most - off_mm, f.si(it.fields[4])?, f.si(it.fields[5])?);
+    let stroke_m = (stroke_m * 1e4).floor() * 1e-4;
+    if stroke_m > 0.0 && stroke_m < sensor.stroke_m {
+        offers.push(vec![Offer::new(f, it.fields[3], Bound::UpTo, stroke_m)]);
+    }
     Some(Broken {
         figures: sensor.format(measured, "mm"),
-        offers: vec![sensor.calibrated(f, it)],
-        words: format!("a board takes strokes of {range}"),
+        offers,
+        words: format!(
+            "a board takes strokes of {range}, and measures up to {} mm beside them",
+            brief(off_mm)
+        ),
     })
 }
 

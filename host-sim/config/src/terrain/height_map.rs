@@ -159,10 +159,17 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     let text = text.trim_start_matches('\u{feff}');
     let mut values = Values::default();
     let mut wrong = Vec::new();
+    let mut has_semicolon = false;
+    let mut has_comma = false;
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or("").trim();
         if line.is_empty() {
             continue;
+        }
+        has_semicolon |= line.contains(';');
+        has_comma |= line.contains(',');
+        if has_semicolon && has_comma {
+            return Err(vec![decimal_comma(number, line)]);
         }
         values.lines.push(number);
         if values.lines.len() > MOST {
@@ -203,6 +210,16 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     } else {
         Err(wrong)
     }
+}
+
+/// Spreadsheets of many countries write decimal commas and part the numbers by semicolons: each
+/// comma would part a number in two.
+fn decimal_comma(line: usize, text: &str) -> String {
+    format!(
+        "line {line}: a file with semicolons and commas has decimal commas; write numbers with a \
+         decimal point, such as {}",
+        shortened(&text.replace(',', "."))
+    )
 }
 
 /// The beginning of a text, quoted.
@@ -288,6 +305,19 @@ mod tests {
             ]
         );
         assert_eq!(read("# nothing\n").unwrap_err(), ["it holds no numbers"]);
+        let comma = "a file with semicolons and commas has decimal commas";
+        for (table, line, written) in [
+            ("0,0;0,0;0,1\n0,0;0,2;0,1\n", "line 1: ", "\"0.0;0.0;0.1\""),
+            ("0;0,0;0\n0;0;0\n", "line 1: ", "\"0;0.0;0\""),
+            ("0;0\n# 1,5\n\n0,5;1\n", "line 4: ", "\"0.5;1\""),
+            ("0;0\n0,5\n", "line 2: ", "\"0.5\""),
+        ] {
+            let told = read(table).unwrap_err();
+            assert_eq!(told.len(), 1, "{told:?}");
+            for part in [line, comma, written] {
+                assert!(told[0].contains(part), "{part} in {told:?}");
+            }
+        }
         assert_eq!(
             table(b"1,2\n\xff,3").map(drop).unwrap_err(),
             ["line 2: not a text"]

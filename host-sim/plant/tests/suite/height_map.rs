@@ -223,3 +223,38 @@ fn a_wheel_in_a_groove_stands_on_both_walls() {
             .all(|n| (90.0..130.0).contains(n))
     );
 }
+
+/// The heights of an elevation model are those above the sea.
+#[test]
+fn a_robot_stands_as_well_on_high_ground() {
+    let standing = |height_m: f64| {
+        let mut params = wheeleg_2003();
+        let map = sampled(9, 0.5, -2.0, |x, _| height_m + 0.02 * x);
+        params.terrain.parts = vec![Part {
+            shape: Shape::HeightMap(Arc::new(map)),
+            material: Material::ROUGH,
+        }];
+        let plant = Plant::new(&params).unwrap();
+        let state = plant
+            .initial_state(1)
+            .unwrap_or_else(|e| panic!("{height_m} m: {e}"));
+        let o = plant.outputs(&state);
+        (o.position_m[2] - height_m, o.foot_normal_n)
+    };
+    let (low_m, low_n) = standing(0.0);
+    for height_m in [
+        999.7, 1000.0, 1024.0, 1500.0, 8848.0, -430.0, 9999.0, -9999.0,
+    ] {
+        let (above_m, feet_n) = standing(height_m);
+        assert!(
+            (above_m - low_m).abs() < 1e-9,
+            "{height_m}: {above_m}, {low_m}"
+        );
+        for (foot, low) in feet_n.iter().zip(low_n) {
+            assert!(
+                (foot - low).abs() < 1e-3,
+                "{height_m}: {feet_n:?}, {low_n:?}"
+            );
+        }
+    }
+}

@@ -138,12 +138,15 @@ impl Columns {
             find(name).ok_or_else(|| {
                 // Tables of other countries' programs; nothing else has these in a name.
                 let parted = names.iter().any(|name| name.contains([';', '\t']));
-                let help = if parted {
-                    "columns are parted by commas, and numbers have a decimal point"
+                let (what, help) = if parted {
+                    (
+                        "the columns are parted by semicolons or tabs".to_owned(),
+                        "columns are parted by commas, and numbers have a decimal point",
+                    )
                 } else {
-                    help
+                    (format!("there is no column `{name}`"), help)
                 };
-                StudyError::refused(format!("{file}, line 1: there is no column `{name}`"), help)
+                StudyError::refused(format!("{file}, line 1: {what}"), help)
             })
         };
         let times = VALVES.map(|valve| format!("{valve}_us"));

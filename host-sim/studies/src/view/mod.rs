@@ -135,8 +135,12 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
 fn span(options: &Options) -> Result<Span, StudyError> {
     let Options { from_s, to_s, .. } = *options;
     if !(from_s >= 0.0 && to_s > from_s) {
+        let to = match to_s {
+            f64::INFINITY => "the end".to_owned(),
+            to_s => format!("{to_s} s"),
+        };
         return Err(StudyError::refused(
-            format!("from {from_s} s to {to_s} s is not part of a log"),
+            format!("from {from_s} s to {to} is not part of a log"),
             "give --from from 0 on, and --to after it",
         ));
     }

@@ -13,7 +13,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         Refusal::NotInControl => {
             "it needs the control, which an operator takes at the console: take it first".to_owned()
         }
-        Refusal::NotArmed => "it needs armed axes: clear a stop if there was one, then arm".to_owned(),
+        Refusal::NotArmed => "it needs armed axes: give ClearFault if there was a stop, then Arm".to_owned(),
         Refusal::NotDisarmed => "it needs disarmed axes: disarm first".to_owned(),
         Refusal::Moving => {
             "the robot is moving: wait for the end of the motion, or give Hold, or StopGait in a gait"
@@ -25,7 +25,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
              leg that steps first"
                 .to_owned()
         }
-        Refusal::Latched => "an E-stop or HOLD is latched: clear it first".to_owned(),
+        Refusal::Latched => "an E-stop or HOLD is latched: give ClearFault, then Arm once the reservoir is full".to_owned(),
         Refusal::NoAir => {
             "the supply pressure switch is open: wait until the reservoir is full, then ask again; \
              if it stays open, check compressor, hose and regulator"

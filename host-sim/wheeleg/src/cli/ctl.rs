@@ -24,7 +24,7 @@ use wheeleg_telemetry::channels;
 
 use super::exit::{self, LOST};
 use super::serve::refused;
-use super::{print, say, tell, whole};
+use super::{print, say, stop_on_signals, tell, whole};
 use param::ParamCommand;
 use reach::{Reach, not_answered};
 
@@ -54,7 +54,8 @@ enum CtlCommand {
     /// Show the robot on the whole terminal: Esc stops it, q quits.
     #[cfg(unix)]
     Top,
-    /// Take control, send one command, wait until it has finished, and release control.
+    /// Take control, send one command, wait until it has finished, and release control. Ctrl-C ends what
+    /// it has begun: a walk with both feet down, any other motion where it is.
     Take {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
         #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
@@ -417,8 +418,15 @@ fn take(reach: &Reach, words: &[String]) -> Result<ExitCode, StudyError> {
             ));
         }
     }
-    let end = reach.in_control(&[(name.as_str(), Value::Object(given))])?;
-    reach.print_outcome(&end)
+    let stop = stop_on_signals()?;
+    let command = (name.as_str(), Value::Object(given));
+    match (reach.in_control_unless(&[command], &stop)?, stop.signal()) {
+        (None, Some(signal)) => {
+            tell(&format!("{}: `{name}` was ended", signal.label()));
+            Ok(ExitCode::from(signal.exit_code()))
+        }
+        (end, _) => reach.print_outcome(&end.unwrap_or(Outcome::Unknown)),
+    }
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ pub(super) struct FieldArgs {
     /// move to its folder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/field")]
     out: PathBuf,
-    /// Write the pictures as PNG as well as SVG.
+    /// Write the pictures as PNG as well as SVG, if the program was built with `--features png`.
     #[arg(long)]
     png: bool,
     /// Print the summary as JSON on stdout.

@@ -189,7 +189,7 @@ fn tell(line: &str) {
 /// What every study that draws can be asked for.
 #[derive(Debug, Args)]
 struct Drawing {
-    /// Write the figures as PNG as well as SVG.
+    /// Write the figures as PNG as well as SVG, if the program was built with `--features png`.
     #[arg(long)]
     png: bool,
 }

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use quick_xml::Reader;
@@ -156,6 +156,7 @@ fn fixed_links(urdf: &str) -> BTreeSet<String> {
 }
 
 struct Writer {
+    path: PathBuf,
     file: mcap::Writer<BufWriter<File>>,
     channels: Vec<u16>,
     counts: [u64; TOPICS.len()],
@@ -167,6 +168,7 @@ struct Writer {
 
 impl Writer {
     fn create(path: &Path, fixed: BTreeSet<String>, urdf: String) -> Result<Self, StudyError> {
+        let failed = |e| LogError::made(path, e);
         let file = File::create(path).map_err(|e| StudyError::output("create", path, e))?;
         let mut file = mcap::WriteOptions::new()
             .profile("ros2")
@@ -176,7 +178,7 @@ impl Writer {
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             .create(BufWriter::new(file))
-            .map_err(LogError::from)?;
+            .map_err(failed)?;
         let mut channels = Vec::new();
         for topic in &TOPICS {
             let definition = topic.kind.definition();
@@ -187,9 +189,10 @@ impl Writer {
                     let facts = [("offered_qos_profiles".to_owned(), profiles)];
                     file.add_channel(schema, topic.name, "cdr", &facts.into())
                 });
-            channels.push(added.map_err(LogError::from)?);
+            channels.push(added.map_err(failed)?);
         }
         Ok(Self {
+            path: path.to_owned(),
             file,
             channels,
             counts: [0; TOPICS.len()],
@@ -209,7 +212,7 @@ impl Writer {
             publish_time: t_ns,
         };
         let written = self.file.write_to_known_channel(&header, &message.bytes());
-        Ok(written.map_err(LogError::from)?)
+        Ok(written.map_err(|e| LogError::made(&self.path, e))?)
     }
 
     fn take(&mut self, channel: Derived, t_ns: u64, payload: &[u8]) -> Result<(), StudyError> {
@@ -239,9 +242,10 @@ impl Writer {
     }
 
     fn finish(mut self) -> Result<(), StudyError> {
-        self.file.finish().map_err(LogError::from)?;
+        let failed = |e| LogError::made(&self.path, e);
+        self.file.finish().map_err(failed)?;
         let flushed = self.file.into_inner().flush();
-        Ok(flushed.map_err(|e| LogError::from(mcap::McapError::Io(e)))?)
+        Ok(flushed.map_err(|e| failed(mcap::McapError::Io(e)))?)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -9,13 +10,21 @@ use wheeleg_console::client::{Client, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::request::FRAME_MAX;
 use wheeleg_console::{ADDRESS, Fingerprint, Key};
+use wheeleg_master::command::CommandCode;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::study::Stop;
 use wheeleg_studies::view::plain;
 
 use super::super::exit::{LOST, REFUSED};
 use super::super::serve::refused;
 use super::super::{print, tell};
 
+/// What is said where the control could not be given back.
+const NOT_RELEASED: &str = "the control is not released: the robot will hold";
+/// Longest time that a walk needs to put both feet down.
+const COMES_TO_REST: Duration = Duration::from_secs(20);
+/// Between two attempts to release the control. Beats are sent in each, more often than they are due.
+const BETWEEN: Duration = Duration::from_millis(50);
 /// How long a command of this program may be under way, ms.
 const VALID_MS: u32 = 1_000;
 
@@ -64,32 +73,49 @@ impl Reach {
     /// Takes the control, gives commands up to the first that is not done, and releases the control;
     /// how the last one ended.
     pub(super) fn in_control(&self, commands: &[(&str, Value)]) -> Result<Outcome, StudyError> {
+        let ended = self.in_control_unless(commands, &Stop::default())?;
+        Ok(ended.unwrap_or(Outcome::Unknown))
+    }
+
+    /// The same until a signal: what moves is then brought to rest before the control is released.
+    /// `None` after a signal.
+    pub(super) fn in_control_unless(
+        &self,
+        commands: &[(&str, Value)],
+        stop: &Stop,
+    ) -> Result<Option<Outcome>, StudyError> {
         for (name, arguments) in commands {
             ensure_fits(name, arguments)?;
         }
         let mut client = self.control()?;
-        let mut give = |name: &str, arguments: &Value| {
-            let end = client.carry_out(name, arguments, VALID_MS).map_err(refused);
-            client.keep_control(true);
-            end
-        };
-        let mut end = give("TakeControl", &json!({}))?;
+        let taken = client.carry_out("TakeControl", &json!({}), VALID_MS);
+        let mut end = taken.map_err(refused)?;
+        client.keep_control(true);
         if end != Outcome::Done {
-            return Ok(end);
+            return Ok(Some(end));
         }
+        // From here on a signal has to leave the robot at rest.
+        stop.begin();
         for (name, arguments) in commands {
-            end = give(name, arguments)?;
+            let n = client.give(name, arguments, VALID_MS).map_err(refused)?;
+            match client.outcome_unless(n, &|| stop.is_asked()) {
+                Some(ended) => end = ended,
+                None => {
+                    bring_to_rest(&mut client, name)?;
+                    return Ok(None);
+                }
+            }
             if end != Outcome::Done {
                 break;
             }
         }
         if end != Outcome::Lost {
-            let released = give("ReleaseControl", &json!({}))?;
-            if released != Outcome::Done {
-                tell("the control is not released: the robot will hold");
+            let released = client.carry_out("ReleaseControl", &json!({}), VALID_MS);
+            if released.map_err(refused)? != Outcome::Done {
+                tell(NOT_RELEASED);
             }
         }
-        Ok(end)
+        Ok(Some(end))
     }
 
     /// Gives a command to the simulation; how it ended.
@@ -120,6 +146,33 @@ impl Reach {
         }
         Ok(ExitCode::from(code))
     }
+}
+
+/// Ends what the command `name` has begun, and releases the control: a walk with both feet down,
+/// anything else where it is.
+fn bring_to_rest(client: &mut Client, name: &str) -> Result<(), StudyError> {
+    let is_gait = matches!(
+        CommandCode::of_name(name),
+        Some(CommandCode::Walk | CommandCode::StartGait)
+    );
+    let mut give = |name: &str| {
+        let end = client.carry_out(name, &json!({}), VALID_MS);
+        end.map_err(refused)
+    };
+    if !is_gait || give("StopGait")? != Outcome::Done {
+        // Refused where nothing is armed: then nothing moves.
+        give("Hold")?;
+    }
+    let begin = Instant::now();
+    // Refused as long as the robot moves.
+    while let Outcome::Refused { .. } = give("ReleaseControl")? {
+        if begin.elapsed() > COMES_TO_REST {
+            tell(NOT_RELEASED);
+            break;
+        }
+        std::thread::sleep(BETWEEN);
+    }
+    Ok(())
 }
 
 /// Tells what a server refuses over HTTP; its exit code.
