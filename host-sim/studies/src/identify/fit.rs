@@ -116,15 +116,15 @@ impl Problem<'_> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// The least cost close to a fit with some factors held at the file's value.
+    /// The least cost from a start with some factors held at the file's value.
     #[must_use]
-    pub fn held(&self, fit: &Fit, held: &[usize], go_on: &dyn Fn() -> bool) -> Option<Fit> {
+    pub fn held(&self, start: &Logs, held: &[usize], go_on: &dyn Fn() -> bool) -> Option<Fit> {
         let mut problem = *self;
-        let mut start = fit.logs;
         for i in held {
             problem.limits[*i] = [0.0; 2];
-            start[*i] = 0.0;
         }
+        let start =
+            std::array::from_fn(|i| start[i].clamp(problem.limits[i][0], problem.limits[i][1]));
         problem.fit(&start, go_on)
     }
 

@@ -47,8 +47,9 @@ fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Which factors can go back to the file's value without the fit getting worse by more than
-/// [`WORSE`]: of those that the data do not determine, the least determined first. Some of them may
-/// be determined together, as mass and pressure are, and so not all can go back.
+/// [`WORSE`]: of those that the data do not determine, the one first that has moved least against its
+/// deviation. Some of them may be determined together, as mass and pressure are, and so not all
+/// can go back.
 #[must_use]
 pub fn returnable(
     information: &DMatrix<f64>,
@@ -58,21 +59,40 @@ pub fn returnable(
     let Some(covariance) = covariance(information) else {
         return Vec::new();
     };
-    let left = |i: &usize| intervals[*i].deviation / trust(*i);
+    let moved = |i: &usize| logs[*i].abs() / intervals[*i].deviation;
     let mut order: Vec<usize> = (0..COUNT).filter(|i| !intervals[*i].determined).collect();
-    order.sort_by(|a, b| left(b).total_cmp(&left(a)));
+    order.sort_by(|a, b| moved(a).total_cmp(&moved(b)));
     let mut chosen = Vec::new();
     for i in order {
         chosen.push(i);
-        let size = chosen.len();
-        let part = DMatrix::from_fn(size, size, |a, b| covariance[(chosen[a], chosen[b])]);
-        let moved = DVector::from_fn(size, |a, _| logs[chosen[a]]);
-        let rise = part.cholesky().map(|part| moved.dot(&part.solve(&moved)));
-        if rise.is_none_or(|rise| rise > WORSE) {
+        let pull = pull(&covariance, logs, &chosen);
+        let rise = pull.map(|pull| chosen.iter().zip(&pull).map(|(i, p)| logs[*i] * p).sum());
+        if rise.is_none_or(|rise: f64| rise > WORSE) {
             chosen.pop();
         }
     }
     chosen
+}
+
+/// By how much each of some factors has moved, over the covariance of them.
+fn pull(covariance: &DMatrix<f64>, logs: &Logs, of: &[usize]) -> Option<DVector<f64>> {
+    let part = DMatrix::from_fn(of.len(), of.len(), |a, b| covariance[(of[a], of[b])]);
+    let moved = DVector::from_fn(of.len(), |a, _| logs[of[a]]);
+    Some(part.cholesky()?.solve(&moved))
+}
+
+/// Where the others are most likely if some factors go back to the file's value: the start of a fit
+/// without these.
+#[must_use]
+pub fn conditional(information: &DMatrix<f64>, logs: &Logs, held: &[usize]) -> Option<Logs> {
+    let covariance = covariance(information)?;
+    let pull = pull(&covariance, logs, held)?;
+    let mut start = *logs;
+    for (i, log) in start.iter_mut().enumerate() {
+        let parts = held.iter().zip(&pull);
+        *log -= parts.map(|(k, p)| covariance[(i, *k)] * p).sum::<f64>();
+    }
+    Some(start)
 }
 
 /// Intervals under the information of data and file.

@@ -356,7 +356,8 @@ pub fn fitted<'a>(
             break fit.clone();
         }
         // The plant is not as linear as the choice assumes.
-        match second.held(&fit, &held, &go_on) {
+        let start = intervals::conditional(&information, &fit.logs, &held);
+        match start.and_then(|start| second.held(&start, &held, &go_on)) {
             Some(kept) if 2.0 * (kept.cost - fit.cost) <= intervals::WORSE => break kept,
             _ => held.pop(),
         };
@@ -426,7 +427,7 @@ fn accepted(
         let held = [&fitted.held[..], &refused[..]].concat();
         fit = fitted
             .problem
-            .held(&fit, &held, &|| !progress.is_stopped())?;
+            .held(&fit.logs, &held, &|| !progress.is_stopped())?;
     }
     Some((fit, refused))
 }
