@@ -259,11 +259,10 @@ fn what_the_data_do_not_determine_stays_as_the_file_has_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = config();
     let real = applied(&config.axis, &truth(5));
-    let text = measured(&real, 2, 900, rich, false);
+    let text = measured(&real, 2, 600, |_| OUT, false);
     let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let all = problem(&config, &lab);
     let Fitted {
-        problem,
         fit,
         kept,
         held,
@@ -271,8 +270,8 @@ fn what_the_data_do_not_determine_stays_as_the_file_has_it() {
         ..
     } = fitted(&all, 1, &Progress::silent()).expect("a fit");
     assert!(
-        held.iter().any(|i| fit.logs[*i].abs() > 0.05),
-        "{:?}",
+        held.iter().any(|i| fit.logs[*i].abs() > 0.01),
+        "{held:?} of {:?}, {intervals:?}",
         fit.logs
     );
     assert!(
@@ -285,14 +284,6 @@ fn what_the_data_do_not_determine_stays_as_the_file_has_it() {
         let moved = (kept.logs[i] - fit.logs[i]).abs();
         assert!(moved < 2.5 * intervals[i].deviation, "{}", FREE[i].name);
     }
-    // To move one of them alone, without the others, would fit worse.
-    let mut alone = fit.logs;
-    for i in &held {
-        alone[*i] = 0.0;
-    }
-    let alone = problem.residuals(&alone).expect("a plant").norm();
-    assert!(alone > kept.residuals.norm(), "{alone}");
-
     let summary = study(&text, folder.path()).expect("it ends");
     let count = written_axis_says_what_is_kept(&summary, &folder.path().join("out"));
     assert!(count > 0, "{summary}");
