@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 
 use crate::ReportError;
 
-/// Everything that a run writes.
-const RESULTS: [&str; 7] = [
+/// Everything that a run writes, and what other commands make of its log beside it.
+const RESULTS: [&str; 13] = [
     "log.mcap",
     "summary.json",
     "report.html",
@@ -26,6 +26,12 @@ const RESULTS: [&str; 7] = [
     "csv",
     "figures",
     NATIVE,
+    "log.html",
+    "log-recovered.mcap",
+    "log-recovered.html",
+    "compared.html",
+    "parquet",
+    "ros2",
 ];
 /// The file that a run holds while it writes into a folder.
 const LOCK: &str = ".lock";
@@ -33,6 +39,26 @@ const LOCK: &str = ".lock";
 pub const NATIVE: &str = "sil";
 /// Where the results of the run before stay.
 const PREVIOUS: &str = "previous";
+
+/// All results of a kind of run that writes `also`, too.
+fn results(also: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
+    RESULTS.into_iter().chain(also.iter().copied())
+}
+
+/// The result that has the place of a file in a folder, or of the folder that the file is in: a run
+/// that reads the file may not write there.
+#[must_use]
+pub fn result_in_place_of(
+    file: &Path,
+    folder: &Path,
+    also: &'static [&'static str],
+) -> Option<&'static str> {
+    let file = file.canonicalize().ok()?;
+    results(also).find(|name| {
+        let result = folder.join(name).canonicalize();
+        result.is_ok_and(|result| file.starts_with(result))
+    })
+}
 
 /// The first of `previous`, `previous-2`, … that does not exist.
 fn free_place(folder: &Path) -> PathBuf {
@@ -49,6 +75,8 @@ fn free_place(folder: &Path) -> PathBuf {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
+    /// Names of results beside those that every run has.
+    also: &'static [&'static str],
     /// Folders that were not there before, the innermost first.
     made: Vec<PathBuf>,
     /// Where the results of the run before went.
@@ -58,12 +86,13 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Creates the folder, or sets aside the results in it, and holds it.
+    /// Creates the folder, or sets aside the results in it, and holds it. `also` are the names of
+    /// results that only this kind of run has.
     ///
     /// # Errors
     /// [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
     /// its lock cannot be created or a result not moved.
-    pub fn prepare(path: &Path) -> Result<Self, ReportError> {
+    pub fn prepare(path: &Path, also: &'static [&'static str]) -> Result<Self, ReportError> {
         let above = path.ancestors().filter(|p| !p.as_os_str().is_empty());
         let made = above.take_while(|p| !p.exists());
         let made: Vec<PathBuf> = made.map(Path::to_owned).collect();
@@ -72,9 +101,10 @@ impl Folder {
             .map_err(|e| ReportError::output("create the folder", path, e))
             .inspect_err(gone)?;
         let lock = lock(&path.join(LOCK)).inspect_err(gone)?;
-        let previous = set_aside(path)?;
+        let previous = set_aside(path, also)?;
         Ok(Self {
             path: path.to_owned(),
+            also,
             made,
             previous,
             _lock: lock,
@@ -91,11 +121,11 @@ impl Folder {
 impl Drop for Folder {
     /// Of a run that has written nothing, nothing is left.
     fn drop(&mut self) {
-        if RESULTS.iter().any(|name| self.path.join(name).exists()) {
+        if results(self.also).any(|name| self.path.join(name).exists()) {
             return;
         }
         if let Some(previous) = &self.previous {
-            for name in RESULTS {
+            for name in results(self.also) {
                 // What is not there does not come back.
                 let _ = std::fs::rename(previous.join(name), self.path.join(name));
             }
@@ -223,19 +253,20 @@ fn take(_: &File) -> std::io::Result<bool> {
 }
 
 /// Moves the results in a folder to the next free `previous`, if there are any; where they are.
-fn set_aside(folder: &Path) -> Result<Option<PathBuf>, ReportError> {
-    let old = RESULTS.map(|name| folder.join(name));
-    if !old.iter().any(|path| path.exists()) {
+fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<PathBuf>, ReportError> {
+    let old: Vec<&str> = results(also)
+        .filter(|name| folder.join(name).exists())
+        .collect();
+    if old.is_empty() {
         return Ok(None);
     }
     let previous = free_place(folder);
     std::fs::create_dir_all(&previous)
         .map_err(|e| ReportError::output("create the folder", &previous, e))?;
-    for (name, path) in RESULTS.iter().zip(&old) {
-        if path.exists() {
-            std::fs::rename(path, previous.join(name))
-                .map_err(|e| ReportError::output("set aside", path, e))?;
-        }
+    for name in old {
+        let path = folder.join(name);
+        std::fs::rename(&path, previous.join(name))
+            .map_err(|e| ReportError::output("set aside", &path, e))?;
     }
     // Standard error may be closed or full.
     let _ = writeln!(
@@ -258,7 +289,7 @@ mod tests {
         let folder = temporary.path().join("a/b");
         // Each run draws its first figure while it holds the folder.
         let prepare = || {
-            Folder::prepare(&folder).map(|_held| {
+            Folder::prepare(&folder, &[]).map(|_held| {
                 fs::create_dir_all(folder.join("figures")).expect("created");
             })
         };
@@ -300,7 +331,7 @@ mod tests {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let file = temporary.path().join("taken");
         fs::write(&file, "x").expect("written");
-        let error = Folder::prepare(&file).expect_err("not a folder");
+        let error = Folder::prepare(&file, &[]).expect_err("not a folder");
         assert!(error.to_string().contains("taken"), "{error}");
     }
 
@@ -308,9 +339,9 @@ mod tests {
     fn a_folder_that_is_held_is_refused_by_name_of_its_lock_and_nothing_is_moved() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path();
-        let first = Folder::prepare(folder).expect("prepared");
+        let first = Folder::prepare(folder, &[]).expect("prepared");
         fs::write(folder.join("log.mcap"), "the first's").expect("written");
-        let refused = Folder::prepare(folder).expect_err("held");
+        let refused = Folder::prepare(folder, &[]).expect_err("held");
         let said = refused.to_string();
         assert!(said.contains(".lock"), "{said}");
         assert!(
@@ -321,7 +352,7 @@ mod tests {
         // A lock that nobody holds any more is none, whatever the file says.
         drop(first);
         assert!(folder.join(LOCK).exists());
-        let _second = Folder::prepare(folder).expect("free again");
+        let _second = Folder::prepare(folder, &[]).expect("free again");
         assert!(folder.join("previous/log.mcap").exists());
     }
 
@@ -329,14 +360,14 @@ mod tests {
     fn a_run_without_a_result_leaves_nothing_and_what_it_set_aside_comes_back() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path().join("runs/a");
-        drop(Folder::prepare(&folder).expect("prepared"));
+        drop(Folder::prepare(&folder, &[]).expect("prepared"));
         assert!(!temporary.path().join("runs").exists());
 
         // A folder of somebody else's stays, with what is in it.
         fs::create_dir_all(&folder).expect("created");
         fs::write(folder.join("notes.txt"), "mine").expect("written");
         fs::write(folder.join("summary.json"), "earlier").expect("written");
-        let held = Folder::prepare(&folder).expect("prepared");
+        let held = Folder::prepare(&folder, &[]).expect("prepared");
         assert!(folder.join("previous/summary.json").exists());
         drop(held);
         let kept = fs::read_to_string(folder.join("summary.json"));
@@ -344,9 +375,59 @@ mod tests {
         assert!(folder.join("notes.txt").exists() && !folder.join("previous").exists());
 
         // With a result all stays where it went.
-        let held = Folder::prepare(&folder).expect("prepared");
+        let held = Folder::prepare(&folder, &[]).expect("prepared");
         fs::write(folder.join("log.mcap"), "new").expect("written");
         drop(held);
         assert!(folder.join("previous/summary.json").exists());
+    }
+
+    #[test]
+    fn what_was_made_of_a_log_goes_with_it_and_so_do_files_of_one_kind_of_run() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path();
+        let made = [
+            "log.mcap",
+            "log.html",
+            "log-recovered.mcap",
+            "parquet",
+            "ros2",
+        ];
+        for name in made {
+            fs::write(folder.join(name), "first").expect("written");
+        }
+        fs::write(folder.join("axis.toml"), "mine").expect("written");
+        // The axis file is a result of another kind of run.
+        let held = Folder::prepare(folder, &[]).expect("prepared");
+        for name in made {
+            assert!(!folder.join(name).exists(), "{name}");
+            assert!(folder.join("previous").join(name).exists(), "{name}");
+        }
+        assert!(folder.join("axis.toml").exists());
+        fs::write(folder.join("log.mcap"), "second").expect("written");
+        drop(held);
+        let _held = Folder::prepare(folder, &["axis.toml"]).expect("prepared");
+        assert!(!folder.join("axis.toml").exists());
+        let kept = fs::read_to_string(folder.join("previous-2/axis.toml"));
+        assert_eq!(kept.expect("kept"), "mine");
+    }
+
+    #[test]
+    fn a_file_in_the_place_of_a_result_is_found_by_any_path_to_it() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path().join("out");
+        fs::create_dir_all(folder.join("figures")).expect("created");
+        for name in ["axis.toml", "figures/mine.toml", "mine.toml"] {
+            fs::write(folder.join(name), "mine").expect("written");
+        }
+        let also: &[&str] = &["axis.toml"];
+        let found = |file: &str| result_in_place_of(&folder.join(file), &folder, also);
+        assert_eq!(found("axis.toml"), Some("axis.toml"));
+        assert_eq!(found("../out/./axis.toml"), Some("axis.toml"));
+        assert_eq!(found("figures/mine.toml"), Some("figures"));
+        assert_eq!(found("mine.toml"), None);
+        assert_eq!(found("none.toml"), None);
+        let other = temporary.path().join("other");
+        let elsewhere = result_in_place_of(&folder.join("axis.toml"), &other, also);
+        assert_eq!(elsewhere, None);
     }
 }

@@ -1,16 +1,21 @@
 //! Identification: the truth is known, because the measurements are the plant's own.
 
+use std::path::Path;
+
+use nalgebra::DMatrix;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::{Axis, AxisParams};
 use wheeleg_studies::identify::fit::{Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
-use wheeleg_studies::identify::intervals::{covers, undetermined};
+use wheeleg_studies::identify::intervals::{
+    conditional, covers, intervals, returnable, undetermined,
+};
 use wheeleg_studies::identify::lab::Lab;
 use wheeleg_studies::identify::map::Mapped;
 use wheeleg_studies::identify::{Fitted, Options, fitted, identify, noise};
-use wheeleg_studies::study::{Progress, Settings};
+use wheeleg_studies::study::{Progress, Settings, Signal, Stop};
 
 const OUT: [u16; 4] = [1000, 0, 0, 1000];
 const BACK: [u16; 4] = [0, 1000, 1000, 0];
@@ -108,6 +113,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         intervals,
         information,
         stopped,
+        ..
     } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     assert!(stopped.is_none());
     let found = (0..COUNT).filter(|i| intervals[*i].determined).count();
@@ -155,17 +161,21 @@ fn what_the_valves_never_did_is_not_determined() {
     assert!(intervals.iter().filter(|t| t.determined).count() < COUNT - 2);
 }
 
-fn study(text: &str, folder: &std::path::Path) -> Result<String, String> {
+fn study(text: &str, folder: &Path) -> Result<String, String> {
     let lab = folder.join("lab.csv");
     std::fs::write(&lab, text).expect("written");
+    study_of(&lab, "bench-vq110u", &folder.join("out"))
+}
+
+fn study_of(lab: &Path, axis: &str, out: &Path) -> Result<String, String> {
     let options = Options {
-        lab: &lab,
-        axis: "bench-vq110u",
+        lab,
+        axis,
         map: &[],
         hold_out: 0.3,
         seed: 1,
     };
-    let finished = identify(&options, |_| Settings::new(folder.join("out")));
+    let finished = identify(&options, |_| Settings::new(out));
     finished.map(|f| f.summary).map_err(|e| e.to_string())
 }
 
@@ -187,12 +197,209 @@ fn the_study_writes_an_axis_that_meets_what_it_has_not_seen_and_notices_a_leak()
     assert!((kg(&axis.axis) / kg(&real) - 1.0).abs() < 0.3);
     assert!(out.join("next-experiment.csv").exists() && out.join("report.html").exists());
 
+    // A second identification keeps what somebody has made of the first.
+    std::fs::write(out.join("axis.toml"), "mine").expect("written");
+    let short = measured(&real, 2, 400, rich, false);
+    let summary = study(&short, folder.path()).expect("it ends");
+    let kept = |name: &str| std::fs::read_to_string(out.join("previous").join(name));
+    assert_eq!(kept("axis.toml").expect("kept"), "mine");
+    assert!(kept("next-experiment.csv").is_ok());
+    written_axis_says_what_is_kept(&summary, &out);
+
     let mut leaky = real.clone();
     leaky.cylinder.piston_leak_m3_s_pa *= 20_000.0;
     let other = tempfile::tempdir().expect("a folder");
     let summary = study(&measured(&leaky, 2, 4800, rich, false), other.path()).expect("it ends");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["explained"], false, "{summary}");
+}
+
+/// Whether the axis of a study is sound, with the file's value where the summary says that it is kept;
+/// how many are.
+fn written_axis_says_what_is_kept(summary: &str, out: &Path) -> usize {
+    let summary: serde_json::Value = serde_json::from_str(summary).expect("JSON");
+    let text = std::fs::read_to_string(out.join("axis.toml")).expect("an axis");
+    let found = AxisConfig::parse("axis.toml", &text).expect("a sound one");
+    let file = config();
+    let of = |config: &AxisConfig, path: &str| {
+        let mut all = config.parameters.iter();
+        let info = all.find(|info| info.path == path).expect("a parameter");
+        (info.value[0], info.source.clone())
+    };
+    let mut count = 0;
+    for parameter in summary["parameters"].as_array().expect("a list") {
+        let factor = parameter["factor"].as_f64().expect("a number");
+        let [low, high] = ["low", "high"].map(|end| parameter[end].as_f64().expect("a number"));
+        assert!((low..=high).contains(&factor), "{parameter}");
+        let is_kept = !parameter["kept"].is_null();
+        count += usize::from(is_kept);
+        assert!(is_kept || (factor - 1.0).abs() > 0.0, "{parameter}");
+        for path in parameter["paths"].as_array().expect("a list") {
+            let path = path.as_str().expect("a text");
+            let ((before, source), (after, said)) = (of(&file, path), of(&found, path));
+            if is_kept {
+                assert!(
+                    (after - before).abs() <= 1e-12 * before.abs(),
+                    "{path}: {after}"
+                );
+                assert!(said.starts_with(&source), "{path}: {said}");
+            } else if parameter["determined"] == false {
+                assert!(
+                    said.contains("does not determine it alone"),
+                    "{path}: {said}"
+                );
+            } else {
+                assert!(said.starts_with("IDENTIFIED"), "{path}: {said}");
+            }
+        }
+    }
+    count
+}
+
+/// Data that know a conductance and a dead volume only together: the volume goes back to the file's
+/// value, and the conductance makes up for it; a volume that contradicts the file stays.
+#[test]
+fn what_is_not_determined_goes_back_to_the_file_and_the_others_make_up_for_it() {
+    let volume = FREE.iter().position(|f| f.name == "dead_volume_a");
+    let volume = volume.expect("one");
+    let mut information = DMatrix::identity(COUNT, COUNT) * 1e6;
+    information[(volume, volume)] = 0.04 * 1e6;
+    information[(0, volume)] = 0.2 * 1e6;
+    information[(volume, 0)] = 0.2 * 1e6;
+    let known = intervals(&information);
+    assert!(known[0].determined && !known[volume].determined);
+    let mut logs = [0.0; COUNT];
+    (logs[0], logs[volume]) = (0.1, 0.6);
+    let held = returnable(&information, &known, &logs);
+    assert_eq!(held, [volume]);
+    let start = conditional(&information, &logs, &held).expect("a start");
+    assert!(start[volume].abs() < 1e-9 && (start[0] - 0.22).abs() < 1e-3);
+    logs[volume] = 3.0;
+    assert!(returnable(&information, &known, &logs).is_empty());
+}
+
+/// A single stroke shuts no valve: the delay of that is the file's, and so is its source.
+#[test]
+fn what_the_data_do_not_determine_stays_as_the_file_has_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let real = applied(&config().axis, &truth(5));
+    let text = measured(&real, 2, 600, |_| OUT, false);
+    let summary = study(&text, folder.path()).expect("it ends");
+    let count = written_axis_says_what_is_kept(&summary, &folder.path().join("out"));
+    assert!(count > 0, "{summary}");
+}
+
+/// A supply that measures less than the pressure at which its contact closes.
+#[test]
+fn an_axis_that_the_program_would_refuse_is_not_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = AxisConfig::source("bench-vq110u").expect("built in");
+    let text = source.text.replacen("551325.0", "690000.0", 1);
+    let file = folder.path().join("mine.toml");
+    std::fs::write(&file, &text).expect("written");
+    let config = AxisConfig::parse("mine.toml", &text).expect("sound");
+    let mut real = config.axis.clone();
+    real.supply.set_pressure_pa *= 0.9;
+    real.supply.initial_pressure_pa *= 0.9;
+    let lab = folder.path().join("lab.csv");
+    std::fs::write(&lab, measured(&real, 2, 1500, rich, true)).expect("written");
+    let out = folder.path().join("out");
+    let file = file.to_str().expect("UTF-8");
+    let summary = study_of(&lab, file, &out).expect("it ends");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let mut parameters = summary["parameters"].as_array().expect("a list").iter();
+    let supply = parameters
+        .find(|p| p["name"] == "supply_pressure")
+        .expect("one");
+    assert_eq!(supply["kept"], "contradiction", "{supply}");
+    let axis = AxisConfig::from_path(&out.join("axis.toml")).expect("a sound one");
+    assert!((axis.axis.supply.set_pressure_pa - config.axis.supply.set_pressure_pa).abs() < 1e-6);
+    let text = std::fs::read_to_string(out.join("axis.toml")).expect("an axis");
+    assert!(text.contains("contradicts other values of this file"));
+}
+
+#[test]
+fn an_output_that_is_an_input_is_refused_and_both_stay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path();
+    let text = measured(&config().axis, 1, 300, |_| OUT, false);
+    let axis = AxisConfig::source("bench-vq110u").expect("built in").text;
+    for (lab, mine, named) in [
+        ("next-experiment.csv", "mine.toml", "next-experiment.csv"),
+        ("lab.csv", "axis.toml", "axis.toml"),
+    ] {
+        let [lab, mine] = [lab, mine].map(|name| out.join(name));
+        std::fs::write(&lab, &text).expect("written");
+        std::fs::write(&mine, &axis).expect("written");
+        let told = study_of(&lab, mine.to_str().expect("UTF-8"), out).expect_err("refused");
+        assert!(
+            told.contains(named) && told.contains("is an input"),
+            "{told}"
+        );
+        assert_eq!(std::fs::read_to_string(&lab).expect("there"), text);
+        assert_eq!(std::fs::read_to_string(&mine).expect("there"), axis);
+        assert!(!out.join("previous").exists() && !out.join("summary.json").exists());
+        std::fs::remove_file(&lab).expect("removed");
+        std::fs::remove_file(&mine).expect("removed");
+    }
+}
+
+/// A stop is looked at between two simulations, of which a step of the fit needs some 25.
+#[test]
+fn a_fit_that_is_stopped_ends_within_a_step_and_is_told_as_stopped() {
+    let config = config();
+    let real = applied(&config.axis, &truth(5));
+    let text = measured(&real, 1, 300, |_| OUT, false);
+    let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
+    let problem = problem(&config, &lab);
+    let calls = std::cell::Cell::new(0);
+    let go_on = || {
+        calls.set(calls.get() + 1);
+        calls.get() < 3
+    };
+    let start = [0.0; COUNT];
+    let fit = problem.fit(&start, &go_on).expect("a plant");
+    assert!(fit.logs == start && calls.get() < 5, "{:?}", fit.logs);
+
+    // All starts are under way or not begun when it comes: none of them is done.
+    let stop = Stop::default();
+    let progress = Progress::new("test", stop.clone());
+    stop.ask(Signal::HangUp);
+    let stopped = fitted(&problem, 1, &progress)
+        .expect("what there is")
+        .stopped;
+    assert_eq!(stopped.map(|stopped| stopped.done), Some(0));
+}
+
+/// Blank lines and the line ends of another system count as an editor counts them.
+#[test]
+fn a_wrong_line_after_blank_lines_is_told_by_its_own_number() {
+    let config = config();
+    let sound = measured(&config.axis, 1, 300, |_| OUT, false);
+    let mut lines: Vec<&str> = sound.lines().collect();
+    for _ in 0..3 {
+        lines.insert(100, "");
+    }
+    lines[209] = "0.205,many,1000,0,0,1000";
+    lines.insert(0, "");
+    for end in ["\n", "\r\n"] {
+        let told = |lines: &[&str]| {
+            let wrong = Lab::parse("lab.csv", &lines.join(end), &config.axis, &[]);
+            wrong.expect_err("wrong").to_string()
+        };
+        let said = told(&lines);
+        assert!(said.contains("line 211, column `position_mm`"), "{said}");
+        let mut short = lines.clone();
+        short[210] = "0.205,40";
+        let said = told(&short);
+        assert!(said.contains("line 211, column `fill_a_us`"), "{said}");
+        short[1] = "time_s,place";
+        let said = told(&short);
+        assert!(
+            said.contains("lab.csv, line 2: there is no column"),
+            "{said}"
+        );
+    }
 }
 
 /// A table with names, units and columns of its own, of which one tells two valves, is the same

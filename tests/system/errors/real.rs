@@ -44,11 +44,11 @@ pub(super) fn driven() -> Vec<Driven> {
 }
 
 fn outputs(folder: &Path, all: &mut Vec<Driven>) {
-    let output = || Folder::prepare(Path::new(NO_FOLDER)).expect_err("no folder");
+    let output = || Folder::prepare(Path::new(NO_FOLDER), &[]).expect_err("no folder");
     all.push(("ReportError::Output", Box::new(output()), vec![NO_FOLDER]));
     let held = folder.join("held");
-    let _held = Folder::prepare(&held).expect("free");
-    let in_use = Folder::prepare(&held).expect_err("in use");
+    let _held = Folder::prepare(&held, &[]).expect("free");
+    let in_use = Folder::prepare(&held, &[]).expect_err("in use");
     let words = vec!["held", ".lock", "process"];
     all.push(("ReportError::InUse", Box::new(in_use), words));
     let no_png = ensure_png().expect_err("built without it");

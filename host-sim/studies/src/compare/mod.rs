@@ -142,7 +142,8 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
 pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
     let configs = configs(options)?;
     let before = judged::read(options)?;
-    let job = Job::begin("compare", settings)?;
+    let axes: Vec<&Path> = options.axes.iter().map(Path::new).collect();
+    let job = Job::begin_with("compare", settings, &[], &axes)?;
     let comparison = Comparison::play(options, configs, before, &job.progress)?;
     Ok(comparison.write(job))
 }

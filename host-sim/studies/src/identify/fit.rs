@@ -2,7 +2,7 @@
 //!
 //! Levenberg–Marquardt in Marquardt's form (Nocedal, Wright: Numerical Optimization, ch. 10), on
 //! logarithms of the factors. The file is a measurement, too: each logarithm has its trust as a
-//! standard deviation, so that what the data cannot tell stays where the file has it.
+//! standard deviation, so that what the data cannot tell stays close to where the file has it.
 
 use nalgebra::{DMatrix, DVector};
 use wheeleg_plant::axis::AxisParams;
@@ -89,7 +89,15 @@ impl Problem<'_> {
     /// How the residuals change with each logarithm; `None` where there is no such plant.
     #[must_use]
     pub fn jacobian(&self, logs: &Logs) -> Option<DMatrix<f64>> {
+        self.jacobian_while(logs, &|| true)
+    }
+
+    /// The same, `None` also if `go_on` ends it early.
+    fn jacobian_while(&self, logs: &Logs, go_on: &dyn Fn() -> bool) -> Option<DMatrix<f64>> {
         let columns = (0..COUNT).map(|i| {
+            if !go_on() {
+                return None;
+            }
             let at = |by: f64| {
                 let mut moved = *logs;
                 moved[i] += by;
@@ -106,6 +114,18 @@ impl Problem<'_> {
         });
         let columns: Vec<DVector<f64>> = columns.collect::<Option<_>>()?;
         Some(DMatrix::from_columns(&columns))
+    }
+
+    /// The least cost from a start with some factors held at the file's value.
+    #[must_use]
+    pub fn held(&self, start: &Logs, held: &[usize], go_on: &dyn Fn() -> bool) -> Option<Fit> {
+        let mut problem = *self;
+        for i in held {
+            problem.limits[*i] = [0.0; 2];
+        }
+        let start =
+            std::array::from_fn(|i| start[i].clamp(problem.limits[i][0], problem.limits[i][1]));
+        problem.fit(&start, go_on)
     }
 
     fn cost(&self, residuals: &DVector<f64>, logs: &Logs) -> f64 {
@@ -127,7 +147,7 @@ impl Problem<'_> {
             if !go_on() {
                 break;
             }
-            let Some(jacobian) = self.jacobian(&now.logs) else {
+            let Some(jacobian) = self.jacobian_while(&now.logs, go_on) else {
                 break;
             };
             let mut normal = jacobian.tr_mul(&jacobian);
@@ -139,7 +159,7 @@ impl Problem<'_> {
             }
             let before = now.cost;
             let mut better = None;
-            while better.is_none() && damping < 1e8 {
+            while better.is_none() && damping < 1e8 && go_on() {
                 better = self.step(&now, &normal, &gradient, damping);
                 damping *= if better.is_some() { 0.2 } else { 5.0 };
             }

@@ -120,8 +120,8 @@ struct Columns {
 
 impl Columns {
     /// `map` tells where those are that have another name in the file.
-    fn of(file: &str, names: Vec<String>, map: &[Mapped]) -> Result<Self, StudyError> {
-        mapped(file, &names, map)?;
+    fn of(file: &str, line: u64, names: Vec<String>, map: &[Mapped]) -> Result<Self, StudyError> {
+        mapped(file, line, &names, map)?;
         let find = |name: &str| -> Option<Place> {
             let from = map.iter().find(|mapped| mapped.name == name);
             let own = from.map_or(name, |mapped| mapped.column.as_str());
@@ -146,7 +146,7 @@ impl Columns {
                 } else {
                     (format!("there is no column `{name}`"), help)
                 };
-                StudyError::refused(format!("{file}, line 1: {what}"), help)
+                StudyError::refused(format!("{file}, line {line}: {what}"), help)
             })
         };
         let times = VALVES.map(|valve| format!("{valve}_us"));
@@ -185,7 +185,7 @@ impl Columns {
         match others.find(|(i, _)| !known.contains(i)) {
             Some((_, name)) => Err(StudyError::refused(
                 format!(
-                    "{file}, line 1: the column `{}` is not known, or stands there twice",
+                    "{file}, line {line}: the column `{}` is not known, or stands there twice",
                     shown(name)
                 ),
                 help,
@@ -196,7 +196,7 @@ impl Columns {
 }
 
 /// Whether each column that is named is in the table, once.
-fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError> {
+fn mapped(file: &str, line: u64, names: &[String], map: &[Mapped]) -> Result<(), StudyError> {
     for (place, mapped) in map.iter().enumerate() {
         let Mapped { name, column, .. } = mapped;
         if map[..place].iter().any(|earlier| earlier.name == *name) {
@@ -216,7 +216,7 @@ fn mapped(file: &str, names: &[String], map: &[Mapped]) -> Result<(), StudyError
             let all = shown_at(&names.join("`, `"), 400);
             return Err(StudyError::refused(
                 format!(
-                    "{file}, line 1: there is {how} `{}`, which `--map` gives for `{name}`",
+                    "{file}, line {line}: there is {how} `{}`, which `--map` gives for `{name}`",
                     shown(column)
                 ),
                 format!("the columns are `{all}`"),
@@ -257,12 +257,13 @@ impl Lab {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let names = reader.headers().map_err(|e| bad_row(file, &[], &e))?;
-        let columns = Columns::of(file, names.iter().map(str::to_owned).collect(), map)?;
+        let names = reader.headers().map_err(|e| bad_row(file, text, &[], &e))?;
+        let names = names.iter().map(str::to_owned).collect();
+        let columns = Columns::of(file, line_of(text, &csv::Position::new()), names, map)?;
         let mut rows = Vec::new();
         for record in reader.records() {
-            let record = record.map_err(|e| bad_row(file, &columns.names, &e))?;
-            let line = record.position().map_or(0, csv::Position::line);
+            let record = record.map_err(|e| bad_row(file, text, &columns.names, &e))?;
+            let line = record.position().map_or(0, |at| line_of(text, at));
             rows.push((line, row(&At { file, line }, &columns, &record, axis)?));
         }
         if rows.len() < ROWS_MIN {
@@ -279,11 +280,20 @@ impl Lab {
     }
 }
 
+/// The line of a record: the reader counts blank lines before it as a part of it.
+fn line_of(text: &str, at: &csv::Position) -> u64 {
+    let begin = usize::try_from(at.byte()).ok();
+    let rest = begin.and_then(|begin| text.as_bytes().get(begin..));
+    let blank = rest.unwrap_or_default().iter();
+    let blank = blank.take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    at.line() + blank.filter(|byte| **byte == b'\n').count() as u64
+}
+
 /// A line that is no row of the table.
-fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
+fn bad_row(file: &str, text: &str, columns: &[String], error: &csv::Error) -> StudyError {
     const HELP: &str = "each line has a value for each column, parted by commas";
     if let csv::ErrorKind::UnequalLengths { pos, len, .. } = error.kind() {
-        let line = pos.as_ref().map_or(0, csv::Position::line);
+        let line = pos.as_ref().map_or(0, |at| line_of(text, at));
         let of = format!("{len} values, and the table has {} columns", columns.len());
         return match columns.get(*len as usize) {
             Some(missing) => {
@@ -296,7 +306,7 @@ fn bad_row(file: &str, columns: &[String], error: &csv::Error) -> StudyError {
             }
         };
     }
-    let line = error.position().map_or(1, csv::Position::line);
+    let line = error.position().map_or(1, |at| line_of(text, at));
     StudyError::refused(
         format!("{file}, line {line}: it is not a row of a CSV table"),
         HELP,

@@ -21,8 +21,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_config::AxisConfig;
 use wheeleg_config::axis::Change;
+use wheeleg_config::builtin::Source;
+use wheeleg_config::{AxisConfig, ParameterInfo};
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
@@ -39,6 +40,9 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 
 /// Starts of the fit: the file, and others around it.
 const STARTS: usize = 4;
+/// Fits of an identification: the starts, one with the noise that they leave, and one with what is
+/// held.
+const FITS: u64 = STARTS as u64 + 2;
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;
 /// A rest of the measurement that is missed by more than this many times the sensor's noise is
@@ -49,6 +53,18 @@ const EXPLAINED: f64 = 3.0;
 pub const AXIS: &str = "axis.toml";
 /// The next experiment.
 pub const NEXT: &str = "next-experiment.csv";
+/// What an identification writes beside what every study does.
+const FILES: [&str; 2] = [AXIS, NEXT];
+
+/// Why a value is still the file's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Kept {
+    /// The data do not determine it.
+    Undetermined,
+    /// The value of the fit contradicts others of the axis file.
+    Contradiction,
+}
 
 /// One factor.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -59,7 +75,7 @@ pub struct Parameter {
     pub words: &'static str,
     /// Parameters of the axis file that it multiplies.
     pub paths: &'static [&'static str],
-    /// Factor on the file's value.
+    /// Factor on the file's value; 1 if that is kept.
     pub factor: f64,
     /// Least factor, 95 %.
     pub low: f64,
@@ -67,6 +83,21 @@ pub struct Parameter {
     pub high: f64,
     /// Whether the data determine it; otherwise it is what the file is trusted to.
     pub determined: bool,
+    /// Why the file's value is kept; null if it is not.
+    pub kept: Option<Kept>,
+}
+
+impl Parameter {
+    /// What is to be said of its value, in words; empty if the data determine it.
+    #[must_use]
+    pub fn note(&self) -> &'static str {
+        match (self.kept, self.determined) {
+            (Some(Kept::Contradiction), _) => "kept: the fit's value contradicts the axis file",
+            (Some(Kept::Undetermined), _) => "not determined, kept",
+            (None, false) => "not determined alone, moved with others",
+            (None, true) => "",
+        }
+    }
 }
 
 /// How far the plant is from what was measured.
@@ -87,7 +118,7 @@ pub struct Identified {
     pub lab: Lab,
     /// Ticks that were fitted.
     pub ticks: usize,
-    /// The fit.
+    /// The fit, with what is kept.
     pub fit: Fit,
     /// All factors.
     pub parameters: Vec<Parameter>,
@@ -132,7 +163,7 @@ pub struct Summary<'a> {
     explained: bool,
     /// What the data do not determine.
     undetermined: &'a [String],
-    /// The most telling next experiment, null if the plant plays none.
+    /// The most telling next experiment, null if the plant plays none or the fit was stopped.
     next_experiment: Option<&'a str>,
 }
 
@@ -167,9 +198,10 @@ pub fn identify(
     let source = AxisConfig::source(options.axis)?;
     let config = AxisConfig::parse(&source.file, &source.text)?;
     let lab = Lab::load(options.lab, &config.axis, options.map)?;
-    let job = Job::begin("identify", &settings(&config.name))?;
-    let identified = Identified::of(config, lab, options, &job.progress)?;
-    let toml = identified.rewritten(&source.file, &source.text, options)?;
+    let reads = [options.lab, Path::new(options.axis)];
+    let job = Job::begin_with("identify", &settings(&config.name), &FILES, &reads)?;
+    let identified = Identified::of(config, &source, lab, options, &job.progress)?;
+    let toml = identified.rewritten(&source, options)?;
     Ok(Identified { toml, ..identified }.write(job))
 }
 
@@ -213,13 +245,19 @@ pub fn best(
 ) -> Result<(Fit, Option<Stopped>), StudyError> {
     let go_on = || !progress.is_stopped();
     let fits = progress.each("starts", starts, |start| {
-        Ok::<_, StudyError>(problem.fit(start, &go_on))
+        let fit = problem.fit(start, &go_on);
+        // One that was under way when the study was stopped has not come to its end.
+        Ok::<_, StudyError>((fit, go_on()))
     })?;
-    let done = fits.iter().flatten().count() as u64;
-    let stopped = progress.stopped(done, starts.len() as u64, "starts");
-    let fits = fits.into_iter().flatten().flatten();
+    let done = fits.iter().flatten().filter(|(_, whole)| *whole).count();
+    let stopped = progress.stopped(done as u64, FITS, "fits");
+    let fits = fits.into_iter().flatten().filter_map(|(fit, _)| fit);
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = best.ok_or_else(|| unplayed(problem, "the measurement", ""))?;
+    // Stopped before the first: the file's values are what there is.
+    let file = || starts.first().and_then(|start| problem.fit(start, &go_on));
+    let best = best
+        .or_else(file)
+        .ok_or_else(|| unplayed(problem, "the measurement", ""))?;
     Ok((best, stopped))
 }
 
@@ -264,9 +302,15 @@ fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
 
 /// A fit, and what it tells.
 #[derive(Debug, Clone)]
-pub struct Fitted {
-    /// The fit.
+pub struct Fitted<'a> {
+    /// What was fitted, with the noise that the fit leaves.
+    pub problem: Problem<'a>,
+    /// The fit of all factors.
     pub fit: Fit,
+    /// The fit with `held` at the file's values.
+    pub kept: Fit,
+    /// Which factors the data do not determine and are held at the file's value.
+    pub held: Vec<usize>,
     /// Of each factor.
     pub intervals: [Interval; COUNT],
     /// Information of the data about the logarithms.
@@ -279,7 +323,11 @@ pub struct Fitted {
 ///
 /// # Errors
 /// As [`best`].
-pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<Fitted, StudyError> {
+pub fn fitted<'a>(
+    problem: &Problem<'a>,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Fitted<'a>, StudyError> {
     let pressures = problem.lab.samples.iter().any(|s| s.pressure_pa.is_some());
     let channels = if pressures { 3 } else { 1 };
     let (first, stopped) = best(problem, &starts(&problem.limits, seed), progress)?;
@@ -298,17 +346,96 @@ pub fn fitted(problem: &Problem<'_>, seed: u64, progress: &Progress) -> Result<F
     let leaves = || unplayed(problem, "the measurement", why);
     let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
     let information = intervals::information(&jacobian, variance(&fit, channels).max(1.0));
+    let intervals = intervals::intervals(&information);
+    let mut held = intervals::returnable(&information, &intervals, &fit.logs);
+    if progress.is_stopped() {
+        held.clear();
+    }
+    let kept = loop {
+        if held.is_empty() {
+            break fit.clone();
+        }
+        // The plant is not as linear as the choice assumes.
+        let start = intervals::conditional(&information, &fit.logs, &held);
+        match start.and_then(|start| second.held(&start, &held, &go_on)) {
+            Some(kept) if 2.0 * (kept.cost - fit.cost) <= intervals::WORSE => break kept,
+            _ => held.pop(),
+        };
+    };
     Ok(Fitted {
+        problem: second,
         fit,
-        intervals: intervals::intervals(&information),
+        kept,
+        held,
+        intervals,
         information,
         stopped,
     })
 }
 
+/// What becomes of the axis file under these factors; `said` gives the source of each value.
+fn changes(
+    config: &AxisConfig,
+    logs: &Logs,
+    said: impl Fn(usize, &ParameterInfo) -> String,
+) -> Vec<Change> {
+    let mut changes = Vec::new();
+    for (i, free) in FREE.iter().enumerate() {
+        let parameters = config.parameters.iter();
+        for info in parameters.filter(|info| free.paths.contains(&info.path.as_str())) {
+            let value = info.value.first().map_or(0.0, |v| v * logs[i].exp());
+            changes.push(Change {
+                path: info.path.clone(),
+                values: vec![value.clamp(info.min, info.max)],
+                unit: info.unit.clone(),
+                source: said(i, info),
+            });
+        }
+    }
+    changes
+}
+
+/// A fit that the program accepts in an axis file, and what is held at the file's value for that:
+/// factors that contradict other values of the file.
+fn accepted(
+    fitted: &Fitted<'_>,
+    config: &AxisConfig,
+    source: &Source,
+    progress: &Progress,
+) -> Option<(Fit, Vec<usize>)> {
+    let Source { file, text } = source;
+    let is_sound = |logs: &Logs| {
+        let changes = changes(config, logs, |_, info| info.source.clone());
+        let text = AxisConfig::rewritten(file, text, &changes);
+        text.is_ok_and(|text| AxisConfig::parse(file, &text).is_ok())
+    };
+    let mut fit = fitted.kept.clone();
+    let mut refused = Vec::new();
+    while !is_sound(&fit.logs) {
+        let moved: Vec<usize> = (0..COUNT).filter(|i| fit.logs[*i].abs() > 0.0).collect();
+        if moved.is_empty() {
+            break;
+        }
+        let alone = |i: &usize| {
+            let mut logs = [0.0; COUNT];
+            logs[*i] = fit.logs[*i];
+            !is_sound(&logs)
+        };
+        let wrong: Vec<usize> = moved.iter().copied().filter(alone).collect();
+        // Some contradict each other only.
+        refused.extend(if wrong.is_empty() { moved } else { wrong });
+        let held = [&fitted.held[..], &refused[..]].concat();
+        fit = fitted
+            .problem
+            .held(&fit.logs, &held, &|| !progress.is_stopped())?;
+    }
+    Some((fit, refused))
+}
+
 impl Identified {
     fn of(
         config: AxisConfig,
+        source: &Source,
         lab: Lab,
         options: &Options<'_>,
         progress: &Progress,
@@ -324,28 +451,40 @@ impl Identified {
             noise,
             limits: free::limits(&config),
         };
+        let fitted = fitted(&problem, options.seed, progress)?;
+        let (kept, refused) = accepted(&fitted, &config, source, progress)
+            .ok_or_else(|| unplayed(&problem, "the measurement", ""))?;
         let Fitted {
             fit,
+            held,
             intervals,
             information,
             stopped,
-        } = fitted(&problem, options.seed, progress)?;
+            ..
+        } = fitted;
+        let stopped = stopped.or_else(|| progress.stopped(FITS - 1, FITS, "fits"));
         let play = |axis: &AxisParams| {
             predict(axis, &lab, lab.on_us.len())
                 .map_err(|e| unplayed(&problem, "the rest of the measurement", &format!(": {e}")))
         };
-        let played = [play(axis)?, play(&applied(axis, &fit.logs))?];
-        let parameters = FREE.iter().zip(&fit.logs).zip(&intervals);
-        let parameters = parameters.map(|((free, log), interval)| {
-            let [low, high] = interval.factors(*log);
+        let played = [play(axis)?, play(&applied(axis, &kept.logs))?];
+        let parameters = FREE.iter().enumerate().map(|(i, free)| {
+            let factor = kept.logs[i].exp();
+            let [low, high] = intervals[i].factors(fit.logs[i]);
             Parameter {
                 name: free.name,
                 words: free.words,
                 paths: free.paths,
-                factor: log.exp(),
-                low,
-                high,
-                determined: interval.determined,
+                factor,
+                // What is held moves the others, within their intervals as far as the plant is linear.
+                low: low.min(factor),
+                high: high.max(factor),
+                determined: intervals[i].determined,
+                kept: if refused.contains(&i) {
+                    Some(Kept::Contradiction)
+                } else {
+                    held.contains(&i).then_some(Kept::Undetermined)
+                },
             }
         });
         Ok(Self {
@@ -354,9 +493,14 @@ impl Identified {
             after: misses(&lab, &played[1], ticks),
             noise_mm: noise.position_m * 1e3,
             undetermined: intervals::undetermined(&information),
-            experiments: experiment::ranked(&problem, &fit.logs, &information, 1.0),
+            // A fit that was stopped is none to plan with.
+            experiments: if stopped.is_some() {
+                Vec::new()
+            } else {
+                experiment::ranked(&problem, &kept.logs, &information, 1.0)
+            },
             ticks,
-            fit,
+            fit: kept,
             played,
             toml: String::new(),
             stopped,
@@ -372,45 +516,47 @@ impl Identified {
     }
 
     /// The axis file with what was found.
-    fn rewritten(
-        &self,
-        file: &str,
-        text: &str,
-        options: &Options<'_>,
-    ) -> Result<String, StudyError> {
+    ///
+    /// # Errors
+    /// [`StudyError::Config`] if the program would not accept it.
+    fn rewritten(&self, source: &Source, options: &Options<'_>) -> Result<String, StudyError> {
         let lab = options.lab.file_name().map(|name| name.to_string_lossy());
         let lab = lab.unwrap_or_default();
-        let changes = self.parameters.iter().flat_map(|parameter| {
-            let lab = &lab;
-            self.config
-                .parameters
-                .iter()
-                .filter(|info| parameter.paths.contains(&info.path.as_str()))
-                .map(move |info| {
-                    let value = |factor: f64| info.value.first().map_or(0.0, |v| v * factor);
-                    let interval = format!(
-                        "{} to {} {}",
-                        wheeleg_config::brief(value(parameter.low)),
-                        wheeleg_config::brief(value(parameter.high)),
+        let changes = changes(&self.config, &self.fit.logs, |i, info| {
+            let parameter = &self.parameters[i];
+            let before = &info.source;
+            let in_unit = |factor: f64| {
+                let value = info.value.first().map_or(0.0, |v| v * factor);
+                wheeleg_config::brief(value)
+            };
+            let note = match (parameter.kept, parameter.determined) {
+                (Some(Kept::Undetermined), _) => format!("; {lab} does not determine it"),
+                (Some(Kept::Contradiction), _) => {
+                    format!("; what fits {lab} contradicts other values of this file")
+                }
+                (None, true) => {
+                    return format!(
+                        "IDENTIFIED from {lab}: {} to {} {} (95 %)",
+                        in_unit(parameter.low),
+                        in_unit(parameter.high),
                         info.unit
                     );
-                    Change {
-                        path: info.path.clone(),
-                        values: vec![value(parameter.factor).clamp(info.min, info.max)],
-                        unit: info.unit.clone(),
-                        source: if parameter.determined {
-                            format!("IDENTIFIED from {lab}: {interval} (95 %)")
-                        } else {
-                            format!(
-                                "ASSUMED: {lab} does not determine it; before: {}",
-                                info.source
-                            )
-                        },
-                    }
-                })
+                }
+                (None, false) => {
+                    return format!(
+                        "ASSUMED: {lab} does not determine it alone, but fits worse with {} {}; before: {before}",
+                        in_unit(1.0),
+                        info.unit
+                    );
+                }
+            };
+            // Said once, also if it is identified again.
+            let before = before.strip_suffix(&note).unwrap_or(before);
+            format!("{before}{note}")
         });
-        let changes: Vec<Change> = changes.collect();
-        Ok(AxisConfig::rewritten(file, text, &changes)?)
+        let toml = AxisConfig::rewritten(&source.file, &source.text, &changes)?;
+        AxisConfig::parse(AXIS, &toml)?;
+        Ok(toml)
     }
 
     /// What `summary.json` holds.

@@ -87,6 +87,7 @@ struct Page<'a> {
 #[derive(Serialize)]
 struct Shown<'a> {
     parameter: &'a Parameter,
+    note: &'static str,
     paths: String,
 }
 
@@ -128,6 +129,7 @@ pub(super) fn render(
             .iter()
             .map(|parameter| Shown {
                 parameter,
+                note: parameter.note(),
                 paths: parameter.paths.join(", "),
             })
             .collect(),

@@ -11,6 +11,8 @@ mod page;
 
 pub use judge::{Figure, Worse};
 
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_control::joint::{Correction, JointGains};
@@ -184,7 +186,7 @@ pub fn tune(
     let settings = settings(&config.name);
     // An axis that is refused costs no earlier results.
     let delays = delays(file, &config, seed)?;
-    let job = Job::begin("tune", &settings)?;
+    let job = Job::begin_with("tune", &settings, &[], &[Path::new(file)])?;
     let tuned = Tuned::play(file, config, delays, (seed, section), &job.progress)?;
     Ok(tuned.write(job))
 }

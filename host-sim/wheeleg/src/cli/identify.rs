@@ -76,12 +76,15 @@ pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
 fn text(identified: &Identified, report: &Path) -> String {
     let mut text = format!("{:<34}{:>9}{:>9}{:>9}\n", "", "factor", "from", "to");
     for p in &identified.parameters {
-        let note = if p.determined { "" } else { "  not determined" };
-        let _ = writeln!(
-            text,
-            "{:<34}{:>9.4}{:>9.4}{:>9.4}{note}",
-            p.words, p.factor, p.low, p.high
+        let line = format!(
+            "{:<34}{:>9.4}{:>9.4}{:>9.4}  {}",
+            p.words,
+            p.factor,
+            p.low,
+            p.high,
+            p.note()
         );
+        let _ = writeln!(text, "{}", line.trim_end());
     }
     for direction in &identified.undetermined {
         let _ = writeln!(text, "undetermined   {direction}");
