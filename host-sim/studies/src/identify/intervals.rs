@@ -1,16 +1,12 @@
 //! Intervals of a fit, and what the data do not determine.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::fit::{Z95, trust};
-use super::free::{COUNT, FREE, Logs};
+use super::free::{COUNT, FREE};
 
 /// A parameter is determined if the data leave less than this share of the file's uncertainty.
 const DETERMINED: f64 = 0.5;
-/// Values that the data do not determine are held at the file's as long as twice the cost grows by
-/// no more than this: 95 % of a chi-square distribution with one degree of freedom. No determined
-/// value then leaves its interval.
-pub(super) const WORSE: f64 = Z95 * Z95;
 /// Least share of a parameter in a direction that is named.
 const SHARE: f64 = 0.3;
 
@@ -44,55 +40,6 @@ fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         whole[(i, i)] += trust(i).powi(-2);
     }
     Some(whole.cholesky()?.inverse())
-}
-
-/// Which factors can go back to the file's value without the fit getting worse by more than
-/// [`WORSE`]: of those that the data do not determine, the one first that has moved least against its
-/// deviation. Some of them may be determined together, as mass and pressure are, and so not all
-/// can go back.
-#[must_use]
-pub fn returnable(
-    information: &DMatrix<f64>,
-    intervals: &[Interval; COUNT],
-    logs: &Logs,
-) -> Vec<usize> {
-    let Some(covariance) = covariance(information) else {
-        return Vec::new();
-    };
-    let moved = |i: &usize| logs[*i].abs() / intervals[*i].deviation;
-    let mut order: Vec<usize> = (0..COUNT).filter(|i| !intervals[*i].determined).collect();
-    order.sort_by(|a, b| moved(a).total_cmp(&moved(b)));
-    let mut chosen = Vec::new();
-    for i in order {
-        chosen.push(i);
-        let pull = pull(&covariance, logs, &chosen);
-        let rise = pull.map(|pull| chosen.iter().zip(&pull).map(|(i, p)| logs[*i] * p).sum());
-        if rise.is_none_or(|rise: f64| rise > WORSE) {
-            chosen.pop();
-        }
-    }
-    chosen
-}
-
-/// By how much each of some factors has moved, over the covariance of them.
-fn pull(covariance: &DMatrix<f64>, logs: &Logs, of: &[usize]) -> Option<DVector<f64>> {
-    let part = DMatrix::from_fn(of.len(), of.len(), |a, b| covariance[(of[a], of[b])]);
-    let moved = DVector::from_fn(of.len(), |a, _| logs[of[a]]);
-    Some(part.cholesky()?.solve(&moved))
-}
-
-/// Where the others are most likely if some factors go back to the file's value: the start of a fit
-/// without these.
-#[must_use]
-pub fn conditional(information: &DMatrix<f64>, logs: &Logs, held: &[usize]) -> Option<Logs> {
-    let covariance = covariance(information)?;
-    let pull = pull(&covariance, logs, held)?;
-    let mut start = *logs;
-    for (i, log) in start.iter_mut().enumerate() {
-        let parts = held.iter().zip(&pull);
-        *log -= parts.map(|(k, p)| covariance[(i, *k)] * p).sum::<f64>();
-    }
-    Some(start)
 }
 
 /// Intervals under the information of data and file.

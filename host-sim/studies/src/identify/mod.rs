@@ -40,9 +40,8 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 
 /// Starts of the fit: the file, and others around it.
 const STARTS: usize = 4;
-/// Fits of an identification: the starts, one with the noise that they leave, and one with what is
-/// held.
-const FITS: u64 = STARTS as u64 + 2;
+/// Fits of an identification: the starts, and one with the noise that they leave.
+const FITS: u64 = STARTS as u64 + 1;
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;
 /// A rest of the measurement that is missed by more than this many times the sensor's noise is
@@ -55,16 +54,6 @@ pub const AXIS: &str = "axis.toml";
 pub const NEXT: &str = "next-experiment.csv";
 /// What an identification writes beside what every study does.
 const FILES: [&str; 2] = [AXIS, NEXT];
-
-/// Why a value is still the file's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Kept {
-    /// The data do not determine it.
-    Undetermined,
-    /// The value of the fit contradicts others of the axis file.
-    Contradiction,
-}
 
 /// One factor.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -83,8 +72,8 @@ pub struct Parameter {
     pub high: f64,
     /// Whether the data determine it; otherwise it is what the file is trusted to.
     pub determined: bool,
-    /// Why the file's value is kept; null if it is not.
-    pub kept: Option<Kept>,
+    /// Whether the file's value is kept, because that of the fit contradicts others of the axis file.
+    pub kept: bool,
 }
 
 impl Parameter {
@@ -92,10 +81,9 @@ impl Parameter {
     #[must_use]
     pub fn note(&self) -> &'static str {
         match (self.kept, self.determined) {
-            (Some(Kept::Contradiction), _) => "kept: the fit's value contradicts the axis file",
-            (Some(Kept::Undetermined), _) => "not determined, kept",
-            (None, false) => "not determined alone, moved with others",
-            (None, true) => "",
+            (true, _) => "kept: the fit's value contradicts the axis file",
+            (false, false) => "not determined",
+            (false, true) => "",
         }
     }
 }
@@ -307,10 +295,6 @@ pub struct Fitted<'a> {
     pub problem: Problem<'a>,
     /// The fit of all factors.
     pub fit: Fit,
-    /// The fit with `held` at the file's values.
-    pub kept: Fit,
-    /// Which factors the data do not determine and are held at the file's value.
-    pub held: Vec<usize>,
     /// Of each factor.
     pub intervals: [Interval; COUNT],
     /// Information of the data about the logarithms.
@@ -347,26 +331,9 @@ pub fn fitted<'a>(
     let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
     let information = intervals::information(&jacobian, variance(&fit, channels).max(1.0));
     let intervals = intervals::intervals(&information);
-    let mut held = intervals::returnable(&information, &intervals, &fit.logs);
-    if progress.is_stopped() {
-        held.clear();
-    }
-    let kept = loop {
-        if held.is_empty() {
-            break fit.clone();
-        }
-        // The plant is not as linear as the choice assumes.
-        let start = intervals::conditional(&information, &fit.logs, &held);
-        match start.and_then(|start| second.held(&start, &held, &go_on)) {
-            Some(kept) if 2.0 * (kept.cost - fit.cost) <= intervals::WORSE => break kept,
-            _ => held.pop(),
-        };
-    };
     Ok(Fitted {
         problem: second,
         fit,
-        kept,
-        held,
         intervals,
         information,
         stopped,
@@ -409,7 +376,7 @@ fn accepted(
         let text = AxisConfig::rewritten(file, text, &changes);
         text.is_ok_and(|text| AxisConfig::parse(file, &text).is_ok())
     };
-    let mut fit = fitted.kept.clone();
+    let mut fit = fitted.fit.clone();
     let mut refused = Vec::new();
     while !is_sound(&fit.logs) {
         let moved: Vec<usize> = (0..COUNT).filter(|i| fit.logs[*i].abs() > 0.0).collect();
@@ -424,10 +391,9 @@ fn accepted(
         let wrong: Vec<usize> = moved.iter().copied().filter(alone).collect();
         // Some contradict each other only.
         refused.extend(if wrong.is_empty() { moved } else { wrong });
-        let held = [&fitted.held[..], &refused[..]].concat();
         fit = fitted
             .problem
-            .held(&fit.logs, &held, &|| !progress.is_stopped())?;
+            .held(&fit.logs, &refused, &|| !progress.is_stopped())?;
     }
     Some((fit, refused))
 }
@@ -456,7 +422,6 @@ impl Identified {
             .ok_or_else(|| unplayed(&problem, "the measurement", ""))?;
         let Fitted {
             fit,
-            held,
             intervals,
             information,
             stopped,
@@ -480,11 +445,7 @@ impl Identified {
                 low: low.min(factor),
                 high: high.max(factor),
                 determined: intervals[i].determined,
-                kept: if refused.contains(&i) {
-                    Some(Kept::Contradiction)
-                } else {
-                    held.contains(&i).then_some(Kept::Undetermined)
-                },
+                kept: refused.contains(&i),
             }
         });
         Ok(Self {
@@ -529,30 +490,25 @@ impl Identified {
                 let value = info.value.first().map_or(0.0, |v| v * factor);
                 wheeleg_config::brief(value)
             };
-            let note = match (parameter.kept, parameter.determined) {
-                (Some(Kept::Undetermined), _) => format!("; {lab} does not determine it"),
-                (Some(Kept::Contradiction), _) => {
-                    format!("; what fits {lab} contradicts other values of this file")
+            match (parameter.kept, parameter.determined) {
+                (false, true) => format!(
+                    "IDENTIFIED from {lab}: {} to {} {} (95 %)",
+                    in_unit(parameter.low),
+                    in_unit(parameter.high),
+                    info.unit
+                ),
+                (false, false) => format!(
+                    "ASSUMED: {lab} does not determine it; before: {} {}, {before}",
+                    in_unit(1.0),
+                    info.unit
+                ),
+                (true, _) => {
+                    let note = format!("; what fits {lab} contradicts other values of this file");
+                    // Said once, also if it is identified again.
+                    let before = before.strip_suffix(&note).unwrap_or(before);
+                    format!("{before}{note}")
                 }
-                (None, true) => {
-                    return format!(
-                        "IDENTIFIED from {lab}: {} to {} {} (95 %)",
-                        in_unit(parameter.low),
-                        in_unit(parameter.high),
-                        info.unit
-                    );
-                }
-                (None, false) => {
-                    return format!(
-                        "ASSUMED: {lab} does not determine it alone, but fits worse with {} {}; before: {before}",
-                        in_unit(1.0),
-                        info.unit
-                    );
-                }
-            };
-            // Said once, also if it is identified again.
-            let before = before.strip_suffix(&note).unwrap_or(before);
-            format!("{before}{note}")
+            }
         });
         let toml = AxisConfig::rewritten(&source.file, &source.text, &changes)?;
         AxisConfig::parse(AXIS, &toml)?;
