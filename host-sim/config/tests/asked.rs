@@ -212,8 +212,16 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
     let late = write(4, "sensor_full_scale", "200.0");
     let all = disarm + &full_scale(2) + &arm + &late;
     assert!(judged(&scenario(STAND, &all), &robot).is_err());
-    // What the board refuses for itself changes nothing.
-    assert_accepted(&scenario(STAND, &write(1, "settle_band", "1000")), &robot);
+    // What no board takes is refused when it is read.
+    let beyond = scenario(STAND, &write(1, "settle_band", "1000"));
+    let error = Scenario::parse("my.toml", &beyond).expect_err("must be refused");
+    assert_all(
+        &report(&error),
+        &[
+            "my.toml:15: `events[0].value` = 1000",
+            "allowed 0 to 100 mm",
+        ],
+    );
 }
 
 #[test]
