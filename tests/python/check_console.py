@@ -140,14 +140,14 @@ def becomes_ready(page):
 
 def undisturbed(page, robot, act):
     """Does something as an operator who is not lost meanwhile: after a loss all begins anew, from Ready."""
-    losses = lambda: sum(event["detail"] == "operator_lost" for event in robot.events())
     for _ in range(ATTEMPTS):
-        heard, lost = len(problems), losses()
+        heard, newest = len(problems), max((event["number"] for event in robot.events()), default=0)
         try:
             act(page)
         except PageTimeout as error:
             expect(False, f"{act.__name__}: {error}")
-        if len(problems) == heard or losses() == lost:
+        lost = any(event["detail"] == "operator_lost" and event["number"] > newest for event in robot.events())
+        if len(problems) == heard or not lost:
             return
         again = problems[heard:]
         del problems[heard:]

@@ -49,7 +49,7 @@ impl FaultEvent {
             && match self.code {
                 Some(EventCode::Hold) => HOLDS_THAT_FOLLOW.contains(&self.detail.as_str()),
                 Some(EventCode::Diagnosis | EventCode::RunFailed) => true,
-                code => code == cause.code && self.fault == cause.fault,
+                code => code.is_some() && code == cause.code && self.fault == cause.fault,
             }
     }
 }

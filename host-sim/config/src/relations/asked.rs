@@ -2,7 +2,7 @@
 //!
 //! A command brings values into a run of which the robot's file has others. Each relation of the table
 //! that such a value has a part in is judged again with it: of a gait at once, of a board's parameters
-//! where the board is armed with them. What a motion or a command asks of a cylinder or a leg is no
+//! where the board is armed with them, or left with them at the end. What a motion or a command asks of a cylinder or a leg is no
 //! field of the robot's file, and has no entry in the table.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -72,6 +72,8 @@ struct Judge<'a> {
     poses: BTreeSet<[u64; POSE.len()]>,
     boards: Vec<Board>,
     disarmed: bool,
+    /// Whether an emergency stop holds the boards: what clears it leaves them disarmed.
+    stopped: bool,
 }
 
 /// Field of a scenario that is in place of one of the robot, by the path of that, and what it is
@@ -95,6 +97,7 @@ impl<'a> Judge<'a> {
             poses: BTreeSet::new(),
             boards: boards.collect(),
             disarmed: false,
+            stopped: false,
         };
         // Its file was refused otherwise.
         judge.poses.insert(judge.pose());
@@ -104,8 +107,11 @@ impl<'a> Judge<'a> {
     fn all(mut self) -> Result<(), ConfigError> {
         self.motion()?;
         for event in &self.scenario.events {
-            let (EventAction::Command(command), Some(at)) = (&event.action, event.place.0) else {
-                continue;
+            let (command, at) = match (&event.action, event.place.0) {
+                (EventAction::EStop, _) => (&Command::EmergencyStop, 0),
+                (EventAction::ClearFault, _) => (&Command::ClearFault, 0),
+                (EventAction::Command(command), Some(at)) => (command, at),
+                _ => continue,
             };
             let path = format!("events[{at}]");
             match *command {
@@ -117,6 +123,8 @@ impl<'a> Judge<'a> {
                 Command::Walk(_) => self.walk(&path, "command")?,
                 Command::WriteParameter { node, id, raw } => self.write(at, node, id, raw)?,
                 Command::Disarm => self.disarmed = true,
+                Command::EmergencyStop => self.stopped = true,
+                Command::ClearFault => self.disarmed |= take(&mut self.stopped),
                 Command::Arm => self.arm()?,
                 _ => {}
             }
@@ -515,6 +523,15 @@ impl<'a> Judge<'a> {
             ));
         }
         for (one, ((why, allowed), advice)) in found.iter().zip(told) {
+            // What an earlier event is to blame for has been told there.
+            let is_own = one
+                .relation
+                .fields
+                .iter()
+                .any(|field| brought.contains_key(*field));
+            if !is_own && !new_pose {
+                continue;
+            }
             self.report(one, parameters, brought, (&why, &allowed), advice)?;
         }
         Ok(())

@@ -81,6 +81,9 @@ impl Index {
         let Some(middle) = limited.len().checked_sub(1).map(|last| last / 2) else {
             return index;
         };
+        for (_, bounds) in &limited {
+            index.top_m = index.top_m.max(bounds.high_m[2]);
+        }
         // Cells of the size of the parts, but not many more cells than parts.
         let wide = |b: &Bounds, i: usize| b.high_m[i] - b.low_m[i];
         let mean = |b: &Bounds| (wide(b, 0) * wide(b, 1)).sqrt();
@@ -98,7 +101,6 @@ impl Index {
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
         for (_, bounds) in &limited {
-            index.top_m = index.top_m.max(bounds.high_m[2]);
             for i in 0..2 {
                 low[i] = low[i].min(bounds.low_m[i]);
                 high[i] = high[i].max(bounds.high_m[i]);
@@ -126,7 +128,7 @@ impl Index {
         }
         large.sort_unstable_by_key(|(number, _)| *number);
         if index.items.is_empty() {
-            // Some along X, some along Y: no grid tells them apart.
+            // Parts without a width: no grid tells them apart.
             index.everywhere = large.into_iter().map(|(number, _)| number).collect();
         } else if !large.is_empty() {
             let coarse = Self::of(large);

@@ -389,8 +389,14 @@ fn accepted(
             !is_sound(&logs)
         };
         let wrong: Vec<usize> = moved.iter().copied().filter(alone).collect();
-        // Some contradict each other only.
-        refused.extend(if wrong.is_empty() { moved } else { wrong });
+        let mends = |i: &usize| {
+            let mut logs = fit.logs;
+            logs[*i] = 0.0;
+            is_sound(&logs)
+        };
+        // Some contradict each other only: then one of them is held.
+        let one = || moved.iter().copied().find(mends).unwrap_or(moved[0]);
+        refused.extend(if wrong.is_empty() { vec![one()] } else { wrong });
         fit = fitted
             .problem
             .held(&fit.logs, &refused, &|| !progress.is_stopped())?;

@@ -105,7 +105,7 @@ pub(super) fn render(
     let determined = identified
         .parameters
         .iter()
-        .filter(|p| p.determined)
+        .filter(|p| p.determined && !p.kept)
         .count();
     let explained = if identified.is_explained() {
         "the held-out data are matched within three times the sensor's noise"

@@ -247,7 +247,7 @@ fn holder(state: &Value) -> Option<String> {
 /// Time within which the master ends a lease that was revoked, and is seen to.
 const ENDS: Duration = Duration::from_secs(3);
 
-/// Revokes control, and waits until the lease of its holder is over, or the clock stands.
+/// Revokes control, and waits until the lease of its holder is over, which takes long where the clock is slow or paused.
 fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     let mut client = reach.control()?;
     let before = match state_when(&mut client, |_| true) {
@@ -265,20 +265,27 @@ fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
         tell("nobody is in control");
         return reach.print_outcome(&Outcome::Done);
     };
+    let is_revoked = |state: &Value| state["control"]["ended"] == "revoked";
     let is_over = |state: &Value| {
-        let now = &state["control"];
-        let stands = state["pace"]["paused"] == true;
-        now["session"] != holder["session"] || (stands && now["ended"] == "revoked")
+        let is_paused = state["pace"]["paused"] == true;
+        state["control"]["session"] != holder["session"] || (is_paused && is_revoked(state))
     };
     let after = match state_when(&mut client, is_over) {
+        Err(Outcome::Unknown) => state_when(&mut client, is_revoked),
+        end => end,
+    };
+    let after = match after {
         Ok(state) => state,
         Err(unknown) => return reach.print_outcome(&unknown),
     };
     tell(&plain(&format!("{name:?} is no longer in control")));
     if after["control"]["session"] == holder["session"] {
-        tell(
-            "the clock is paused: after `wheeleg ctl resume` the lease ends, and an armed robot holds",
-        );
+        tell(match after["pace"]["paused"] == true {
+            true => {
+                "the clock is paused: after `wheeleg ctl resume` the lease ends, and an armed robot holds"
+            }
+            false => "the clock is slow: the lease is not over yet, and then an armed robot holds",
+        });
     }
     reach.print_outcome(&Outcome::Done)
 }

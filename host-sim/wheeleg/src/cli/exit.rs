@@ -67,7 +67,22 @@ pub(super) const CTL: &Table = &[
     (0, "done"),
     (REFUSED, "refused"),
     (FAILED, "error"),
-    (LOST, "the connection ended, or a stop was not confirmed"),
+    (
+        LOST,
+        "the connection ended, nobody answered, or a stop was not confirmed",
+    ),
+    (
+        Signal::HangUp.exit_code(),
+        "`take` and `top`: ended by a hang-up",
+    ),
+    (
+        Signal::Interrupt.exit_code(),
+        "`take` and `top`: ended with Ctrl-C",
+    ),
+    (
+        Signal::Terminate.exit_code(),
+        "`take` and `top`: ended with SIGTERM",
+    ),
 ];
 
 /// Of `wheeleg replay`.

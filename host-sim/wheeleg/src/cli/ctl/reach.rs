@@ -164,13 +164,14 @@ fn bring_to_rest(client: &mut Client, name: &str) -> Result<(), StudyError> {
         give("Hold")?;
     }
     let begin = Instant::now();
+    let mut end = give("ReleaseControl")?;
     // Refused as long as the robot moves.
-    while let Outcome::Refused { .. } = give("ReleaseControl")? {
-        if begin.elapsed() > COMES_TO_REST {
-            tell(NOT_RELEASED);
-            break;
-        }
+    while matches!(end, Outcome::Refused { .. }) && begin.elapsed() <= COMES_TO_REST {
         std::thread::sleep(BETWEEN);
+        end = give("ReleaseControl")?;
+    }
+    if end != Outcome::Done {
+        tell(NOT_RELEASED);
     }
     Ok(())
 }
