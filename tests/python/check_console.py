@@ -396,9 +396,9 @@ def events_alone(page):
 
 def board_table(page):
     page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
-    row = page.locator(".boardtable tbody tr").nth(2)
+    row = page.locator(".boardlist .boardtable tbody tr").nth(2)
     try:
-        page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardtable tbody tr')[2].cells[3].textContent)", timeout=15000)
+        page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardlist .boardtable tbody tr')[2].cells[3].textContent)", timeout=15000)
     except Exception:
         problems.append(f"the table of boards has no counts: {row.inner_text()!r}")
     page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
