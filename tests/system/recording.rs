@@ -132,10 +132,8 @@ fn a_recording_repeats_after_term_and_after_a_kill() {
     }
 }
 
-/// Ctrl-C ends a walk as its own stop does: the next command is carried out, without a latched stop.
-#[test]
-fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
-    let served = Served::new("");
+/// A `ctl take` that makes the robot walk, and the state in which it does.
+fn walking(served: &Served) -> (Child, Value) {
     served.until("ready", |state| state["ready"] == true);
     for command in ["Arm", "Stand"] {
         let done = served.ctl(&["take", "--", command]);
@@ -156,7 +154,15 @@ fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("start");
-    served.until("walking", |state| state["phase"] == "walk");
+    let state = served.until("walking", |state| state["phase"] == "walk");
+    (driver, state)
+}
+
+/// Ctrl-C ends a walk as its own stop does: the next command is carried out, without a latched stop.
+#[test]
+fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
+    let served = Served::new("");
+    let (driver, _) = walking(&served);
     let sent = Command::new("kill")
         .args(["-INT", &driver.id().to_string()])
         .status();
@@ -177,26 +183,7 @@ fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
     let served = Served::new("");
-    served.until("ready", |state| state["ready"] == true);
-    for command in ["Arm", "Stand"] {
-        let done = served.ctl(&["take", "--", command]);
-        assert!(done.status.success(), "{done:?}");
-    }
-    let walk = [
-        "speed=60",
-        "turn=0",
-        "pattern=alternate",
-        "lift=60",
-        "nose=-20",
-    ];
-    let mut driver = Command::new(program::path())
-        .args(["ctl", "--url", &served.address, "take", "--", "Walk"])
-        .args(walk)
-        .env("XDG_STATE_HOME", served.home.path())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("start");
-    let before = served.until("walking", |state| state["phase"] == "walk");
+    let (mut driver, before) = walking(&served);
     let us = |state: &Value| state["master_us"].as_u64().expect("a time");
     let pid = served.child.id().to_string();
     let signal = |name: &str| {

@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
+use wheeleg_studies::export::same_file;
 use wheeleg_studies::study::Stop;
 
 use crate::part::NotAPart;
@@ -289,17 +290,13 @@ impl Store {
 
     /// Whether a path is that of one of its own files, or would be among them.
     pub(crate) fn owns(&self, path: &Path) -> bool {
-        let one = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
-            (Ok(a), Ok(b)) => a == b,
-            _ => false,
-        };
         let parent = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
         let mut own = ["parts", "attempts"].into_iter();
-        one(path, &self.folder.join(PLAN_FILE))
-            || own.any(|name| one(parent, &self.folder.join(name)))
+        same_file(path, &self.folder.join(PLAN_FILE))
+            || own.any(|name| same_file(parent, &self.folder.join(name)))
     }
 
     /// Its plan.

@@ -6,22 +6,13 @@ mod common;
 mod values;
 
 use common::{assert_all, report};
+use values::SHORT;
 use wheeleg_config::{Advised, ConfigError, Problem, RobotConfig, Scenario, builtin};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 
 /// Paths, values as they are written, and units.
 type Changes<'a> = &'a [(&'a str, &'a str, &'a str)];
-
-/// The robot with pistons of 90 mm.
-const SHORT: Changes<'static> = &[
-    ("cylinder.stroke", "90.0", "mm"),
-    ("gait.stroke", "90.0", "mm"),
-    ("gait.held_leg_s6", "90.0", "mm"),
-    ("start.vertical.stroke", "90.0", "mm"),
-    ("body.foot_pad", "0.20", "m"),
-    ("node.joint.sensor_max", "95.0", "mm"),
-];
 
 fn robot(changes: Changes<'_>) -> RobotConfig {
     let mut text = ROBOT.to_owned();

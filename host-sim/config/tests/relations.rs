@@ -11,7 +11,7 @@ use std::panic::catch_unwind;
 use common::{assert_all, report};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use values::with;
+use values::{SHORT, with};
 use wheeleg_config::{
     Advised, AxisConfig, ConfigError, ParameterInfo, Problem, RELATIONS, Relation, RobotConfig,
 };
@@ -56,15 +56,6 @@ const fn example(
     }
 }
 
-/// A robot with short cylinders that stands.
-const SHORT: &[Set] = &[
-    ("cylinder.stroke", "90.0", "mm"),
-    ("gait.stroke", "90.0", "mm"),
-    ("gait.held_leg_s6", "90.0", "mm"),
-    ("start.vertical.stroke", "90.0", "mm"),
-    ("body.foot_pad", "0.20", "m"),
-    ("node.joint.sensor_max", "95.0", "mm"),
-];
 /// Little air, and an end stop that is as hard as can be.
 const TIGHT_A: &[Set] = &[
     ("line.volume", "0.0", "cm3"),

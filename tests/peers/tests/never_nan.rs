@@ -1,52 +1,13 @@
 //! Any bits as input of the engine: a finite answer or a typed refusal, never NaN, never a panic.
 
+#[path = "../../../host-sim/plant/tests/suite/odd.rs"]
+mod odd;
+
+use odd::{finite, lengths, named, number, numbers};
 use proptest::prelude::*;
 use wheeleg_peers::chain::reference::{ROBOT14, RPP, RPR};
 use wheeleg_peers::chain::{ChainLeg, FloatingState};
 use wheeleg_plant::dynamics::{DynamicsError, RobotDynamicsParams};
-
-/// Raw bits, edges of the format, and ordinary numbers, so that every branch is met.
-fn number() -> impl Strategy<Value = f64> {
-    prop_oneof![
-        3 => any::<u64>().prop_map(f64::from_bits),
-        1 => prop::sample::select(vec![
-            0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN,
-            f64::MIN_POSITIVE, 5e-324, 1e154, 1e-154, 1e160, 1.0, -1.0,
-        ]),
-        3 => -1.0..1.0,
-        2 => 0.3..0.5,
-    ]
-}
-
-fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
-    proptest::array::uniform(number())
-}
-
-/// Lengths that a leg can often take, spoilt one at a time.
-fn lengths() -> impl Strategy<Value = [f64; 3]> {
-    (0.31..0.49, 0.01..0.19, 0.01..0.19, number(), 0..6_usize).prop_map(|(a, b, c, bad, at)| {
-        let mut q = [a, b, c];
-        if let Some(place) = q.get_mut(at) {
-            *place = bad;
-        }
-        q
-    })
-}
-
-fn finite<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
-    values.into_iter().all(|v| v.is_finite())
-}
-
-/// A refusal tells the value that caused it, or which overflow did.
-fn named(error: &DynamicsError) -> bool {
-    let text = error.to_string();
-    match error {
-        DynamicsError::NonFinite { value, .. } => !value.is_finite() && !text.is_empty(),
-        DynamicsError::Leg { .. } | DynamicsError::Singular { .. } => !text.is_empty(),
-        DynamicsError::Parameter { name, .. } => text.contains(name),
-        _ => !text.is_empty(),
-    }
-}
 
 /// A finite answer, or a named refusal.
 fn right<const N: usize>(answer: Result<[f64; N], DynamicsError>) -> Result<(), TestCaseError> {

@@ -192,14 +192,18 @@ impl<'a> Search<'a> {
     /// A narrower limit for the only field of a set, where `next`, the relation that it breaks, asks for one.
     fn narrowed(&self, broken: &Found, set: &[Offer], next: &Found) -> Option<Vec<Offer>> {
         let [only] = set else { return None };
-        let is_own = |offers: &&Vec<Offer>| matches!(offers.as_slice(), [offer] if offer.advised.path == only.advised.path);
-        let mut narrower = next.broken.offers.iter().find(is_own)?.clone();
+        let own_of = |found: &Found| {
+            let mut sets = found.broken.offers.iter();
+            let own = sets.find(
+                |set| matches!(set.as_slice(), [offer] if offer.advised.path == only.advised.path),
+            );
+            own.cloned()
+        };
+        let mut narrower = own_of(next)?;
         for _ in 1..TOGETHER {
             match self.answer(broken, &narrower) {
                 Answer::Accepted => return Some(narrower),
-                Answer::Broken(next) => {
-                    narrower = next.broken.offers.iter().find(is_own)?.clone();
-                }
+                Answer::Broken(next) => narrower = own_of(&next)?,
                 Answer::Refused => break,
             }
         }

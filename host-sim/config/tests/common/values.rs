@@ -1,5 +1,15 @@
 //! Robot and axis files with other values.
 
+/// The robot of the paper with cylinders of 90 mm, standing: paths, values as they are written, and units.
+pub(crate) const SHORT: &[(&str, &str, &str)] = &[
+    ("cylinder.stroke", "90.0", "mm"),
+    ("gait.stroke", "90.0", "mm"),
+    ("gait.held_leg_s6", "90.0", "mm"),
+    ("start.vertical.stroke", "90.0", "mm"),
+    ("body.foot_pad", "0.20", "m"),
+    ("node.joint.sensor_max", "95.0", "mm"),
+];
+
 /// A file with other values; a key that its section has not got is put below the heading.
 pub(crate) fn with(text: &str, path: &str, value: &str, unit: &str) -> String {
     let (section, key) = path.rsplit_once('.').expect("a section and a key");

@@ -378,22 +378,36 @@ fn until_driven(rig: &TestRig, driver: &mut Client, wanted: impl Fn(&Value) -> b
     }
 }
 
+/// One client drives, a second has asked it for the control: both, and the arguments of a hand-over to the second.
+fn asked_for_control(rig: &TestRig) -> (Client, Client, Value) {
+    let mut first = rig.driver("first");
+    let mut second = rig.control("second");
+    look(&mut second, "state");
+    let refused = refusal(&mut second, "TakeControl", &json!({}));
+    assert_eq!(refused, "control_held");
+    let asked = look(&mut first, "asked");
+    assert_eq!(asked["by"], "second");
+    (first, second, json!({ "to": asked["session"] }))
+}
+
+/// The second has taken what the first has handed over: it drives on, and nothing was held meanwhile.
+fn takes_over(rig: &TestRig, second: &mut Client) {
+    done(second, "TakeControl");
+    second.keep_control(true);
+    let state = until_driven(rig, second, |state| state["control"]["holder"] == "second");
+    assert_eq!(
+        (&state["armed"], &state["hold"]),
+        (&json!(true), &json!(null))
+    );
+}
+
 /// A hand-over is a release for one other client: it alone may take the control, for 2 s.
 #[test]
 fn who_is_in_control_hands_it_over_to_one_other() {
     let rig = TestRig::new();
-    let mut first = rig.driver("first");
-    let mut second = rig.control("second");
+    let (mut first, mut second, to) = asked_for_control(&rig);
     let mut third = rig.control("third");
-    look(&mut second, "state");
     let nothing = json!({});
-    assert_eq!(
-        refusal(&mut second, "TakeControl", &nothing),
-        "control_held"
-    );
-    let asked = look(&mut first, "asked");
-    assert_eq!(asked["by"], "second");
-    let to = json!({ "to": asked["session"] });
     // Only who has it gives it away, and to a client that is there and may drive.
     assert_eq!(refusal(&mut third, "HandOver", &to), "not_in_control");
     for nobody in [
@@ -418,30 +432,15 @@ fn who_is_in_control_hands_it_over_to_one_other() {
     for other in [&mut first, &mut third] {
         assert_eq!(refusal(other, "TakeControl", &nothing), "control_held");
     }
-    done(&mut second, "TakeControl");
-    second.keep_control(true);
-    let state = until_driven(&rig, &mut second, |state| {
-        state["control"]["holder"] == "second"
-    });
-    assert_eq!(
-        (&state["armed"], &state["hold"]),
-        (&json!(true), &json!(null))
-    );
+    takes_over(&rig, &mut second);
     assert_eq!(refusal(&mut first, "Arm", &nothing), "not_in_control");
 }
 
 #[test]
 fn what_is_handed_over_and_not_taken_is_free() {
     let rig = TestRig::new();
-    let mut first = rig.driver("first");
-    let mut second = rig.control("second");
-    look(&mut second, "state");
+    let (mut first, mut second, to) = asked_for_control(&rig);
     let nothing = json!({});
-    assert_eq!(
-        refusal(&mut second, "TakeControl", &nothing),
-        "control_held"
-    );
-    let to = json!({ "to": look(&mut first, "asked")["session"] });
     let outcome = first.carry_out("HandOver", &to, 500).expect("sent");
     assert_eq!(outcome, Outcome::Done);
     first.keep_control(false);
@@ -625,15 +624,8 @@ fn a_master_that_dies_with_what_it_accepted_leaves_the_control_free() {
 #[test]
 fn who_hands_over_does_not_take_it_back_in_the_same_breath() {
     let rig = TestRig::new();
-    let mut first = rig.driver("first");
-    let mut second = rig.control("second");
-    look(&mut second, "state");
+    let (mut first, mut second, to) = asked_for_control(&rig);
     let nothing = json!({});
-    assert_eq!(
-        refusal(&mut second, "TakeControl", &nothing),
-        "control_held"
-    );
-    let to = json!({ "to": look(&mut first, "asked")["session"] });
     let over = first.give("HandOver", &to, 500).expect("sent");
     let back = first.give("TakeControl", &nothing, 500).expect("sent");
     let mut answers = std::collections::BTreeMap::new();
@@ -651,10 +643,5 @@ fn who_hands_over_does_not_take_it_back_in_the_same_breath() {
         "{answers:?}"
     );
     assert_eq!(look(&mut second, "offered")["by"], "first");
-    done(&mut second, "TakeControl");
-    second.keep_control(true);
-    let state = until_driven(&rig, &mut second, |state| {
-        state["control"]["holder"] == "second"
-    });
-    assert_eq!(state["hold"], json!(null));
+    takes_over(&rig, &mut second);
 }

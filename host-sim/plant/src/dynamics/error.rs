@@ -46,10 +46,10 @@ pub enum DynamicsError {
 }
 
 /// Passes a finite array, refuses the first value that is not.
-pub(crate) fn finite<const N: usize>(
-    name: &'static str,
-    values: &[f64; N],
-) -> Result<(), DynamicsError> {
+///
+/// # Errors
+/// [`DynamicsError::NonFinite`] with that value.
+pub fn finite<const N: usize>(name: &'static str, values: &[f64; N]) -> Result<(), DynamicsError> {
     match values.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
         Some(index) => Err(DynamicsError::NonFinite {

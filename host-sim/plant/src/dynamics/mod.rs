@@ -14,5 +14,5 @@ pub mod noc;
 mod params;
 pub mod printed;
 
-pub use error::DynamicsError;
+pub use error::{DynamicsError, finite};
 pub use params::{BodyParams, HalfRobotParams, LegBodies, RobotDynamicsParams};

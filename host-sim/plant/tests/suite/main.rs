@@ -13,6 +13,7 @@ mod height_map;
 mod kinematic_laws;
 mod never_nan;
 mod noc;
+mod odd;
 mod rigid_ground;
 mod rk4;
 mod robot;

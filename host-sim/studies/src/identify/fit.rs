@@ -117,8 +117,12 @@ impl Problem<'_> {
     }
 
     /// The least cost from a start with some factors held at the file's value.
-    #[must_use]
-    pub fn held(&self, start: &Logs, held: &[usize], go_on: &dyn Fn() -> bool) -> Option<Fit> {
+    pub(super) fn held(
+        &self,
+        start: &Logs,
+        held: &[usize],
+        go_on: &dyn Fn() -> bool,
+    ) -> Option<Fit> {
         let mut problem = *self;
         for i in held {
             problem.limits[*i] = [0.0; 2];

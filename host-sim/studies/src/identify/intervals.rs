@@ -33,19 +33,14 @@ pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
     jacobian.tr_mul(jacobian) / variance
 }
 
-/// Covariance of the logarithms under the information of data and file.
-fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// Intervals under the information of data and file.
+#[must_use]
+pub fn intervals(information: &DMatrix<f64>) -> [Interval; COUNT] {
     let mut whole = information.clone();
     for i in 0..COUNT {
         whole[(i, i)] += trust(i).powi(-2);
     }
-    Some(whole.cholesky()?.inverse())
-}
-
-/// Intervals under the information of data and file.
-#[must_use]
-pub fn intervals(information: &DMatrix<f64>) -> [Interval; COUNT] {
-    let covariance = covariance(information);
+    let covariance = whole.cholesky().map(|c| c.inverse());
     std::array::from_fn(|i| {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)]);
         let deviation = variance.sqrt().min(trust(i));

@@ -22,7 +22,6 @@ use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::axis::Change;
-use wheeleg_config::builtin::Source;
 use wheeleg_config::{AxisConfig, ParameterInfo};
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
@@ -188,8 +187,8 @@ pub fn identify(
     let lab = Lab::load(options.lab, &config.axis, options.map)?;
     let reads = [options.lab, Path::new(options.axis)];
     let job = Job::begin_with("identify", &settings(&config.name), &FILES, &reads)?;
-    let identified = Identified::of(config, &source, lab, options, &job.progress)?;
-    let toml = identified.rewritten(&source, options)?;
+    let identified = Identified::of(config, lab, options, &job.progress)?;
+    let toml = identified.rewritten(options)?;
     Ok(Identified { toml, ..identified }.write(job))
 }
 
@@ -367,13 +366,12 @@ fn changes(
 fn accepted(
     fitted: &Fitted<'_>,
     config: &AxisConfig,
-    source: &Source,
     progress: &Progress,
 ) -> Option<(Fit, Vec<usize>)> {
-    let Source { file, text } = source;
+    let file = &config.source.file;
     let is_sound = |logs: &Logs| {
         let changes = changes(config, logs, |_, info| info.source.clone());
-        let text = AxisConfig::rewritten(file, text, &changes);
+        let text = AxisConfig::rewritten(file, &config.source.text, &changes);
         text.is_ok_and(|text| AxisConfig::parse(file, &text).is_ok())
     };
     let mut fit = fitted.fit.clone();
@@ -407,7 +405,6 @@ fn accepted(
 impl Identified {
     fn of(
         config: AxisConfig,
-        source: &Source,
         lab: Lab,
         options: &Options<'_>,
         progress: &Progress,
@@ -424,7 +421,7 @@ impl Identified {
             limits: free::limits(&config),
         };
         let fitted = fitted(&problem, options.seed, progress)?;
-        let (kept, refused) = accepted(&fitted, &config, source, progress)
+        let (kept, refused) = accepted(&fitted, &config, progress)
             .ok_or_else(|| unplayed(&problem, "the measurement", ""))?;
         let Fitted {
             fit,
@@ -486,7 +483,7 @@ impl Identified {
     ///
     /// # Errors
     /// [`StudyError::Config`] if the program would not accept it.
-    fn rewritten(&self, source: &Source, options: &Options<'_>) -> Result<String, StudyError> {
+    fn rewritten(&self, options: &Options<'_>) -> Result<String, StudyError> {
         let lab = options.lab.file_name().map(|name| name.to_string_lossy());
         let lab = lab.unwrap_or_default();
         let changes = changes(&self.config, &self.fit.logs, |i, info| {
@@ -516,6 +513,7 @@ impl Identified {
                 }
             }
         });
+        let source = &self.config.source;
         let toml = AxisConfig::rewritten(&source.file, &source.text, &changes)?;
         AxisConfig::parse(AXIS, &toml)?;
         Ok(toml)

@@ -50,16 +50,4 @@ pub use link::{DENSE, End, Link, LinkParams, Px, Py, Pz, Rx, Ry, Rz};
 pub use model::{Fixed, Floating, FloatingState};
 pub use tree::Tree;
 
-use wheeleg_plant::dynamics::DynamicsError;
-
-/// Passes a finite array, refuses the first value that is not.
-fn finite<const N: usize>(name: &'static str, values: &[f64; N]) -> Result<(), DynamicsError> {
-    match values.iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(index) => Err(DynamicsError::NonFinite {
-            name,
-            index,
-            value: values[index],
-        }),
-    }
-}
+use wheeleg_plant::dynamics::finite;

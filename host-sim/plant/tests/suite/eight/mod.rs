@@ -9,16 +9,4 @@ mod foot;
 mod kin;
 mod leg;
 
-use wheeleg_plant::dynamics::DynamicsError;
-
-/// Passes a finite array, refuses the first value that is not.
-fn finite<const N: usize>(name: &'static str, values: &[f64; N]) -> Result<(), DynamicsError> {
-    match values.iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(index) => Err(DynamicsError::NonFinite {
-            name,
-            index,
-            value: values[index],
-        }),
-    }
-}
+use wheeleg_plant::dynamics::finite;
