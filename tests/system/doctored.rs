@@ -149,11 +149,7 @@ fn tables_in_each_others_place_are_told_in_few_words() {
     // The page in the place of the table it is made of.
     let table = fs::read(place.path("six.parquet")).expect("a table");
     let page = ["campaign", "report", "six.parquet", "--out", "six.parquet"];
-    place.refusal(
-        &page,
-        2,
-        &["take the place of the table six.parquet", "--out FILE"],
-    );
+    place.refusal(&page, 2, &["`six.parquet` is an input", "--out"]);
     assert_eq!(fs::read(place.path("six.parquet")).expect("kept"), table);
     assert!(!place.path("six.parquet.previous").exists());
     // A part in the place of a table, and a table in the place of a part.

@@ -134,8 +134,8 @@ const OTHERS: [Case; 50] = [
     (
         &["identify", "semicolons.csv", "--axis", "bench-vq110u"],
         &[
-            "line 1: the columns are parted by semicolons",
-            "parted by commas",
+            "line 1: there is no column `position_mm` among `time_s`, `Weg`",
+            "--map",
         ],
     ),
     (
@@ -247,7 +247,8 @@ fn files(folder: &Path) {
         [&b"\xff\xfe"[..], &utf16].concat(),
     )
     .expect("written");
-    write("semicolons.csv", &head.replace(',', ";"));
+    let german = head.replace("position_mm", "Weg").replace(',', ";");
+    write("semicolons.csv", &german);
     write("note.csv", &format!("{head},note\n"));
     let rows = |second: &str| {
         let sound = (2..300).map(|k| format!("{},{},0,0,0,0\n", f64::from(k) * 0.005, 40 + k / 4));

@@ -508,3 +508,52 @@ fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
     );
     assert!(folder.path().join("out/summary.json").is_file(), "{said}");
 }
+
+/// Where a board presses its piston against the stop is known to its law, and to the relation that judges the
+/// stroke of a robot.
+#[test]
+fn a_board_seats_where_the_relation_takes_it_to() {
+    let raw_mm = |name: &str| {
+        let mut rows = wheeleg_control::tuning::TABLE.iter();
+        let row = rows.find(|row| row.name == name).expect("a row");
+        row.value as f64 / 65_536.0
+    };
+    for (name, mm) in ["SEAT_TARGET", "SEATED_WITHIN"]
+        .into_iter()
+        .zip(wheeleg_config::SEAT_MM)
+    {
+        assert!((raw_mm(name) - mm).abs() < 1e-4, "{name}: {}", raw_mm(name));
+    }
+}
+
+/// Cylinders that are 3 mm longer than their boards are told: refused by the fields; with what is advised
+/// the robot gets ready.
+#[test]
+fn a_longer_stroke_is_told_to_the_boards_too() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let robot = include_str!("../../host-sim/robots/wheeleg.toml");
+    let longer = changed(robot, &vec![("cylinder.stroke", 183.0, "mm")]);
+    let path = folder.path().join("robot.toml");
+    fs::write(&path, &longer).expect("written");
+    let scenario = folder.path().join("stand.toml");
+    let stand = "name = \"s\"\ndescription = \"d\"\nrobot = \"robot.toml\"\nduration = \"5 s\"\n\
+                 seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n";
+    fs::write(&scenario, stand).expect("written");
+    let out = folder.path().join("out");
+    let run = |scenario: &Path| wheeleg(&["run", "--out", out.to_str().expect("UTF-8")], scenario);
+    let refused = run(&scenario);
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    for part in ["`cylinder.stroke`", "`node.joint.stroke_max`", "183 mm"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let told = longer.replacen(
+        "[node.joint]\n",
+        "[node.joint]\nstroke_max = { value = 183.0, unit = \"mm\", source = \"ASSUMED\" }\n",
+        1,
+    );
+    fs::write(&path, told).expect("written");
+    let ready = run(&scenario);
+    let said = String::from_utf8_lossy(&ready.stderr).into_owned();
+    assert_eq!(ready.status.code(), Some(0), "{said}");
+}

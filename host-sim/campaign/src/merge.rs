@@ -9,7 +9,7 @@ use wheeleg_studies::export::make_room;
 use wheeleg_studies::study::Stop;
 
 use crate::columns::{Columns, FACT};
-use crate::pages::GROUP_ROWS;
+use crate::pages::{GROUP_ROWS, in_words};
 use crate::part::{self, PLAN, PROGRAM};
 use crate::row::{self, Row};
 use crate::store::Store;
@@ -112,7 +112,7 @@ fn table_of(
     let written = write([&temporary, out], &stores, &columns, facts, (partial, stop));
     let result = written.and_then(|merged| {
         if merged.is_some() && !is_same(&temporary, out) {
-            make_room(out)?;
+            make_room(out, &[])?;
             let renamed = std::fs::rename(&temporary, out);
             renamed.map_err(|e| CampaignError::output("write", out, e))?;
         }
@@ -230,7 +230,7 @@ fn write(
     (partial, stop): (bool, &Stop),
 ) -> Result<Option<Merged>, CampaignError> {
     let failed = |e: std::io::Error| CampaignError::output("write", out, e);
-    let full = |e: parquet::errors::ParquetError| failed(std::io::Error::other(e.to_string()));
+    let full = |e: parquet::errors::ParquetError| failed(std::io::Error::other(in_words(&e)));
     let file = File::create(to).map_err(failed)?;
     let text = serde_json::to_string(&columns.all).expect("columns are JSON");
     let facts = [(FACT, text.as_str()), (PLAN, plan_text), (PROGRAM, program)];

@@ -25,6 +25,17 @@ const MOST_PACKED: usize = 22;
 /// Plain, two names of a dictionary, and runs: no value is made of others.
 const ENCODINGS: [usize; 4] = [0, 2, 3, 8];
 
+/// What is wrong with a table, without the words of the library that reads it.
+pub(crate) fn in_words(error: &ParquetError) -> String {
+    match error {
+        ParquetError::General(what) => what.clone(),
+        ParquetError::EOF(what) => format!("it ends early: {what}"),
+        ParquetError::NYI(what) => format!("this program cannot read all of it: {what}"),
+        ParquetError::External(error) => error.to_string(),
+        other => other.to_string(),
+    }
+}
+
 fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("it is damaged: {what}"))
 }

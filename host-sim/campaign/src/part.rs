@@ -6,6 +6,7 @@ use std::path::Path;
 use wheeleg_config::{open_file, word};
 
 use crate::columns::{Column, Columns, FACT, Kind};
+use crate::pages::in_words;
 use crate::row::{self, Row};
 use crate::table::{Data, Table, TableReader, TableWriter};
 use crate::{host, program};
@@ -104,7 +105,7 @@ pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), N
 /// Table of a part, if it is one of this plan and program.
 pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
     let file = open(path)?;
-    let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(e.to_string());
+    let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(in_words(&e));
     let reader = TableReader::new(file).map_err(torn)?;
     of(&reader, plan)?;
     let table = reader.read().map_err(torn)?;

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
-use wheeleg_studies::export::same_file;
+use wheeleg_report::output::same_file;
 use wheeleg_studies::study::Stop;
 
 use crate::part::NotAPart;

@@ -17,9 +17,10 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use wheeleg_config::open_file;
 
+use crate::CampaignError;
 use crate::columns::{Column, Kind};
+use crate::pages::{self, in_words};
 use crate::panics::caught;
-use crate::{CampaignError, pages};
 
 /// Bytes of text for each byte of a file: many rows may share one. A row has some 40 bytes that do not
 /// pack, and its texts are cut ([`crate::row::ERROR_MOST`]) or those of a plan ([`crate::pages::NAMES_MOST`]).
@@ -162,7 +163,7 @@ impl Table {
         };
         write().map_err(|e: ParquetError| {
             let _ = std::fs::remove_file(path);
-            std::io::Error::other(e)
+            std::io::Error::other(in_words(&e))
         })
     }
 
@@ -181,7 +182,7 @@ impl Table {
             let facts = keys.iter().map(|key| reader.fact(key).map(str::to_owned));
             Ok((reader.read()?, facts.collect()))
         };
-        read().map_err(|e: ParquetError| CampaignError::unreadable(path, e))
+        read().map_err(|e: ParquetError| CampaignError::unreadable(path, in_words(&e)))
     }
 
     /// Hash of all columns and values, hexadecimal.

@@ -18,7 +18,7 @@ pub struct LawChoice {
 /// Names, by the numbers of the boards' parameter `law`.
 const NAMES: [&str; 6] = ["fuzzy", "on-off", "p", "pid", "sliding", "predictive"];
 /// Number of the predictive law.
-const PREDICTIVE: u8 = 5;
+pub(crate) const PREDICTIVE: u8 = 5;
 
 impl fmt::Display for LawChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

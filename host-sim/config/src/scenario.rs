@@ -1,5 +1,6 @@
 //! A scenario: which robot does what, for how long, and what happens to it.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use wheeleg_master::argument;
@@ -173,6 +174,15 @@ const LEGS: [(&str, LegChoice); 2] = [("left", LegChoice::Left), ("right", LegCh
 pub(crate) const MAX_DURATION_S: f64 = 9.0e6;
 
 impl Scenario {
+    /// The files that it was read from: its own, and those that its ground is made of.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = Path::new(&self.source.0.file);
+        let ground = terrain::named_files(&self.source.0.text).into_iter();
+        let beside = ground.map(|name| own.with_file_name("").join(name));
+        std::iter::once(own.to_owned()).chain(beside).collect()
+    }
+
     /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
     /// beside it.
     ///

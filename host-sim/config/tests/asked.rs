@@ -215,6 +215,34 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
     );
 }
 
+/// A board that stays as wrong as it was is told of once; one that is made wrong in another way, again.
+#[test]
+fn a_wrong_parameter_of_a_board_is_told_once_whatever_is_written_after_it() {
+    let robot = robot(&[]);
+    let write = |at_s: u32, board: u8, parameter: &str, value: &str| {
+        event(
+            at_s,
+            &format!(
+                "command = \"WriteParameter\"\nboard = {board}\nparameter = \"{parameter}\"\nvalue = {value}"
+            ),
+        )
+    };
+    let refusals = |events: &[String]| {
+        let error = judged(&scenario(STAND, &events.concat()), &robot).expect_err("refused");
+        error.problems().len()
+    };
+    let wrong = write(1, 3, "settle_band", "0.1");
+    let others = [
+        write(2, 3, "settle_ticks", "200"),
+        write(3, 3, "settle_ticks", "300"),
+    ];
+    assert_eq!(refusals(&[wrong.clone(), others.concat()]), 1);
+    let worse = write(4, 3, "settle_band", "0.05");
+    assert_eq!(refusals(&[wrong.clone(), others.concat(), worse]), 2);
+    let another = write(4, 4, "settle_band", "0.1");
+    assert_eq!(refusals(&[wrong, others.concat(), another]), 2);
+}
+
 #[test]
 fn references_and_paths_stay_within_the_cylinders() {
     let short = robot(SHORT);

@@ -113,6 +113,31 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
     assert!(case.scenario_json.get("seed").is_none());
 }
 
+/// A case has a seed, a robot and a name of its own: a factor that sets them would do nothing.
+#[test]
+fn what_a_case_does_not_take_from_its_scenario_is_no_factor() {
+    for (field, grid, instead) in [
+        ("seed", "[1, 2]", "`root`"),
+        ("seed", "[\"1\", \"2\"]", "`replicates`"),
+        ("robot", "[\"wheeleg\"]", "`parameter = \"robot\"`"),
+        ("name", "[\"a\"]", "`parameter = \"scenario\"`"),
+        ("description", "[\"a\"]", "leave the factor out"),
+    ] {
+        let factor = format!("[factor.x]\nparameter = \"scenario.{field}\"\ngrid = {grid}\n");
+        let error = Plan::of(sources(&format!("{HEAD}{factor}"))).expect_err(field);
+        let [problem] = error.problems() else {
+            panic!("{field}: {:?}", error.problems())
+        };
+        let said = problem.summary();
+        assert!(
+            said.contains(&format!("\"scenario.{field}\": no factor sets it")),
+            "{said}"
+        );
+        let help = problem.help_text().expect("a help");
+        assert!(help.contains(instead), "{help}");
+    }
+}
+
 #[test]
 fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     let bars = "[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n\

@@ -97,6 +97,11 @@ const QUICK_PUSH: &[Set] = &[
     ("gait.push_speed", "0.4", "m/s"),
     ("gait.push_acceleration", "5.0", "m/s2"),
 ];
+/// Boards that press a piston against its stop.
+const PRESSING: &[Set] = &[
+    ("node.joint.law", "5", "1"),
+    ("node.joint.precharge", "3.0", "bar"),
+];
 const SMALL_RESERVOIR: &[Set] = &[("supply.reservoir", "10.0", "cm3")];
 
 #[rustfmt::skip]
@@ -169,6 +174,7 @@ const EXAMPLES: &[Example] = &[
     example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5], &["sensor.adc.bits", "node.joint.settle_band"]),
+    example("stop of a joint", ROBOT, PRESSING, ("node.joint.stroke_max", "{}", "mm"), [178.0, 178.6], &["node.joint.stroke_max"]),
     example("board's full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9], &[]),
     example("board's volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0], &[]),
     example("board's volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0], &[]),
@@ -322,6 +328,50 @@ fn relations_are_told_together_and_beside_missing_fields() {
         ],
     );
     assert_eq!(said.lines().count(), 3, "{said}");
+}
+
+/// What has no part in a relation of the gait hides it not, whether it lacks or cannot be read.
+#[test]
+fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
+    let slow = with(ROBOT, "gait.touchdown_speed", "10.0", "mm/s");
+    let slow = with(&slow, "gait.push_speed", "0.1", "m/s");
+    for (key, value, told) in [
+        ("steps", "1e9", 3),
+        ("held_leg_s5", "\"x\"", 3),
+        ("touchdown_reflex", "7", 3),
+        // Each of these has a part in one of them.
+        ("push_acceleration", "-1.0", 2),
+        ("lower", "-1.0", 2),
+        // And this in both.
+        ("stroke", "-1.0", 1),
+    ] {
+        let text = with(&slow, &format!("gait.{key}"), value, "1");
+        let error = RobotConfig::parse("my.toml", &text).expect_err("wrong");
+        assert_eq!(error.problems().len(), told, "{key}: {}", report(&error));
+    }
+}
+
+/// A step of 10 mm has no 15 mm to lower slowly: it is judged by what it has.
+#[test]
+fn a_short_step_is_judged_by_its_own_way_down() {
+    let text = with(ROBOT, "gait.stroke", "10.0", "mm");
+    let text = with(&text, "gait.touchdown_speed", "9.9", "mm/s");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("too slow");
+    let slow = error.problems().iter();
+    let mut slow = slow.filter(|problem| problem.relation() == Some("time to touch down"));
+    let said = slow.next().expect("told").to_string();
+    assert!(said.contains("the last 10 mm take"), "{said}");
+    let text = with(&text, "gait.touchdown_speed", "10.1", "mm/s");
+    let slow = match RobotConfig::parse("my.toml", &text) {
+        Ok(_) => 0,
+        Err(error) => {
+            let relations = error.problems().iter().map(Problem::relation);
+            relations
+                .filter(|name| *name == Some("time to touch down"))
+                .count()
+        }
+    };
+    assert_eq!(slow, 0);
 }
 
 /// Fields that relations and offers are about, each with the share of its sound value to which it

@@ -38,6 +38,31 @@ fn without_a_section_and_below_loose_parts_the_floor_is_level_rock() {
     assert_eq!(ground.height_m(1.5, 0.6), Some(0.0));
 }
 
+/// What a length is written as makes no other ground, to the last bit.
+#[test]
+fn the_same_lengths_in_other_units_are_the_same_ground() {
+    let ground = |x: [f64; 2], height: f64, per_m: f64, unit: &str| {
+        let [from, to] = x.map(|m| (m * per_m * 1e6).round() / 1e6);
+        let height = (height * per_m * 1e6).round() / 1e6;
+        let block = format!(
+            "[[terrain]]\nkind = \"block\"\nx = {{ value = [{from}, {to}], unit = \"{unit}\" }}\n\
+             y = {{ value = [-{to}, {to}], unit = \"{unit}\" }}\nheight = \"{height} {unit}\"\n"
+        );
+        accepted(&block).ground
+    };
+    for millimetres in 1..400_u32 {
+        let x_m = [1.0, 1.0 + f64::from(millimetres) / 1e3];
+        let height_m = f64::from(millimetres) / 1e3;
+        let in_metres = ground(x_m, height_m, 1.0, "m");
+        for (per_m, unit) in [(1e2, "cm"), (1e3, "mm"), (1e6, "um")] {
+            let other = ground(x_m, height_m, per_m, unit);
+            assert_eq!(other.terrain, in_metres.terrain, "{millimetres} in {unit}");
+            assert_eq!(other.fingerprint(), in_metres.fingerprint());
+            assert_ne!(other.parts, in_metres.parts);
+        }
+    }
+}
+
 #[test]
 fn parts_stand_on_the_plane_below_them() {
     let scenario = accepted(

@@ -248,7 +248,7 @@ fn indices(topics: &[String]) -> Result<Vec<u16>, BadRequest> {
             .map(|index| index as u16)
             .ok_or_else(|| BadRequest {
                 reason: Reason::UnknownChannel,
-                text: format!("there is no channel {topic:?}; /api/v1/channels lists them"),
+                text: format!("there is no channel {topic:?}: `wheeleg channels` lists them"),
             })
     };
     topics.iter().map(find).collect()
@@ -286,7 +286,9 @@ fn order(name: &str, args: &Map<String, Json>) -> Result<Order, BadRequest> {
     let near = meant(name, names);
     Err(BadRequest {
         reason: Reason::BadCommand,
-        text: format!("there is no command {name:?}{near}; /api/v1/commands lists them"),
+        text: format!(
+            "there is no command {name:?}{near}: `wheeleg commands` lists those of the robot"
+        ),
     })
 }
 

@@ -38,6 +38,19 @@ pub enum ReportError {
         holder: String,
     },
 
+    /// A result would take the place of a file that the command reads.
+    #[error("`{}` is an input, and the result `{}` would take its place", input.display(), result.display())]
+    #[diagnostic(
+        code(wheeleg::output),
+        help("give another place with --out, or move the input away from this one")
+    )]
+    InPlaceOfInput {
+        /// The file that is read.
+        input: PathBuf,
+        /// The result.
+        result: PathBuf,
+    },
+
     /// Drawing a figure failed.
     #[error("cannot draw {figure}: {reason}")]
     #[diagnostic(

@@ -47,8 +47,7 @@ fn results(also: &'static [&'static str]) -> impl Iterator<Item = &'static str> 
 
 /// The result that has the place of a file in a folder, or of the folder that the file is in: a run
 /// that reads the file may not write there.
-#[must_use]
-pub fn result_in_place_of(
+fn result_in_place_of(
     file: &Path,
     folder: &Path,
     also: &'static [&'static str],
@@ -58,6 +57,27 @@ pub fn result_in_place_of(
         let result = folder.join(name).canonicalize();
         result.is_ok_and(|result| file.starts_with(result))
     })
+}
+
+/// Whether two paths lead to one file that there is.
+#[must_use]
+pub fn same_file(one: &Path, other: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(one).is_some_and(|one| real(other) == Some(one))
+}
+
+/// Refuses a file to write that is one of those that are read.
+///
+/// # Errors
+/// [`ReportError::InPlaceOfInput`] with both paths.
+pub fn ensure_no_input(out: &Path, reads: &[&Path]) -> Result<(), ReportError> {
+    match reads.iter().find(|input| same_file(input, out)) {
+        None => Ok(()),
+        Some(input) => Err(ReportError::InPlaceOfInput {
+            input: input.to_path_buf(),
+            result: out.to_owned(),
+        }),
+    }
 }
 
 /// The first of `previous`, `previous-2`, … that does not exist.
@@ -87,12 +107,24 @@ pub struct Folder {
 
 impl Folder {
     /// Creates the folder, or sets aside the results in it, and holds it. `also` are the names of
-    /// results that only this kind of run has.
+    /// results that only this kind of run has, `reads` the files that it reads: they stay where they are.
     ///
     /// # Errors
-    /// [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
+    /// [`ReportError::InPlaceOfInput`] if a result has the place of such a file, [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
     /// its lock cannot be created or a result not moved.
-    pub fn prepare(path: &Path, also: &'static [&'static str]) -> Result<Self, ReportError> {
+    pub fn prepare(
+        path: &Path,
+        also: &'static [&'static str],
+        reads: &[&Path],
+    ) -> Result<Self, ReportError> {
+        for input in reads {
+            if let Some(result) = result_in_place_of(input, path, also) {
+                return Err(ReportError::InPlaceOfInput {
+                    input: input.to_path_buf(),
+                    result: path.join(result),
+                });
+            }
+        }
         let above = path.ancestors().filter(|p| !p.as_os_str().is_empty());
         let made = above.take_while(|p| !p.exists());
         let made: Vec<PathBuf> = made.map(Path::to_owned).collect();
@@ -289,7 +321,7 @@ mod tests {
         let folder = temporary.path().join("a/b");
         // Each run draws its first figure while it holds the folder.
         let prepare = || {
-            Folder::prepare(&folder, &[]).map(|_held| {
+            Folder::prepare(&folder, &[], &[]).map(|_held| {
                 fs::create_dir_all(folder.join("figures")).expect("created");
             })
         };
@@ -331,7 +363,7 @@ mod tests {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let file = temporary.path().join("taken");
         fs::write(&file, "x").expect("written");
-        let error = Folder::prepare(&file, &[]).expect_err("not a folder");
+        let error = Folder::prepare(&file, &[], &[]).expect_err("not a folder");
         assert!(error.to_string().contains("taken"), "{error}");
     }
 
@@ -339,9 +371,9 @@ mod tests {
     fn a_folder_that_is_held_is_refused_by_name_of_its_lock_and_nothing_is_moved() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path();
-        let first = Folder::prepare(folder, &[]).expect("prepared");
+        let first = Folder::prepare(folder, &[], &[]).expect("prepared");
         fs::write(folder.join("log.mcap"), "the first's").expect("written");
-        let refused = Folder::prepare(folder, &[]).expect_err("held");
+        let refused = Folder::prepare(folder, &[], &[]).expect_err("held");
         let said = refused.to_string();
         assert!(said.contains(".lock"), "{said}");
         assert!(
@@ -352,7 +384,7 @@ mod tests {
         // A lock that nobody holds any more is none, whatever the file says.
         drop(first);
         assert!(folder.join(LOCK).exists());
-        let _second = Folder::prepare(folder, &[]).expect("free again");
+        let _second = Folder::prepare(folder, &[], &[]).expect("free again");
         assert!(folder.join("previous/log.mcap").exists());
     }
 
@@ -360,14 +392,14 @@ mod tests {
     fn a_run_without_a_result_leaves_nothing_and_what_it_set_aside_comes_back() {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let folder = temporary.path().join("runs/a");
-        drop(Folder::prepare(&folder, &[]).expect("prepared"));
+        drop(Folder::prepare(&folder, &[], &[]).expect("prepared"));
         assert!(!temporary.path().join("runs").exists());
 
         // A folder of somebody else's stays, with what is in it.
         fs::create_dir_all(&folder).expect("created");
         fs::write(folder.join("notes.txt"), "mine").expect("written");
         fs::write(folder.join("summary.json"), "earlier").expect("written");
-        let held = Folder::prepare(&folder, &[]).expect("prepared");
+        let held = Folder::prepare(&folder, &[], &[]).expect("prepared");
         assert!(folder.join("previous/summary.json").exists());
         drop(held);
         let kept = fs::read_to_string(folder.join("summary.json"));
@@ -375,7 +407,7 @@ mod tests {
         assert!(folder.join("notes.txt").exists() && !folder.join("previous").exists());
 
         // With a result all stays where it went.
-        let held = Folder::prepare(&folder, &[]).expect("prepared");
+        let held = Folder::prepare(&folder, &[], &[]).expect("prepared");
         fs::write(folder.join("log.mcap"), "new").expect("written");
         drop(held);
         assert!(folder.join("previous/summary.json").exists());
@@ -397,7 +429,7 @@ mod tests {
         }
         fs::write(folder.join("axis.toml"), "mine").expect("written");
         // The axis file is a result of another kind of run.
-        let held = Folder::prepare(folder, &[]).expect("prepared");
+        let held = Folder::prepare(folder, &[], &[]).expect("prepared");
         for name in made {
             assert!(!folder.join(name).exists(), "{name}");
             assert!(folder.join("previous").join(name).exists(), "{name}");
@@ -405,7 +437,7 @@ mod tests {
         assert!(folder.join("axis.toml").exists());
         fs::write(folder.join("log.mcap"), "second").expect("written");
         drop(held);
-        let _held = Folder::prepare(folder, &["axis.toml"]).expect("prepared");
+        let _held = Folder::prepare(folder, &["axis.toml"], &[]).expect("prepared");
         assert!(!folder.join("axis.toml").exists());
         let kept = fs::read_to_string(folder.join("previous-2/axis.toml"));
         assert_eq!(kept.expect("kept"), "mine");
@@ -429,5 +461,17 @@ mod tests {
         let other = temporary.path().join("other");
         let elsewhere = result_in_place_of(&folder.join("axis.toml"), &other, also);
         assert_eq!(elsewhere, None);
+        // Whoever reads such a file gets no folder, and nothing is moved.
+        fs::write(folder.join("summary.json"), "earlier").expect("written");
+        let input = folder.join("figures/mine.toml");
+        let refused = Folder::prepare(&folder, &[], &[Path::new("none"), &input]);
+        let said = refused.expect_err("an input").to_string();
+        assert!(said.contains("figures/mine.toml` is an input"), "{said}");
+        assert!(folder.join("summary.json").exists() && !folder.join("previous").exists());
+        let linked = folder.join("linked.toml");
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&input, &linked).expect("linked");
+        assert!(ensure_no_input(&input, &[&linked]).is_err());
+        assert!(ensure_no_input(&folder.join("mine.toml"), &[&input]).is_ok());
     }
 }

@@ -14,7 +14,7 @@ pub fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotCon
         recorder.provenance("fault", fault.to_string());
     }
     for part in &scenario.ground.parts {
-        recorder.provenance("terrain", part.as_str());
+        recorder.wording("terrain", part.as_str());
     }
     if let Some(fingerprint) = scenario.ground.fingerprint() {
         recorder.provenance("terrain fingerprint", fingerprint);
@@ -24,5 +24,30 @@ pub fn provenance(recorder: &mut Recorder, scenario: &Scenario, robot: &RobotCon
             "parameter",
             format!("{} = {} {}", p.path, p.value_text(), p.unit),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::builtin;
+
+    /// A scenario is what it says, however it says it; another height is another run.
+    #[test]
+    fn the_spelling_of_the_ground_is_no_part_of_the_hash() {
+        let robot = builtin::robot(builtin::DEFAULT_ROBOT).expect("built in");
+        let hash = |height: &str| {
+            let text = format!(
+                "name = \"t\"\ndescription = \"d\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\nseed = 1\n\
+                 targets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\nkind = \"step\"\n\
+                 at = \"1 m\"\nheight = \"{height}\"\n"
+            );
+            let scenario = Scenario::parse("my.toml", &text).expect("usable");
+            let mut recorder = Recorder::in_memory();
+            provenance(&mut recorder, &scenario, &robot, 1);
+            recorder.hash()
+        };
+        assert_eq!(hash("0.057 m"), hash("57 mm"));
+        assert_ne!(hash("0.057 m"), hash("58 mm"));
     }
 }

@@ -557,6 +557,53 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
     assert!(told(&metres.join("\n")).contains("less than 2 % of the stroke"));
 }
 
+/// What spreadsheets of other countries write, and clocks that jitter, are read as what they mean.
+#[test]
+fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
+    let config = config();
+    let sound = measured(&config.axis, 1, 300, |_| OUT, true);
+    let read = |text: &str| Lab::parse("lab.csv", text, &config.axis, &[]);
+    let plain = read(&sound).expect("sound");
+    let commas = |text: &str| text.replace(',', ";").replace('.', ",");
+    let tabs = |text: &str| text.replace(',', "\t");
+    let (head, rows) = sound.split_once('\n').expect("a head");
+    let quoted: String = rows
+        .lines()
+        .map(|row| format!("\"{}\"\n", row.replace(',', "\",\"").replace('.', ",")))
+        .collect();
+    for text in [commas(&sound), tabs(&sound), format!("{head}\n{quoted}")] {
+        let other = read(&text).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(other, plain);
+    }
+    // Up to 0.2 ms beside the ms, the second row as well.
+    let jitter = rows.lines().enumerate().map(|(k, row)| {
+        let (time, rest) = row.split_once(',').expect("a time");
+        let time_s: f64 = time.parse().expect("a number");
+        let late_ms = if k == 0 {
+            0.0
+        } else {
+            [0.2, -0.1, 0.0, 0.15][k % 4]
+        };
+        format!("{:.5},{rest}\n", time_s + 1e-3 * late_ms)
+    });
+    let jitter: String = jitter.collect();
+    assert_eq!(read(&format!("{head}\n{jitter}")).expect("read"), plain);
+    // Thousands are none, and what has another name is told with those that there are.
+    let told = |text: &str| read(text).expect_err("refused").to_string();
+    let thousands = commas(&sound).replacen("\n0", "\n1.000,5", 1);
+    assert!(
+        told(&thousands).contains("\"1.000,5"),
+        "{}",
+        told(&thousands)
+    );
+    let foreign = sound.replacen("position_mm", "Weg [mm]", 1);
+    let told = told(&foreign);
+    assert!(
+        told.contains("no column `position_mm` among `time_s`, `Weg [mm]`"),
+        "{told}"
+    );
+}
+
 /// Random cylinders, and how often an interval has the truth: one in the suite, 100 in
 /// `cargo xtask deep identify`. Of few cylinders the share says nothing.
 #[test]

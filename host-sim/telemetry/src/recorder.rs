@@ -248,6 +248,16 @@ impl<'a> Recorder<'a> {
         self.put(index::RUN, 0, 0, &sample);
     }
 
+    /// Records a line of provenance as it was written, beside one that says the same in values: no part of
+    /// the hash, so that `1.0 m` and `1000 mm` are one.
+    pub fn wording(&mut self, kind: &str, text: impl Into<String>) {
+        let sample = ProvenanceSample {
+            kind: kind.to_owned(),
+            text: text.into(),
+        };
+        self.hand_on(index::RUN, 0, 0, &sample);
+    }
+
     /// A disk that takes nothing more, or takes again: a fault of the run, not of
     /// this computer. What is not written is counted; memory and hash go on.
     pub fn set_disk_full(&mut self, full: bool) {

@@ -13,7 +13,7 @@ use wheeleg_config::{AxisConfig, RobotConfig, Scenario, builtin};
 use wheeleg_console::client::{Url, http};
 use wheeleg_console::keys::{self, Keys, VIEW_FILE};
 use wheeleg_remote_host::{NodeChoice, NodeKind, Nodes};
-use wheeleg_report::output::Folder;
+use wheeleg_report::output::{Folder, ensure_no_input};
 use wheeleg_report::plot::ensure_png;
 use wheeleg_scene::urdf;
 use wheeleg_sim::{Boards, Session, SimError};
@@ -44,16 +44,21 @@ pub(super) fn driven() -> Vec<Driven> {
 }
 
 fn outputs(folder: &Path, all: &mut Vec<Driven>) {
-    let output = || Folder::prepare(Path::new(NO_FOLDER), &[]).expect_err("no folder");
+    let output = || Folder::prepare(Path::new(NO_FOLDER), &[], &[]).expect_err("no folder");
     all.push(("ReportError::Output", Box::new(output()), vec![NO_FOLDER]));
     let held = folder.join("held");
-    let _held = Folder::prepare(&held, &[]).expect("free");
-    let in_use = Folder::prepare(&held, &[]).expect_err("in use");
+    let _held = Folder::prepare(&held, &[], &[]).expect("free");
+    let in_use = Folder::prepare(&held, &[], &[]).expect_err("in use");
     let words = vec!["held", ".lock", "process"];
     all.push(("ReportError::InUse", Box::new(in_use), words));
+    let input = folder.join("input.toml");
+    std::fs::write(&input, "").expect("written");
+    let in_place = ensure_no_input(&input, &[&input]).expect_err("an input");
+    let words = vec!["input.toml", "is an input"];
+    all.push(("ReportError::InPlaceOfInput", Box::new(in_place), words));
     let no_png = ensure_png().expect_err("built without it");
     all.push(("ReportError::NoPng", Box::new(no_png), vec!["`--png`"]));
-    let begun = Job::begin("x", &Settings::new(NO_FOLDER)).expect_err("no folder");
+    let begun = Job::begin("x", &Settings::new(NO_FOLDER), &[]).expect_err("no folder");
     all.push(("StudyError::Report", Box::new(begun), vec![NO_FOLDER]));
     let of_campaign = CampaignError::from(output());
     all.push((

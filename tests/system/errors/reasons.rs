@@ -209,6 +209,7 @@ fn commands(all: &mut Vec<Reason>) {
     let times = vec!["`period`", "2 s", "1 s", "allowed: "];
     add("ParamError::PushTooLong", push, times);
     let slow = ParamError::TouchdownTooSlow {
+        way_mm: PositionMm::from_raw(15 << 16),
         needs_us: 2_000_000,
         has_us: 1_000_000,
     };

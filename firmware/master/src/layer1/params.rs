@@ -126,6 +126,8 @@ pub enum ParamError {
     },
     /// The slow part of the lowering alone takes as long as there is until the push.
     TouchdownTooSlow {
+        /// Length of the slow part: a step may have less than [`GUARD_MM`] to go down.
+        way_mm: PositionMm,
         /// Time needed, µs.
         needs_us: u32,
         /// Time available, µs.
@@ -167,7 +169,7 @@ impl ParamError {
                 Some(&argument::TOUCHDOWN_SPEED),
                 Some(&argument::LOWER),
                 Some(&argument::PUSH),
-                None,
+                Some(&argument::STEP_STROKE),
                 None,
             ],
             Self::OutOfReach { .. } => [
@@ -210,12 +212,16 @@ impl fmt::Display for ParamError {
                 Seconds(has_us),
                 Seconds(needs_us)
             ),
-            Self::TouchdownTooSlow { needs_us, has_us } => write!(
+            Self::TouchdownTooSlow {
+                way_mm,
+                needs_us,
+                has_us,
+            } => write!(
                 f,
                 "with this `touchdown_speed` the last {} mm of the lowering take {} s, but from `lower` \
                  to `push` there are {} s; allowed: `touchdown_speed` 0, or `push` more than {} s after \
                  `lower`",
-                GUARD_MM.get(),
+                way_mm.get(),
                 Seconds(needs_us),
                 Seconds(has_us),
                 Seconds(needs_us)
@@ -347,8 +353,19 @@ impl GaitParams {
         if speed_mm_s <= 0.0 {
             return None;
         }
-        let needs_us = super::units::seconds_to_us(GUARD_MM.get().to_num::<f32>() / speed_mm_s);
-        (needs_us >= has_us).then_some(ParamError::TouchdownTooSlow { needs_us, has_us })
+        let way_mm = self.slow_way_mm();
+        let needs_us = super::units::seconds_to_us(way_mm.get().to_num::<f32>() / speed_mm_s);
+        (needs_us >= has_us).then_some(ParamError::TouchdownTooSlow {
+            way_mm,
+            needs_us,
+            has_us,
+        })
+    }
+
+    /// The part of the lowering at the touchdown speed: all of it, where a step is short.
+    #[must_use]
+    pub fn slow_way_mm(&self) -> PositionMm {
+        self.stroke_mm.limit(PositionMm::ZERO, GUARD_MM)
     }
 
     /// Leg that steps in step `k`.

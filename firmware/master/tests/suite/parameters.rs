@@ -84,6 +84,28 @@ fn parameters_out_of_range_are_refused_by_name() {
     );
 }
 
+/// A step that goes up by less than the slow way is lowered slowly over what it has.
+#[test]
+fn a_short_step_is_lowered_slowly_over_its_own_stroke() {
+    let short = |stroke_mm: f64, speed_mm_s: f64| GaitParams {
+        stroke_mm: PositionMm::from_f64(stroke_mm),
+        touchdown_speed_mm_s: VelocityMmS::from_f64(speed_mm_s),
+        ..GaitParams::default()
+    };
+    // There is a second.
+    assert_eq!(short(5.0, 5.01).validate(), Ok(()));
+    assert_eq!(short(1.0, 1.01).validate(), Ok(()));
+    let error = short(5.0, 5.0).validate().expect_err("refused");
+    assert!(
+        error
+            .to_string()
+            .contains("the last 5 mm of the lowering take 1 s"),
+        "{error}"
+    );
+    assert!(short(100.0, 15.0).validate().is_err());
+    assert_eq!(short(100.0, 15.01).validate(), Ok(()));
+}
+
 /// Each of the five relations of order alone, and all violations at once.
 #[test]
 fn every_relation_names_both_instants() {

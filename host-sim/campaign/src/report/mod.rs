@@ -10,7 +10,7 @@ mod worst;
 use std::path::{Path, PathBuf};
 
 use wheeleg_config::open_file;
-use wheeleg_studies::export::{same_file, write_new};
+use wheeleg_studies::export::write_new;
 
 use crate::columns::Columns;
 use crate::part::PROGRAM;
@@ -73,19 +73,11 @@ impl Report {
     /// Writes the page.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if a table stands there, else [`CampaignError::Study`] with the
-    /// path and what the operating system said.
+    /// [`CampaignError::Study`] with the path, and what the operating system said or which table stands
+    /// there.
     pub fn write(&self, out: &Path) -> Result<(), CampaignError> {
-        if let Some(table) = self.tables.iter().find(|table| same_file(table, out)) {
-            return Err(CampaignError::refused(
-                format!(
-                    "the page would take the place of the table {}",
-                    table.display()
-                ),
-                "give another file with --out FILE",
-            ));
-        }
-        Ok(write_new(out, &self.page)?)
+        let tables: Vec<&Path> = self.tables.iter().map(PathBuf::as_path).collect();
+        Ok(write_new(out, &self.page, &tables)?)
     }
 
     /// Reads a table, and compares it with another one.

@@ -106,11 +106,43 @@ fn field_in_all<'a>(
     }
 }
 
+/// Fields of a scenario that a case does not take from its file, and what is to be done instead.
+const WITHOUT_EFFECT: [(&str, &str); 4] = [
+    (
+        "scenario.seed",
+        "each case has a seed of its own, which follows from `root`: `replicates` repeats a case with other \
+         noise, and `paired = true` gives the values of a factor the same",
+    ),
+    (
+        "scenario.robot",
+        "write `parameter = \"robot\"` and a `grid` of robots",
+    ),
+    (
+        "scenario.name",
+        "write `parameter = \"scenario\"` and a `grid` of scenarios",
+    ),
+    (
+        "scenario.description",
+        "a description enters no run: leave the factor out",
+    ),
+];
+
 /// One field that a factor sets, in one file.
 fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &Base) {
     let full = format!("{prefix}{path}");
     let named = format!("`factor.{}.parameter` = \"{full}\"", factor.name);
     let at_path = span_of_path(r, factor, &full);
+    let without_effect = WITHOUT_EFFECT.iter().find(|(set, _)| *set == full);
+    if let Some((_, instead)) = without_effect {
+        let message = format!("{named}: no factor sets it");
+        r.problem(
+            at_path,
+            message,
+            "without effect",
+            Some((*instead).to_owned()),
+        );
+        return;
+    }
     if factor.is_text() {
         if !base.has_text(path) {
             let message = format!("{named}: {} has no name there", base.file);

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use toml_edit::{Document, TableLike};
+use toml_edit::Document;
 
 use crate::Scenario;
 use crate::builtin::{self, Source};
 use crate::error::ConfigError;
-use crate::terrain::Data;
+use crate::terrain::{Data, named_files};
 
 /// A file: its name for messages, and what is in it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -119,25 +119,6 @@ fn data_of(name: &str, file: &str, text: &str) -> Result<BTreeMap<String, Data>,
         }
     }
     Ok(data)
-}
-
-/// The files that the ground of a scenario is made from.
-fn named_files(text: &str) -> Vec<String> {
-    let Ok(document) = Document::parse(text) else {
-        return Vec::new();
-    };
-    let Some(terrain) = document.get("terrain") else {
-        return Vec::new();
-    };
-    let file = |part: &dyn TableLike| Some(part.get("file")?.as_str()?.to_owned());
-    match (terrain.as_array_of_tables(), terrain.as_array()) {
-        (Some(parts), _) => parts.iter().filter_map(|part| file(part)).collect(),
-        (None, Some(parts)) => {
-            let tables = parts.iter().filter_map(|part| part.as_inline_table());
-            tables.filter_map(|part| file(part)).collect()
-        }
-        _ => Vec::new(),
-    }
 }
 
 /// A name as it is, a relative path from the folder.

@@ -54,7 +54,7 @@ impl Reader {
         let written = self.numbers(&path, spec, value, span.clone(), &range)?;
         let mut ok = true;
         for v in &written {
-            let si = v * factor;
+            let si = self.si(*v, factor);
             // Half an ulp of slack: 20 * 1e-3 may round above a limit of 0.02.
             let slack = 4.0 * f64::EPSILON * si.abs();
             if !(si >= spec.min - slack && si <= spec.max + slack) {
@@ -99,7 +99,17 @@ impl Reader {
             whole: spec.integer,
             doc: spec.doc,
         });
-        Some(written.into_iter().map(|v| v * factor).collect())
+        Some(written.into_iter().map(|v| self.si(v, factor)).collect())
+    }
+
+    /// A value in SI. In a scenario `57 mm` is `0.057 m` to the last bit, which a product with 0.001 is
+    /// not. Of robots and axes the unit is part of what identifies them.
+    fn si(&self, value: f64, factor: f64) -> f64 {
+        let parts = (1.0 / factor).round();
+        match !self.source_required && parts > 1.0 && 1.0 / parts == factor {
+            true => value / parts,
+            false => value * factor,
+        }
     }
 
     /// A pure number needs no unit where no source is asked for.

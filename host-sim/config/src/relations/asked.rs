@@ -58,7 +58,12 @@ struct Board {
     /// The event that has written a parameter last.
     writers: BTreeMap<u16, usize>,
     judged: bool,
+    /// Relations that it was refused for, with the values of their fields.
+    refused: BTreeSet<Refused>,
 }
+
+/// The name of a relation and the bits of what its fields say.
+type Refused = (&'static str, Vec<Vec<u64>>);
 
 struct Judge<'a> {
     scenario: &'a Scenario,
@@ -87,6 +92,7 @@ impl<'a> Judge<'a> {
             stored: stored.clone(),
             writers: BTreeMap::new(),
             judged: true,
+            refused: BTreeSet::new(),
         });
         let mut judge = Self {
             scenario,
@@ -415,7 +421,7 @@ impl<'a> Judge<'a> {
         }
         let new_pose = self.poses.insert(self.pose());
         let parameters = take(&mut self.parameters);
-        let judged = self.judge(&parameters, &brought, new_pose);
+        let judged = self.judge(&parameters, &brought, new_pose, &mut BTreeSet::new());
         self.parameters = parameters;
         judged
     }
@@ -472,15 +478,21 @@ impl<'a> Judge<'a> {
             let called = format!(", the `{}` of board {}", info.name, index + 1);
             brought.insert(path, (format!("events[{at}].value"), called));
         }
-        self.judge(&parameters, &brought, false)
+        // What is as wrong as it was is told once, whatever is written beside it.
+        let mut refused = take(&mut board.refused);
+        let judged = self.judge(&parameters, &brought, false, &mut refused);
+        self.boards[index].refused = refused;
+        judged
     }
 
-    /// Judges the table with what the scenario has brought; `new_pose`: in another start pose, too.
+    /// Judges the table with what the scenario has brought; `new_pose`: in another start pose, too. What
+    /// is `refused` already is left out, and what is told now is added to it.
     fn judge(
         &mut self,
         parameters: &[ParameterInfo],
         brought: &Brought,
         new_pose: bool,
+        refused: &mut BTreeSet<Refused>,
     ) -> Result<(), ConfigError> {
         let plant = &self.robot.plant;
         let whole = |facts: &Facts<'_>| {
@@ -530,6 +542,14 @@ impl<'a> Judge<'a> {
                 .iter()
                 .any(|field| brought.contains_key(*field));
             if !is_own && !new_pose {
+                continue;
+            }
+            let said = one.relation.fields.iter().map(|field| {
+                let info = parameters.iter().find(|info| info.path == **field);
+                let value = info.map_or(&[][..], |info| &info.value);
+                value.iter().map(|value| value.to_bits()).collect()
+            });
+            if !refused.insert((one.relation.name, said.collect())) {
                 continue;
             }
             self.report(one, parameters, brought, (&why, &allowed), advice)?;

@@ -1,12 +1,13 @@
 //! Relations of a few fields that are more than an order.
 
 use wheeleg_master::contact::Side;
-use wheeleg_master::layer1::params::{ParamError, Pattern};
+use wheeleg_master::layer1::params::{GaitParams as MasterGait, ParamError, Pattern};
 use wheeleg_master::layer1::square::GUARD_MM;
 
 use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
 use crate::derived::STEPS_AT_REST;
 use crate::gait::GaitParams;
+use crate::law::PREDICTIVE;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
 
@@ -89,22 +90,23 @@ pub(super) fn begin(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// What the master refuses of the gait.
-fn refused(f: &Facts<'_>) -> Option<impl Iterator<Item = ParamError> + use<>> {
+/// The gait as the master has it, if the fields of this relation can be read.
+fn gait(f: &Facts<'_>, it: &Relation) -> Option<MasterGait> {
+    it.fields.iter().try_for_each(|path| f.si(path).map(drop))?;
+    // What else cannot be read has no part in the relation.
     let value = |spec: &FieldSpec| match spec.dimension {
-        Dimension::Flag => Some(vec![0.0]),
-        _ => Some(vec![f.si(&format!("gait.{}", spec.key))?]),
+        Dimension::Flag => vec![0.0],
+        _ => vec![f.si(&format!("gait.{}", spec.key)).unwrap_or(spec.min)],
     };
-    let values: Option<Vec<Vec<f64>>> = GaitParams::FIELDS.iter().map(value).collect();
-    let mut values = values?.into_iter();
+    let mut values = GaitParams::FIELDS.iter().map(value);
     let gait = GaitParams::build(&mut || values.next().unwrap_or_default());
     // The longest push; which leg steps does not matter.
-    Some(gait.of_master(Pattern::Single(Side::Left)).violations())
+    Some(gait.of_master(Pattern::Single(Side::Left)))
 }
 
 /// A push ends within its step, as the master has it.
 pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
-    let (needs_us, has_us) = refused(f)?.find_map(|error| match error {
+    let (needs_us, has_us) = gait(f, it)?.violations().find_map(|error| match error {
         ParamError::PushTooLong { needs_us, has_us } => Some((needs_us, has_us)),
         _ => None,
     })?;
@@ -136,21 +138,27 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
 
 /// The slow way of a foot down to the ground ends before the push begins, as the master has it.
 pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
-    let [speed, lower, push] = [0, 1, 2].map(|i| it.fields[i]);
-    refused(f)?.find(|error| matches!(error, ParamError::TouchdownTooSlow { .. }))?;
+    let [speed, lower, push, stroke] = [0, 1, 2, 3].map(|i| it.fields[i]);
+    let gait = gait(f, it)?;
+    let too_slow = |error| matches!(error, ParamError::TouchdownTooSlow { .. });
+    gait.violations().any(too_slow).then_some(())?;
     let (speed_m_s, lower_s, push_s) = (f.si(speed)?, f.si(lower)?, f.si(push)?);
-    let (has_s, slow_way_m) = (push_s - lower_s, GUARD_MM.to_f64() * 1e-3);
+    let slow_way_mm = gait.slow_way_mm();
+    let (has_s, slow_way_m) = (push_s - lower_s, slow_way_mm.to_f64() * 1e-3);
     let needs_s = slow_way_m / speed_m_s;
-    let offers = vec![
+    let mut offers = vec![
         Offer::new(f, speed, Bound::Above, slow_way_m / has_s),
         Offer::new(f, speed, Bound::At, 0.0).which_is("a jump of the reference"),
         Offer::new(f, push, Bound::Above, lower_s + needs_s),
         Offer::new(f, lower, Bound::Below, push_s - needs_s),
     ];
+    if slow_way_mm < GUARD_MM {
+        offers.push(Offer::new(f, stroke, Bound::Below, speed_m_s * has_s));
+    }
     offered(
         format!(
             "the last {} mm take {} s, and there are {} s",
-            pretty(GUARD_MM.to_f64()),
+            brief(slow_way_mm.to_f64()),
             brief(needs_s),
             brief(has_s)
         ),
@@ -324,7 +332,11 @@ impl Calibrated {
 
     /// The stroke that a board measures as `measured_mm`.
     fn stroke_at(&self, measured_mm: f64, full_scale_mm: f64, zero: f64) -> f64 {
-        let share = measured_mm / full_scale_mm + zero / CODES;
+        self.stroke_of(measured_mm / full_scale_mm + zero / CODES)
+    }
+
+    /// The stroke at which the wiper stands at a share of its track.
+    fn stroke_of(&self, share: f64) -> f64 {
         (share * self.electrical_m - self.offset_m) / self.gain
     }
 
@@ -353,8 +365,9 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if codes[0] >= least && codes[1] <= most {
         return None;
     }
+    let [from, to] = [least, most].map(|code| brief(sensor.stroke_of(code / CODES) * 1e3));
     let allowed = format!(
-        "allowed are codes from {} to {}",
+        "allowed are codes from {} to {}, which are strokes from {from} to {to} mm",
         pretty(least),
         pretty(most)
     );
@@ -387,6 +400,45 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
             brief(off_mm)
         ),
     })
+}
+
+/// From so near to the end of the stroke that it is told, a board with a precharge presses its piston
+/// against the stop, mm; and so far beside the stop it takes it for pressed (`SEAT_TARGET` and
+/// `SEATED_WITHIN` of the predictive law).
+pub const SEAT_MM: [f64; 2] = [0.5, 1.5];
+
+/// The stop against which a board presses is where it takes it to be.
+pub(super) fn seat(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    // Where a kind of joint has values of its own, those of all say nothing.
+    let own = |path: &str| {
+        let key = path.rsplit_once('.').map_or(path, |(_, key)| key);
+        let mut kinds = ["yaw", "horizontal", "vertical"].into_iter();
+        kinds.any(|kind| f.info(&format!("node.{kind}.{key}")).is_some())
+    };
+    let [stroke, told, gait, precharge, law] = [0, 1, 2, 3, 4].map(|i| it.fields[i]);
+    if [told, precharge, law].into_iter().any(own) {
+        return None;
+    }
+    let (stroke_mm, told_mm, gait_mm) = (f.si(stroke)? * 1e3, f.si(told)?, f.si(gait)? * 1e3);
+    let is_pressed = f.si(law)? == f64::from(PREDICTIVE)
+        && f.si(precharge)? > 0.0
+        && gait_mm > told_mm - SEAT_MM[0];
+    let most_mm = told_mm + SEAT_MM[1];
+    if !is_pressed || stroke_mm <= most_mm * (1.0 + ROUNDING) {
+        return None;
+    }
+    offered(
+        format!(
+            "the board presses a piston at {} mm outwards, and the stop is at {} mm",
+            pretty(told_mm),
+            pretty(stroke_mm)
+        ),
+        vec![
+            Offer::new(f, told, Bound::At, stroke_mm),
+            Offer::new(f, stroke, Bound::UpTo, most_mm * 1e-3),
+            Offer::new(f, gait, Bound::UpTo, (told_mm - SEAT_MM[0]) * 1e-3),
+        ],
+    )
 }
 
 /// A joint that is drawn in, and one that stands out for the gait, measure as settled.

@@ -23,7 +23,7 @@ use wheeleg_protocol::param::JointParam;
 pub use advice::Advised;
 use advice::{Bound, Offer, Search};
 pub(crate) use advice::{Tried, Try};
-pub use laws::SENSOR_TRACK;
+pub use laws::{SEAT_MM, SENSOR_TRACK};
 pub(crate) use moved::Moved;
 use standing::AtRest;
 pub use table::RELATIONS;

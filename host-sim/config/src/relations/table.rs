@@ -117,7 +117,7 @@ pub const RELATIONS: &[Relation] = &[
     above("reach before push", &["gait.push", "gait.reach"], IN_ORDER),
     above("lower before push", &["gait.push", "gait.lower"], IN_ORDER),
     above("push before the end", &["gait.period", "gait.push"], IN_ORDER),
-    law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push"], "a foot would still be coming down slowly when the push begins", laws::touchdown),
+    law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push", "gait.stroke"], "a foot would still be coming down slowly when the push begins", laws::touchdown),
     law("time to push", &["gait.period", "gait.push", "gait.stroke", "gait.push_speed", "gait.push_acceleration"], "the push does not end within its step", laws::push),
     // Bodies and what they touch.
     law("inertias of the chassis", &["spatial.chassis_roll_inertia", "body.chassis_pitch_inertia", "spatial.chassis_yaw_inertia"], NO_BODY, laws::chassis_inertias),
@@ -142,6 +142,7 @@ pub const RELATIONS: &[Relation] = &[
     law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a fault of the sensor", laws::calibration),
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
+    law("stop of a joint", &["cylinder.stroke", "node.joint.stroke_max", "gait.stroke", "node.joint.precharge", "node.joint.law"], "a joint board would press its piston beyond the stroke that it is told, and never take it for settled", laws::seat),
     // What the board of an axis can hold; of one field it is the field's own range.
     board_limits("board's full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
     board_limits("board's volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),

@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toml_edit::{Document, TableLike};
 
 use crate::open_file;
 
@@ -97,5 +98,24 @@ impl Files<'_> {
         let read = file.take(LARGEST).read_to_end(&mut bytes);
         read.map_err(|e| reason(&e))?;
         Ok(bytes)
+    }
+}
+
+/// The files that the ground of a scenario is made from.
+pub(crate) fn named_files(text: &str) -> Vec<String> {
+    let Ok(document) = Document::parse(text) else {
+        return Vec::new();
+    };
+    let Some(terrain) = document.get("terrain") else {
+        return Vec::new();
+    };
+    let file = |part: &dyn TableLike| Some(part.get("file")?.as_str()?.to_owned());
+    match (terrain.as_array_of_tables(), terrain.as_array()) {
+        (Some(parts), _) => parts.iter().filter_map(|part| file(part)).collect(),
+        (None, Some(parts)) => {
+            let tables = parts.iter().filter_map(|part| part.as_inline_table());
+            tables.filter_map(|part| file(part)).collect()
+        }
+        _ => Vec::new(),
     }
 }

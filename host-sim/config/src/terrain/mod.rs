@@ -19,7 +19,7 @@ use super::quantity::pretty;
 use super::reader::{Entry, Reader};
 use fields::{Fields, angle, length};
 pub use files::Data;
-pub(crate) use files::Files;
+pub(crate) use files::{Files, named_files};
 
 /// The ground of a scenario.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,5 +1,6 @@
 //! The pace of a live robot: absolute deadlines from a monotonic clock, one per bus cycle.
 
+use std::mem::replace;
 use std::time::{Duration, Instant};
 
 use super::PaceStatus;
@@ -42,7 +43,7 @@ impl Pace {
             cycles: 0,
             late_ms: Vec::with_capacity(CYCLES),
         };
-        pace.set_speed(speed, now);
+        pace.set_period(speed);
         pace
     }
 
@@ -51,16 +52,27 @@ impl Pace {
         self.status
     }
 
-    /// Simulated over wall time from now on.
+    /// Simulated over wall time from now on. The second that is looked at goes on, however often this is
+    /// called, and the next cycle comes no earlier than it was due.
     pub(super) fn set_speed(&mut self, speed: Option<f64>, now: Instant) {
+        let had_period = self.period.is_some();
+        self.set_period(speed);
+        self.due = match self.period {
+            Some(period) if had_period => self.due.clamp(now, now + period),
+            _ => now,
+        };
+    }
+
+    fn set_period(&mut self, speed: Option<f64>) {
         self.status.speed = speed;
         self.period = speed.map(|speed| self.cycle.div_f64(speed));
-        self.rebase(now);
     }
 
     /// Lets the clock stand, or go on.
     pub(super) fn pause(&mut self, paused: bool, now: Instant) {
-        self.status.paused = paused;
+        if replace(&mut self.status.paused, paused) == paused {
+            return;
+        }
         if paused {
             self.status.factor = 0.0;
         }
@@ -199,6 +211,30 @@ mod tests {
         }
         let factor = pace.status().factor;
         assert!((factor - 2.0).abs() < 0.02, "{factor}");
+    }
+
+    /// A client that sets the pace again and again neither keeps it from being measured nor makes the
+    /// robot faster.
+    #[test]
+    fn a_pace_that_is_set_in_every_cycle_is_measured_and_kept() {
+        let start = Instant::now();
+        let mut pace = Pace::new(CYCLE, Some(1.0), false, start);
+        let mut cycles = 0;
+        for ms in 0..2_000 {
+            let now = start + Duration::from_millis(ms);
+            pace.set_speed(Some(if ms % 2 == 0 { 1.0 } else { 1.001 }), now);
+            pace.pause(false, now);
+            cycles += burst(&mut pace, now);
+        }
+        assert!((199..=202).contains(&cycles), "{cycles} of 200");
+        let factor = pace.status().factor;
+        assert!((factor - 1.0).abs() < 0.02, "{factor}");
+        // From the slowest to a faster one nobody waits for the slow one.
+        let now = start + Duration::from_secs(3);
+        let mut slow = Pace::new(CYCLE, Some(0.1), false, now);
+        burst(&mut slow, now);
+        slow.set_speed(Some(1.0), now);
+        assert_eq!(slow.wait(now), CYCLE);
     }
 
     /// Nor does one in which the clock stood count as a slow one.

@@ -142,8 +142,9 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
 pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
     let configs = configs(options)?;
     let before = judged::read(options)?;
-    let axes: Vec<&Path> = options.axes.iter().map(Path::new).collect();
-    let job = Job::begin_with("compare", settings, &[], &axes)?;
+    let axes = options.axes.iter().map(Path::new);
+    let reads: Vec<&Path> = axes.chain(options.against.as_deref()).collect();
+    let job = Job::begin("compare", settings, &reads)?;
     let comparison = Comparison::play(options, configs, before, &job.progress)?;
     Ok(comparison.write(job))
 }

@@ -1,6 +1,6 @@
 //! One case alone: what happened in it, tick by tick.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::case::{Case, CaseId, Row};
 use super::moves::Played;
@@ -18,6 +18,8 @@ pub struct Single {
     pub row: Row,
     /// What happened; `None` if it is not feasible.
     pub played: Option<Played>,
+    /// The axis, as it was given.
+    pub file: String,
 }
 
 /// Plays the case `id` on the axis that `axes` (built-in names or files) hold under
@@ -35,7 +37,11 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
                 Case::new(&config.name, &config.axis, id.variation, id.seed).map_err(failed)?;
             let played = case.play(id.kind, id.motion).map_err(failed)?;
             let row = case.row(id.kind, id.motion, played.as_ref(), None);
-            return Ok(Single { row, played });
+            return Ok(Single {
+                row,
+                played,
+                file: file.clone(),
+            });
         }
         known.push(config.name);
     }
@@ -56,7 +62,7 @@ impl Single {
     /// # Errors
     /// [`StudyError`] if the folder cannot be used.
     pub fn write(&self, settings: &Settings) -> Result<Finished<Vec<PathBuf>>, StudyError> {
-        let job = Job::begin("case", settings)?;
+        let job = Job::begin("case", settings, &[Path::new(&self.file)])?;
         let cases = std::slice::from_ref(&self.row);
         let judged = &[];
         let summary = json(&Cases { cases, judged }, None);

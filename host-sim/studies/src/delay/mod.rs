@@ -25,6 +25,8 @@ mod tables;
 pub mod trial;
 mod valve_override;
 
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
@@ -282,7 +284,7 @@ pub fn write(
     options: &Options,
     settings: &Settings,
 ) -> Result<Finished<Option<Study>>, StudyError> {
-    let job = Job::begin("delay", settings)?;
+    let job = Job::begin("delay", settings, &[Path::new(&robot.file)])?;
     let collected = Collected::measure(robot, options, &job.progress)?;
     let parts = collected.parts();
     let done = parts.iter().filter(|(_, done)| *done).count() as u64;

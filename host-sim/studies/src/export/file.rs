@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::StudyError;
+use wheeleg_report::output::ensure_no_input;
 
 /// The first of `FILE.previous`, `FILE.previous-2`, … that does not exist.
 fn free_place(path: &Path) -> PathBuf {
@@ -20,19 +21,17 @@ fn free_place(path: &Path) -> PathBuf {
         .unwrap_or_else(|| named(".previous"))
 }
 
-/// Whether two paths lead to one file that there is.
-#[must_use]
-pub fn same_file(one: &Path, other: &Path) -> bool {
-    let real = |path: &Path| path.canonicalize().ok();
-    real(one).is_some_and(|one| real(other) == Some(one))
-}
-
 /// Writes a file. One of the same name that says something else is set aside first, as the results
-/// of a run are; a missing folder is created.
+/// of a run are, unless it is one that the command `reads`; a missing folder is created.
 ///
 /// # Errors
-/// [`StudyError::Output`] with the path and what the operating system said.
-pub fn write_new(path: &Path, content: impl AsRef<[u8]>) -> Result<(), StudyError> {
+/// [`StudyError::Report`] with the path, and what the operating system said or which input it is.
+pub fn write_new(
+    path: &Path,
+    content: impl AsRef<[u8]>,
+    reads: &[&Path],
+) -> Result<(), StudyError> {
+    ensure_no_input(path, reads)?;
     let content = content.as_ref();
     // A device may have no end and a pipe no writer: only a file is read.
     if path.is_file() && std::fs::read(path).is_ok_and(|old| old == content) {
@@ -42,7 +41,7 @@ pub fn write_new(path: &Path, content: impl AsRef<[u8]>) -> Result<(), StudyErro
         return std::fs::write(path, content)
             .map_err(|e| StudyError::output("write the file", path, e));
     }
-    make_room(path)?;
+    make_room(path, reads)?;
     std::fs::write(path, content).map_err(|e| {
         // A part of a file would be taken for the whole.
         let _ = std::fs::remove_file(path);
@@ -67,8 +66,10 @@ fn is_device(path: &Path) -> bool {
 /// Makes room for a file: one of the same name is set aside, a missing folder is created.
 ///
 /// # Errors
-/// [`StudyError::Report`] with the path if it is a folder or a device, or cannot be moved or made.
-pub fn make_room(path: &Path) -> Result<(), StudyError> {
+/// [`StudyError::Report`] with the path if it is a folder, a device or one of the files that the command
+/// `reads`, or cannot be moved or made.
+pub fn make_room(path: &Path, reads: &[&Path]) -> Result<(), StudyError> {
+    ensure_no_input(path, reads)?;
     let kind = match std::fs::metadata(path) {
         Err(_) => None,
         Ok(about) if about.is_dir() => Some(std::io::ErrorKind::IsADirectory.into()),
@@ -103,27 +104,30 @@ mod tests {
         let temporary = tempfile::tempdir().expect("temporary folder");
         let path = temporary.path().join("a/robot.urdf");
         let previous = |n: &str| temporary.path().join(format!("a/robot.urdf.previous{n}"));
-        write_new(&path, "one").expect("written");
-        write_new(&path, "one").expect("unchanged");
+        write_new(&path, "one", &[]).expect("written");
+        write_new(&path, "one", &[]).expect("unchanged");
         assert!(!previous("").exists());
-        write_new(&path, "two").expect("written");
-        write_new(&path, "three").expect("written");
+        write_new(&path, "two", &[]).expect("written");
+        write_new(&path, "three", &[]).expect("written");
         assert_eq!(fs::read_to_string(&path).expect("new"), "three");
         assert_eq!(fs::read_to_string(previous("")).expect("kept"), "one");
         assert_eq!(fs::read_to_string(previous("-2")).expect("kept"), "two");
+        let refused = write_new(&path, "four", &[&path]).expect_err("an input");
+        assert!(refused.to_string().contains("is an input"), "{refused}");
+        assert_eq!(fs::read_to_string(&path).expect("stays"), "three");
         #[cfg(target_os = "linux")]
         {
-            write_new(Path::new("/dev/null"), "x").expect("a device takes it");
-            let full = write_new(Path::new("/dev/full"), "x").expect_err("full");
+            write_new(Path::new("/dev/null"), "x", &[]).expect("a device takes it");
+            let full = write_new(Path::new("/dev/full"), "x", &[]).expect_err("full");
             assert!(full.to_string().contains("/dev/full"), "{full}");
             let pipe = temporary.path().join("pipe");
             let made = std::process::Command::new("mkfifo").arg(&pipe).status();
             assert!(made.expect("mkfifo").success());
-            let refused = write_new(&pipe, "x").expect_err("nobody reads it");
+            let refused = write_new(&pipe, "x", &[]).expect_err("nobody reads it");
             assert!(refused.to_string().contains("not a file"), "{refused}");
             assert!(Path::new("/dev/full").exists() && !Path::new("/dev/null.previous").exists());
         }
-        let error = write_new(temporary.path(), "x").expect_err("a folder");
+        let error = write_new(temporary.path(), "x", &[]).expect_err("a folder");
         assert!(error.to_string().contains("cannot write"), "{error}");
     }
 }

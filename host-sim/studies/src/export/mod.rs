@@ -7,5 +7,5 @@ pub mod parquet;
 mod reading;
 pub mod ros2;
 
-pub use file::{make_room, same_file, write_new};
+pub use file::{make_room, write_new};
 pub use folder::log_of;

@@ -263,7 +263,7 @@ fn tried(
 /// # Errors
 /// [`StudyError`] if a scenario or robot is wrong, or something cannot be drawn or written.
 pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>, StudyError> {
-    let job = Job::begin("field", settings)?;
+    let job = Job::begin("field", settings, &[])?;
     let cases: Vec<(&'static str, u64)> = options
         .scenarios
         .iter()

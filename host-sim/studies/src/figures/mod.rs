@@ -186,7 +186,7 @@ struct SinglePrecision {
 /// # Errors
 /// [`StudyError`] if something cannot be computed, drawn or written.
 pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyError> {
-    let job = Job::begin("figures", settings)?;
+    let job = Job::begin("figures", settings, &[])?;
     let collected = Collected::compute(&job.progress)?;
     let parts = collected.parts();
     let done = parts.iter().filter(|(_, done)| *done).count() as u64;

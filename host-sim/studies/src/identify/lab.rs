@@ -118,6 +118,24 @@ struct Columns {
     load: Option<Place>,
 }
 
+/// What parts the columns of a table: whatever stands most often between the names of its first line.
+/// Tables of many countries' programs have semicolons, as their numbers have commas.
+fn delimiter(text: &str) -> u8 {
+    let mut lines = text.lines();
+    let head = lines.find(|line| !line.trim().is_empty());
+    let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
+    let mut is_quoted = false;
+    for byte in head.unwrap_or_default().bytes() {
+        is_quoted ^= byte == b'"';
+        for (delimiter, count) in &mut counts {
+            *count += i32::from(byte == *delimiter && !is_quoted);
+        }
+    }
+    // Of equal ones the first.
+    let most = counts.into_iter().rev().max_by_key(|(_, count)| *count);
+    most.map_or(b',', |(delimiter, _)| delimiter)
+}
+
 impl Columns {
     /// `map` tells where those are that have another name in the file.
     fn of(file: &str, line: u64, names: Vec<String>, map: &[Mapped]) -> Result<Self, StudyError> {
@@ -133,19 +151,12 @@ impl Columns {
         };
         let help = "the columns are time_s, position_mm, fill_a_us, vent_a_us, fill_b_us, vent_b_us \
                     (or fill_a, vent_a, fill_b, vent_b as 0 and 1), and if there are any \
-                    pressure_a_bar, pressure_b_bar, load_n";
+                    pressure_a_bar, pressure_b_bar, load_n; `--map NAME=COLUMN*FACTOR` names a column \
+                    that is called otherwise or has another unit";
         let need = |name: &str| {
             find(name).ok_or_else(|| {
-                // Tables of other countries' programs; nothing else has these in a name.
-                let parted = names.iter().any(|name| name.contains([';', '\t']));
-                let (what, help) = if parted {
-                    (
-                        "the columns are parted by semicolons or tabs".to_owned(),
-                        "columns are parted by commas, and numbers have a decimal point",
-                    )
-                } else {
-                    (format!("there is no column `{name}`"), help)
-                };
+                let all = shown_at(&names.join("`, `"), 400);
+                let what = format!("there is no column `{name}` among `{all}`");
                 StudyError::refused(format!("{file}, line {line}: {what}"), help)
             })
         };
@@ -255,6 +266,7 @@ impl Lab {
         // Some programs begin a file with the mark of its encoding.
         let text = text.trim_start_matches('\u{feff}');
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter(text))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
         let names = reader.headers().map_err(|e| bad_row(file, text, &[], &e))?;
@@ -291,7 +303,8 @@ fn line_of(text: &str, at: &csv::Position) -> u64 {
 
 /// A line that is no row of the table.
 fn bad_row(file: &str, text: &str, columns: &[String], error: &csv::Error) -> StudyError {
-    const HELP: &str = "each line has a value for each column, parted by commas";
+    const HELP: &str =
+        "each line has a value for each column, parted by commas, semicolons or tabs";
     if let csv::ErrorKind::UnequalLengths { pos, len, .. } = error.kind() {
         let line = pos.as_ref().map_or(0, |at| line_of(text, at));
         let of = format!("{len} values, and the table has {} columns", columns.len());
@@ -334,7 +347,12 @@ fn row(
             &columns.names[place.column],
             record.get(place.column).unwrap_or(""),
         );
-        let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+        // A comma within a cell parts no columns: it is a decimal one.
+        let value = match text.split_once(',') {
+            Some((whole, decimals)) => format!("{whole}.{decimals}").parse::<f64>(),
+            None => text.parse::<f64>(),
+        };
+        let value = value.ok().filter(|v| v.is_finite());
         let value = value.map(|value| value * place.factor + place.offset);
         value.ok_or_else(|| {
             let what = match text {
@@ -434,11 +452,21 @@ fn units(
     ))
 }
 
+/// How far rows are apart as a rule: a clock that jitters has none that is exact.
+fn period_ms(rows: &[(u64, Row)]) -> f64 {
+    let pairs = rows.windows(2);
+    let mut apart: Vec<f64> = pairs
+        .map(|pair| (pair[1].1.time_s - pair[0].1.time_s) * 1e3)
+        .collect();
+    let middle = apart.len() / 2;
+    *apart.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// Rows on a grid of whole ms, without gaps.
 fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, StudyError> {
     let begin_s = rows[0].1.time_s;
     let ms = |row: &Row| (row.time_s - begin_s) * 1e3;
-    let period_ms = ms(&rows[1].1);
+    let period_ms = period_ms(rows);
     let at = |line: u64| At { file, line };
     let help = if columns.on_times {
         "on-times need a row for every ms"
@@ -449,7 +477,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
     let step = period_ms.round();
     if !(1.0..=most).contains(&step) || (period_ms - step).abs() > 0.05 {
         let what = format!(
-            "{} ms after the first row; allowed: whole ms, 1 to {most}",
+            "rows are {} ms apart; allowed: whole ms, 1 to {most}",
             pretty(period_ms)
         );
         return Err(at(rows[1].0).wrong(&columns.names[columns.time.column], &what, help));

@@ -186,7 +186,7 @@ pub fn identify(
     let config = AxisConfig::parse(&source.file, &source.text)?;
     let lab = Lab::load(options.lab, &config.axis, options.map)?;
     let reads = [options.lab, Path::new(options.axis)];
-    let job = Job::begin_with("identify", &settings(&config.name), &FILES, &reads)?;
+    let job = Job::begin_with("identify", &settings(&config.name), &reads, &FILES)?;
     let identified = Identified::of(config, lab, options, &job.progress)?;
     let toml = identified.rewritten(options)?;
     Ok(Identified { toml, ..identified }.write(job))
@@ -402,6 +402,57 @@ fn accepted(
     Some((fit, refused))
 }
 
+/// What stands between the measurement that left a value open, and what was known of it before.
+const UNDETERMINED: &str = " does not determine it; before: ";
+/// What stands before the measurement that a value was kept against.
+const CONTRADICTS: &str = "; what fits ";
+
+/// Where a value came from before this measurement. What an earlier identification has added to it is
+/// left out: identified again and again, a file says it once.
+struct Before<'a> {
+    /// The value that was there before any measurement left it open, with its unit.
+    value: String,
+    /// Its source.
+    source: &'a str,
+    /// The source as it stands, without what it was kept against.
+    whole: &'a str,
+}
+
+impl<'a> Before<'a> {
+    fn of(info: &'a ParameterInfo) -> Self {
+        let (whole, _) = (info.source.split_once(CONTRADICTS)).unwrap_or((&info.source, ""));
+        let earlier = whole.rsplit_once(UNDETERMINED);
+        let earlier = earlier.and_then(|(_, before)| before.split_once(", "));
+        match earlier {
+            Some((value, source)) => Self {
+                value: value.to_owned(),
+                source,
+                whole,
+            },
+            None => {
+                let value = info.value.first().copied().unwrap_or(0.0);
+                Self {
+                    value: format!("{} {}", wheeleg_config::brief(value), info.unit),
+                    source: whole,
+                    whole,
+                }
+            }
+        }
+    }
+}
+
+/// The source of a value that a measurement leaves open.
+fn left_open(lab: &str, info: &ParameterInfo) -> String {
+    let Before { value, source, .. } = Before::of(info);
+    format!("ASSUMED: {lab}{UNDETERMINED}{value}, {source}")
+}
+
+/// The source of a value that is kept, as what fits the measurement is none that the file may have.
+fn kept_against(lab: &str, info: &ParameterInfo) -> String {
+    let whole = Before::of(info).whole;
+    format!("{whole}{CONTRADICTS}{lab} contradicts other values of this file")
+}
+
 impl Identified {
     fn of(
         config: AxisConfig,
@@ -488,7 +539,6 @@ impl Identified {
         let lab = lab.unwrap_or_default();
         let changes = changes(&self.config, &self.fit.logs, |i, info| {
             let parameter = &self.parameters[i];
-            let before = &info.source;
             let in_unit = |factor: f64| {
                 let value = info.value.first().map_or(0.0, |v| v * factor);
                 wheeleg_config::brief(value)
@@ -500,17 +550,8 @@ impl Identified {
                     in_unit(parameter.high),
                     info.unit
                 ),
-                (false, false) => format!(
-                    "ASSUMED: {lab} does not determine it; before: {} {}, {before}",
-                    in_unit(1.0),
-                    info.unit
-                ),
-                (true, _) => {
-                    let note = format!("; what fits {lab} contradicts other values of this file");
-                    // Said once, also if it is identified again.
-                    let before = before.strip_suffix(&note).unwrap_or(before);
-                    format!("{before}{note}")
-                }
+                (false, false) => left_open(&lab, info),
+                (true, _) => kept_against(&lab, info),
             }
         });
         let source = &self.config.source;
@@ -551,5 +592,43 @@ impl Identified {
             let drawn = job.draw(page::figures(identified));
             (page::render(identified, &drawn), drawn)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whoever goes on with the axis that was written, any number of times and in any order, finds where
+    /// each value came from, once.
+    #[test]
+    fn the_source_of_a_value_that_stays_open_does_not_grow() {
+        let config = AxisConfig::load("bench-vq110u").expect("built in");
+        let mut listed = config.parameters.iter();
+        let info = listed.find(|info| info.path == "friction.coulomb");
+        let mut info = info.expect("listed").clone();
+        let own = info.source.clone();
+        let was = format!("{} {}", info.value[0], info.unit);
+        for lab in ["a.csv", "a.csv", "b, c.csv", "; what fits.csv", "a.csv"] {
+            info.source = left_open(lab, &info);
+            assert_eq!(
+                info.source,
+                format!("ASSUMED: {lab} does not determine it; before: {was}, {own}")
+            );
+            // What a fit has made of the value is not what it was.
+            info.value[0] *= 1.1;
+        }
+        for lab in ["a.csv", "b.csv", "a.csv"] {
+            info.source = kept_against(lab, &info);
+        }
+        let kept = info.source.clone();
+        assert_eq!(kept.matches("contradicts").count(), 1, "{kept}");
+        assert!(
+            kept.contains(&own) && kept.contains("what fits a.csv"),
+            "{kept}"
+        );
+        info.source = left_open("a.csv", &info);
+        assert!(!info.source.contains("contradicts"), "{}", info.source);
+        assert!(info.source.ends_with(&own), "{}", info.source);
     }
 }

@@ -46,7 +46,7 @@ pub fn write(
     seed: u64,
     settings: &Settings,
 ) -> Result<Finished<Vec<Outcome>>, StudyError> {
-    let job = Job::begin("faults", settings)?;
+    let job = Job::begin("faults", settings, &[])?;
     let outcomes = run(rows, seed, &job.progress)?;
     let (done, of) = (outcomes.len() as u64, rows.len() as u64);
     let stopped = job.progress.stopped(done, of, "rows");

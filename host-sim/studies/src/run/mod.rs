@@ -172,7 +172,10 @@ fn run_with(
     } else {
         scenario.check_with(robot)?;
     }
-    let job = Job::begin(&scenario.name, settings)?;
+    let files = scenario.files();
+    let mut reads: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    reads.push(Path::new(&robot.file));
+    let job = Job::begin(&scenario.name, settings, &reads)?;
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
     let log = job.folder().join("log.mcap");

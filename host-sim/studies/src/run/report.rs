@@ -39,7 +39,7 @@ mod tests {
         summary: &Summary,
     ) {
         let settings = Settings::new(folder);
-        let job = Job::begin("test", &settings).expect("a folder");
+        let job = Job::begin("test", &settings, &[]).expect("a folder");
         let run = Run {
             summary: summary.clone(),
             failure: None,

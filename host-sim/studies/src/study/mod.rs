@@ -20,7 +20,7 @@ use minijinja::context;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_report::output::{Folder, result_in_place_of};
+use wheeleg_report::output::Folder;
 use wheeleg_report::plot::{Figure, ensure_png};
 use wheeleg_report::{page, subfolder};
 
@@ -132,45 +132,31 @@ pub struct Job {
 
 impl Job {
     /// Takes the folder; results of an earlier run in it are set aside in its folders
-    /// `previous`, `previous-2`, …
+    /// `previous`, `previous-2`, … The files that the study `reads` stay where they are.
     ///
     /// # Errors
-    /// [`StudyError::Report`] if the folder is in use or cannot be written, or if PNG is asked for of a
-    /// program without it.
-    pub fn begin(name: &str, settings: &Settings) -> Result<Self, StudyError> {
-        Self::begin_with(name, settings, &[], &[])
+    /// [`StudyError::Report`] if the folder is in use or cannot be written, if a result has the place of
+    /// a file that is read, or if PNG is asked for of a program without it.
+    pub fn begin(name: &str, settings: &Settings, reads: &[&Path]) -> Result<Self, StudyError> {
+        Self::begin_with(name, settings, reads, &[])
     }
 
-    /// The same for a study that writes files beside those of every study, or reads some: what is
-    /// read stays where it is.
+    /// The same for a study that writes files beside those of every study.
     ///
     /// # Errors
-    /// As [`Job::begin`]; [`StudyError::Refused`] if a result has the place of a file that is read.
+    /// As [`Job::begin`].
     pub fn begin_with(
         name: &str,
         settings: &Settings,
-        also: &'static [&'static str],
         reads: &[&Path],
+        also: &'static [&'static str],
     ) -> Result<Self, StudyError> {
-        let out = &settings.out;
-        for file in reads {
-            if let Some(result) = result_in_place_of(file, out, also) {
-                return Err(StudyError::refused(
-                    format!(
-                        "`{}` is an input, and the result `{}` would take its place",
-                        file.display(),
-                        out.join(result).display()
-                    ),
-                    "give another folder with --out, or move the input out of this one",
-                ));
-            }
-        }
         if settings.png {
             ensure_png()?;
         }
         settings.stop.begin();
         Ok(Self {
-            folder: Folder::prepare(out, also)?,
+            folder: Folder::prepare(&settings.out, also, reads)?,
             png: settings.png,
             unwritten: Mutex::default(),
             progress: Progress::new(name, settings.stop.clone()),

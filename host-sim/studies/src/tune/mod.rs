@@ -186,7 +186,7 @@ pub fn tune(
     let settings = settings(&config.name);
     // An axis that is refused costs no earlier results.
     let delays = delays(file, &config, seed)?;
-    let job = Job::begin_with("tune", &settings, &[], &[Path::new(file)])?;
+    let job = Job::begin("tune", &settings, &[Path::new(file)])?;
     let tuned = Tuned::play(file, config, delays, (seed, section), &job.progress)?;
     Ok(tuned.write(job))
 }

@@ -21,8 +21,9 @@ use self::content::{Content, Span};
 pub use self::plain::{acts, plain};
 use self::signals::Signal;
 use crate::StudyError;
-use crate::export::{same_file, write_new};
+use crate::export::write_new;
 use crate::study::Progress;
+use wheeleg_report::output::ensure_no_input;
 
 /// What to look at.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,18 +110,16 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
     motion.ground = ground::picture(&options.logs[0], motion.geometry.track_mm() * 1e-3, x_m)?;
     let text = page::make(&logs, &groups, &differences, &motion, drawn_as.as_deref())?;
     let page = options.out.clone().unwrap_or_else(|| beside(&options.logs));
-    let is_log = |log: &PathBuf| same_file(log, &page);
-    if let Some(log) = options.logs.iter().find(|log| is_log(log)) {
-        return Err(StudyError::refused(
-            format!("the page would take the place of the log {}", log.display()),
-            "give another file with --out FILE",
-        ));
-    }
+    let logs_read = options.logs.iter().map(PathBuf::as_path);
+    let reads: Vec<&Path> = logs_read
+        .chain(options.robot.as_deref().map(Path::new))
+        .collect();
+    ensure_no_input(&page, &reads)?;
     // The page of a log is made anew; somebody's own file is kept.
     if options.out.is_none() && page::is_ours(&page) {
         let _ = std::fs::remove_file(&page);
     }
-    write_new(&page, &text)?;
+    write_new(&page, &text, &reads)?;
     progress.clear();
     let broken_off = options.logs.iter().zip(&logs);
     let broken_off = broken_off.filter(|(_, log)| !log.content.end.whole);
@@ -293,7 +292,7 @@ mod tests {
                     out: Some(folder.path().join("./log.mcap")),
                     ..part(0.0, 1.0)
                 },
-                "take the place of the log",
+                "log.mcap` is an input",
             ),
         ] {
             let told = viewed(&options).expect_err("refused").to_string();

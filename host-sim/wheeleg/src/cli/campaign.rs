@@ -18,7 +18,7 @@ use wheeleg_studies::run::log_bytes;
 use wheeleg_studies::study::Signal;
 
 use super::exit::{self, CANNOT_WRITE, FAILED, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
-use super::{print, stop_on_signals, tell, tell_unwritten, whole};
+use super::{print, stop_on_signals, tell, tell_error, tell_unwritten, whole};
 
 /// Arguments of `wheeleg campaign`.
 #[derive(Debug, Args)]
@@ -191,7 +191,7 @@ pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
     };
     Ok(result.unwrap_or_else(|error| {
         let code = error.exit_code();
-        tell(&format!("{:?}", miette::Report::new(error)));
+        tell_error(error);
         ExitCode::from(code)
     }))
 }

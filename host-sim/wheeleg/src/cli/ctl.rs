@@ -24,9 +24,9 @@ use wheeleg_telemetry::channels;
 
 use super::exit::{self, LOST};
 use super::serve::refused;
-use super::{print, say, stop_on_signals, tell, whole};
+use super::{print, say, stop_on_signals, tell, tell_error, whole};
 use param::ParamCommand;
-use reach::{Reach, not_answered};
+use reach::{Reach, ended, not_answered};
 
 /// Arguments of `wheeleg ctl`.
 #[derive(Debug, Args)]
@@ -140,7 +140,7 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
                 StudyError::Stdout(_) => Err(why),
                 // Whatever kept the answer away, nobody knows of a stop.
                 _ => {
-                    tell(&format!("{:?}", miette::Report::new(why)));
+                    tell_error(why);
                     Ok(not_confirmed())
                 }
             })
@@ -357,8 +357,7 @@ fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> Result<ExitCod
                 None => continue,
             },
             Some(Incoming::Closed { .. }) => {
-                tell("the connection has ended");
-                return Ok(ExitCode::from(LOST));
+                return Ok(ended());
             }
             _ => continue,
         };

@@ -1,13 +1,13 @@
 //! `wheeleg export`: robot and logs for other programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::compare::controller;
 use super::exit::FAILED;
-use super::{print, stop_on_signals, tell};
+use super::{print, stop_on_signals, tell, tell_error};
 use wheeleg_config::{AxisConfig, builtin};
 use wheeleg_fmu::archive;
 use wheeleg_fmu::description::Fmi;
@@ -118,9 +118,12 @@ impl LogArgs {
 /// Writes the robot, or a log, in the format asked for.
 pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
     match &args.format {
-        Format::Urdf(args) => write(&urdf::write(&builtin::robot(&args.robot)?)?, &args.out),
+        Format::Urdf(args) => {
+            let text = urdf::write(&builtin::robot(&args.robot)?)?;
+            write(&text, &args.out, &[Path::new(&args.robot)])
+        }
         Format::Fmu(args) => unit(args),
-        Format::Layout(args) => write(layout::LAYOUT, args),
+        Format::Layout(args) => write(layout::LAYOUT, args, &[]),
         Format::Parquet(args) => {
             let out = args.out("parquet");
             exported(args, |progress| {
@@ -170,7 +173,7 @@ fn unit(args: &FmuArgs) -> Result<ExitCode, StudyError> {
     let (model, bytes) = match made() {
         Ok(made) => made,
         Err(error) => {
-            tell(&format!("{:?}", miette::Report::new(error)));
+            tell_error(error);
             return Ok(ExitCode::from(FAILED));
         }
     };
@@ -178,7 +181,10 @@ fn unit(args: &FmuArgs) -> Result<ExitCode, StudyError> {
     let kind = kind.as_ref().map_or("unit", |k| k.get_name());
     let named = || PathBuf::from(format!("{}-{kind}.fmu", model.config.name));
     let out = args.out.clone().unwrap_or_else(named);
-    write_new(&out, &bytes)?;
+    let library = args.library.as_deref();
+    let axis = Path::new(&args.axis);
+    let reads: Vec<&Path> = library.into_iter().chain([axis]).collect();
+    write_new(&out, &bytes, &reads)?;
     let (count, place) = (model.variables.len(), out.display());
     print(&format!(
         "{count} variables, {} kB in {place}\n",
@@ -186,11 +192,11 @@ fn unit(args: &FmuArgs) -> Result<ExitCode, StudyError> {
     ))
 }
 
-fn write(text: &str, args: &OutArgs) -> Result<ExitCode, StudyError> {
+fn write(text: &str, args: &OutArgs, reads: &[&Path]) -> Result<ExitCode, StudyError> {
     match &args.out {
         None => print(text),
         Some(path) => {
-            write_new(path, text)?;
+            write_new(path, text, reads)?;
             Ok(ExitCode::SUCCESS)
         }
     }

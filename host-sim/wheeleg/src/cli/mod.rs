@@ -160,7 +160,7 @@ pub(crate) fn main() -> ExitCode {
         Some(Command::Interface(args)) => interface::command(&args),
     };
     result.unwrap_or_else(|error| {
-        tell(&format!("{:?}", miette::Report::new(error)));
+        tell_error(error);
         ExitCode::from(FAILED)
     })
 }
@@ -184,6 +184,11 @@ fn say(text: &str) -> std::io::Result<()> {
 /// Writes a line to standard error. There may be nobody left to read it after a hang-up.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{}", harmless(line));
+}
+
+/// Tells an error in the form that all have: its code, what is wrong, and what can be done.
+fn tell_error(error: impl miette::Diagnostic + Send + Sync + 'static) {
+    tell(&format!("{:?}", miette::Report::new(error)));
 }
 
 /// What every study that draws can be asked for.
@@ -269,7 +274,7 @@ fn place(report: &Path, width: usize) -> String {
 fn tell_unwritten(unwritten: Vec<StudyError>) -> bool {
     let whole = unwritten.is_empty();
     for error in unwritten {
-        tell(&format!("{:?}", miette::Report::new(error)));
+        tell_error(error);
     }
     if !whole {
         tell("the values above are valid; the files named here are missing or truncated");

@@ -1,6 +1,6 @@
 //! `wheeleg plant`: the pneumatic plant of one axis, checked and exported.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
@@ -61,7 +61,7 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, StudyError> {
             let config = AxisConfig::load(&args.axis)?;
             let value = export::sequences(&config.name, &config.axis)
                 .map_err(|e| plant_error(&args.axis, &e))?;
-            write_new(&args.out, format!("{value}\n"))?;
+            write_new(&args.out, format!("{value}\n"), &[Path::new(&args.axis)])?;
             Ok(ExitCode::SUCCESS)
         }
     }

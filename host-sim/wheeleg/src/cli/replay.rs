@@ -60,7 +60,7 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
     let recorded = recorded(&args.folder).map_err(refused)?;
     // What cannot be repeated costs no earlier log.
     if let Some(log) = &args.log {
-        make_room(log)?;
+        make_room(log, &[])?;
     }
     let mut begun = false;
     let replayed = replay(recorded, args.log.as_deref(), &mut |ms, of_ms| {

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use wheeleg_console::client::{Client, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::request::FRAME_MAX;
-use wheeleg_console::{ADDRESS, Fingerprint, Key};
+use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint, Key};
 use wheeleg_master::command::CommandCode;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Stop;
@@ -17,7 +17,7 @@ use wheeleg_studies::view::plain;
 
 use super::super::exit::{LOST, REFUSED};
 use super::super::serve::refused;
-use super::super::{print, tell};
+use super::super::{print, tell, tell_error};
 
 /// What is said where the control could not be given back.
 const NOT_RELEASED: &str = "the control is not released: the robot will hold";
@@ -133,7 +133,7 @@ impl Reach {
                 ("refused", REFUSED, reason.as_str(), text.as_str())
             }
             Outcome::Unknown => ("unknown", LOST, "", "nobody answered within 2 s"),
-            Outcome::Lost => ("lost", LOST, "", "the connection ended"),
+            Outcome::Lost => ("lost", LOST, "", "the connection has ended"),
         };
         if self.json {
             let end = json!({ "status": status, "reason": reason, "text": text });
@@ -141,8 +141,12 @@ impl Reach {
         } else if text.is_empty() {
             print(&format!("{status}\n"))?;
         } else {
+            let help = match end {
+                Outcome::Refused { .. } => "`wheeleg ctl status` tells in which state the robot is",
+                _ => ANSWERS,
+            };
             // It may quote what was given.
-            tell(&plain(&format!("{status}: {text}")));
+            tell_server(plain(&format!("{status}: {text}")), help);
         }
         Ok(ExitCode::from(code))
     }
@@ -178,10 +182,29 @@ fn bring_to_rest(client: &mut Client, name: &str) -> Result<(), StudyError> {
 
 /// Tells what a server refuses over HTTP; its exit code.
 pub(super) fn not_answered(problem: &Value) -> ExitCode {
-    let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
     // A false server may have written it.
-    tell(&plain(&format!("{}: {}", text("detail"), text("remedy"))));
+    let text = |name: &str| plain(problem[name].as_str().unwrap_or_default());
+    let remedy = match text("remedy") {
+        remedy if remedy.is_empty() => ANSWERS.to_owned(),
+        remedy => remedy,
+    };
+    tell_server(text("detail"), remedy);
     ExitCode::from(REFUSED)
+}
+
+/// What helps where nobody answers.
+const ANSWERS: &str = "`wheeleg ctl status` tells whether the server answers";
+
+/// Tells that the connection has ended; the exit code.
+pub(super) fn ended() -> ExitCode {
+    tell_server("the connection has ended".to_owned(), ANSWERS);
+    ExitCode::from(LOST)
+}
+
+/// Tells what a server has refused or left unanswered, as every error is told.
+fn tell_server(what: String, help: impl Into<String>) {
+    let help = help.into();
+    tell_error(ConsoleError::Other { what, help });
 }
 
 /// Bytes of a frame beside the command in it.

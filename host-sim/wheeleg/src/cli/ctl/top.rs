@@ -13,10 +13,9 @@ use wheeleg_studies::study::Suspend;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
 
-use super::super::exit::LOST;
 use super::super::serve::refused;
-use super::super::{no_handler, stop_on_signals, tell};
-use super::reach::Reach;
+use super::super::{no_handler, stop_on_signals};
+use super::reach::{Reach, ended};
 use super::sample;
 use super::terminal::{Key, Line, Terminal};
 
@@ -99,6 +98,8 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
                 break Err(());
             }
             // The server may have given up a client that read nothing; what it sent before is old.
+            // One at a time: a server has room for few.
+            drop(client);
             client = connect(reach, key)?;
             seen = Seen {
                 unconfirmed: seen.unconfirmed || seen.stopping.is_some(),
@@ -129,10 +130,7 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
     match end {
         Ok(None) => Ok(ExitCode::SUCCESS),
         Ok(Some(signal)) => Ok(ExitCode::from(signal.exit_code())),
-        Err(()) => {
-            tell("the connection has ended");
-            Ok(ExitCode::from(LOST))
-        }
+        Err(()) => Ok(ended()),
     }
 }
 
