@@ -557,3 +557,74 @@ fn a_longer_stroke_is_told_to_the_boards_too() {
     let said = String::from_utf8_lossy(&ready.stderr).into_owned();
     assert_eq!(ready.status.code(), Some(0), "{said}");
 }
+
+/// A section of a file, up to the remarks before the next one.
+fn section(text: &str, name: &str) -> std::ops::Range<usize> {
+    let begin = text.find(&format!("[{name}]\n")).expect("the section");
+    let end = text[begin + 1..]
+        .find("\n[")
+        .map_or(text.len(), |at| begin + at + 2);
+    let remark = text[begin..end]
+        .find("\n#")
+        .map_or(end, |at| begin + at + 1);
+    begin..remark
+}
+
+/// `docs/guide/tune.md`, word by word.
+#[test]
+fn the_guide_of_tune_leads_to_a_robot_that_walks() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mine = axis(folder.path(), BENCH, &Vec::new());
+    let out = folder.path().join("out");
+    let tuned = wheeleg(&["tune", "--out", out.to_str().expect("UTF-8")], &mine);
+    assert_eq!(tuned.status.code(), Some(0));
+    let parameters = fs::read_to_string(out.join("node-parameters.toml")).expect("written");
+    let mut robot = include_str!("../../host-sim/robots/wheeleg.toml").to_owned();
+    for name in [
+        "fill_valve",
+        "vent_valve",
+        "line",
+        "cylinder",
+        "friction",
+        "end_stop",
+    ] {
+        robot.replace_range(section(&robot, name), &BENCH[section(BENCH, name)]);
+    }
+    let old = robot[section(&robot, "node.joint")].to_owned();
+    let key = |line: &str| line.split('=').next().unwrap_or_default().trim().to_owned();
+    let kept = [
+        "motion_margin",
+        "precharge",
+        "mass_learning",
+        "release_band",
+        "rest_release",
+    ];
+    let is_kept = |line: &&str| kept.contains(&key(line).as_str());
+    let new = parameters[section(&parameters, "node.joint")]
+        .lines()
+        .filter(|line| !is_kept(line));
+    let lines: Vec<&str> = new.chain(old.lines().filter(is_kept)).collect();
+    robot.replace_range(section(&robot, "node.joint"), &(lines.join("\n") + "\n\n"));
+    let path = folder.path().join("my-robot.toml");
+    fs::write(&path, robot).expect("written");
+    let out = folder.path().join("walk");
+    let arguments = [
+        "run",
+        "three-step",
+        "--strict",
+        "--out",
+        out.to_str().expect("UTF-8"),
+        "--robot",
+    ];
+    let ran = wheeleg(&arguments, &path);
+    let said = String::from_utf8_lossy(&ran.stdout).into_owned();
+    assert_eq!(ran.status.code(), Some(0), "{said}");
+    assert!(said.contains("11 of 11 required targets met"), "{said}");
+    let guide = include_str!("../../docs/guide/tune.md");
+    for key in kept {
+        assert!(
+            guide.contains(&format!("`{key}`")),
+            "the guide tells of {key}"
+        );
+    }
+}

@@ -233,8 +233,8 @@ fn a_wrong_parameter_of_a_board_is_told_once_whatever_is_written_after_it() {
     };
     let wrong = write(1, 3, "settle_band", "0.1");
     let others = [
-        write(2, 3, "settle_ticks", "200"),
-        write(3, 3, "settle_ticks", "300"),
+        write(2, 3, "settle_dwell", "50000"),
+        write(3, 3, "settle_dwell", "60000"),
     ];
     assert_eq!(refusals(&[wrong.clone(), others.concat()]), 1);
     let worse = write(4, 3, "settle_band", "0.05");

@@ -252,7 +252,7 @@ fn gait_parameters_that_contradict_each_other_are_refused_on_reading() {
     assert_told(
         &event(row, Some(("touchdown_speed", "\"10 mm/s\""))),
         &[
-            "my.toml:27: `events[0].touchdown_speed` = 10 mm/s (line 27), `events[0].lower` = 1 s (line 17) ",
+            "my.toml:27: `events[0].touchdown_speed` = 10 mm/s (line 27), `events[0].lower` = 1 s (line 17)",
             "`events[0].push` = 2 s (line 18) and `events[0].stroke` = ",
             "the last 15 mm of the lowering take 1.5 s, but from `lower` to `push` there are 1 s",
             "allowed: `touchdown_speed` 0, or `push` more than 1.5 s after `lower`",

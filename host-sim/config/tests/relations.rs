@@ -174,7 +174,7 @@ const EXAMPLES: &[Example] = &[
     example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5], &["sensor.adc.bits", "node.joint.settle_band"]),
-    example("stop of a joint", ROBOT, PRESSING, ("node.joint.stroke_max", "{}", "mm"), [178.0, 178.6], &["node.joint.stroke_max"]),
+    example("stop of a joint", ROBOT, PRESSING, ("node.joint.stroke_max", "{}", "mm"), [178.0, 178.6], &["node.joint.stroke_max", "gait.stroke"]),
     example("board's full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9], &[]),
     example("board's volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0], &[]),
     example("board's volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0], &[]),

@@ -105,11 +105,18 @@ impl Reader {
     /// A value in SI. In a scenario `57 mm` is `0.057 m` to the last bit, which a product with 0.001 is
     /// not. Of robots and axes the unit is part of what identifies them.
     fn si(&self, value: f64, factor: f64) -> f64 {
-        let parts = (1.0 / factor).round();
-        match !self.source_required && parts > 1.0 && 1.0 / parts == factor {
-            true => value / parts,
-            false => value * factor,
+        let shift = factor.log10().round() as i32;
+        let is_decimal = shift < 0 && format!("1e{shift}").parse() == Ok(factor);
+        if self.source_required || !is_decimal {
+            return value * factor;
         }
+        // Its digits stay, and the point moves.
+        let written = format!("{value:e}");
+        let moved = written.split_once('e').and_then(|(digits, exponent)| {
+            let exponent = exponent.parse::<i32>().ok()? + shift;
+            format!("{digits}e{exponent}").parse().ok()
+        });
+        moved.unwrap_or(value * factor)
     }
 
     /// A pure number needs no unit where no source is asked for.
