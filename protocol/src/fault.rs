@@ -204,7 +204,7 @@ fault_table!(
     LinkLost = 1, bit 0, "No SYNC arrived for the watchdog time.",
         "Check that the master runs and the bus cable is plugged, then clear the fault.";
     StaleMaster = 2, bit 1, "SYNC arrives but its cycle counter does not advance.",
-        "Clear the fault if the master was just started anew; if it was not, restart it: its control loop is stuck while its transmitter repeats.";
+        "Clear the fault if the master has just been restarted; otherwise restart it: its control loop is stuck while its transmitter repeats.";
     SlotOverrun = 3, bit 2, "The board cannot keep to its slot: its clock runs wrong, or its driver was cut off.",
         "Check the baud rate and the clock of this board, then clear the fault.";
     SensorRange = 32, bit 4, "The position sensor reads outside its range.",

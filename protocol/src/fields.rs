@@ -73,7 +73,7 @@ wire_enum! {
     /// 3 to 6 are faults of a board in operation, as is 2; the others are how
     /// boards start.
     ResetCause {
-        Unknown = 0, "The board does not tell.";
+        Unknown = 0, "The board does not report it.";
         PowerUp = 1, "The supply came up, or had fallen below the level at which the processor stops.";
         Watchdog = 2, "The program did not feed the hardware watchdog.";
         BrownOut = 3, "The supply sagged below its warning level and came back.";
@@ -105,7 +105,9 @@ impl ResetCause {
                 "Report this with the firmware version and the log; if it returns, replace the board."
             }
             Self::ClockLoss => "Replace the board: its crystal is damaged.",
-            Self::Software | Self::OptionBytes => "Nothing: somebody works on the board.",
+            Self::Software | Self::OptionBytes => {
+                "Nothing to do: somebody is working on the board."
+            }
             Self::Pin => "Check the reset pin of this board, if nobody pressed it.",
         }
     }

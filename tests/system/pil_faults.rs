@@ -165,7 +165,7 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
                 joint + 1,
                 row.t_s()
             );
-            // Held, or started anew and not armed again.
+            // Held, or restarted and not armed again.
             let held = row.v.mode == HOLD || joint == 1 && row.v.mode <= 1;
             assert!(held, "joint {} in mode {}", joint + 1, row.v.mode);
         }

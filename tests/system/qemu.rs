@@ -389,7 +389,7 @@ fn a_joint_that_lost_its_supply_comes_back_disarmed_and_the_robot_stays_held() {
             assert!(after.len() > 300);
             for row in after {
                 assert!(!sil::energised(&row.v) && row.v.valves_open == 0);
-                // Held, or started anew and not armed again.
+                // Held, or restarted and not armed again.
                 assert!(
                     row.v.mode == HOLD || joint == 1 && row.v.mode <= 1,
                     "{fault}: joint {} in mode {} at {:.3} s",

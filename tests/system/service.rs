@@ -75,10 +75,10 @@ fn commissioned_boards_run_and_swapped_ones_are_named_with_both_ids() {
     let (good, said) = run(&swapped);
     assert!(!good);
     for words in [
-        "at the address of joint 3 stands the board 030303030303030303030303",
+        "the board at the address of joint 3 is 030303030303030303030303",
         "which belongs to joint 4; commissioned is 040404040404040404040404",
         "will not arm",
-        "commission the robot anew",
+        "commission the robot again",
     ] {
         assert!(said.contains(words), "`{words}` in {said}");
     }
@@ -123,7 +123,7 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
     // Printed: what happened, why, and the remedy.
     for words in [
         "wheel 8 is lost",
-        "wheel 8 says why: it has started anew",
+        "wheel 8 says why: it has restarted",
         "this was a brown-out",
     ] {
         assert!(said.contains(words), "`{words}` in {said}");
@@ -210,7 +210,7 @@ fn the_console_names_who_babbles_and_what_to_do() {
     };
     let said = run("babble:joint5@0.3s..0.6s");
     for words in [
-        "joint 5: It sends rubbish in its own slot",
+        "joint 5: It sends garbage in its own slot",
         "Switch the robot off and replace this board",
         "joint 5 says why: first fault",
         "its driver was cut off",
@@ -229,13 +229,13 @@ fn the_console_names_who_babbles_and_what_to_do() {
     for words in [
         "source unknown",
         "Unplug the boards one by one",
-        "joint 5: It heard nothing of the rubbish that all others heard",
+        "joint 5: It did not hear the garbage that all others heard",
     ] {
         assert!(said.contains(words), "`{words}` in {said}");
     }
     for innocent in ["joint 4", "wheel 8"] {
         assert!(
-            !said.contains(&format!("{innocent}: It heard nothing")),
+            !said.contains(&format!("{innocent}: It did not hear")),
             "{said}"
         );
     }

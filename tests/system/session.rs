@@ -116,7 +116,7 @@ fn a_fault_that_cannot_be_injected_is_refused() {
     assert!(inject(&reset, true).is_err(), "it is down");
     session.step_to(1_800 * MS, &mut recorder).expect("it runs");
     let again = session.inject(&reset, true, &mut recorder);
-    assert!(again.is_ok(), "it has started anew long ago");
+    assert!(again.is_ok(), "it restarted long ago");
 }
 
 /// A robot at a console: nobody arms it, and the same inputs give the same recording.

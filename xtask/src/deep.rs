@@ -109,13 +109,13 @@ const CHECKS: [Check; 23] = [
     ),
     Check(
         "pil-speed",
-        "three steps on eight emulated boards, times real time, while nobody else is at work",
+        "three steps on eight emulated boards, times real time, on an otherwise idle machine",
         3,
         pil::speed,
     ),
     Check(
         "lines",
-        "the console's page whose line, server or view is gone, while nobody else is at work",
+        "the console's page whose line, server or view is gone, on an otherwise idle machine",
         5,
         browser::lines,
     ),
@@ -133,7 +133,7 @@ const CHECKS: [Check; 23] = [
     ),
     Check(
         "port",
-        "three steps, a killed server and boards that are gone, over a pseudo-terminal, while nobody else is at work",
+        "three steps, a killed server and boards that are gone, over a pseudo-terminal, on an otherwise idle machine",
         5,
         browser::port,
     ),

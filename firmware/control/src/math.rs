@@ -1,4 +1,5 @@
-//! Products, quotients and roots of fixed-point numbers, each with the bits that it keeps.
+//! Products, quotients and roots of fixed-point numbers, each with the bits that it keeps. Products and shifts round down;
+//! each function states its range.
 
 /// `a × b / 2^shift`, rounded down, with a shift of 1…31; what does not fit becomes one of
 /// the 2^(32 − shift) largest or smallest numbers. It is the upper word of the product

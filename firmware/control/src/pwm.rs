@@ -6,13 +6,18 @@
 //! ticks and one of 350 µs, always starting at the tick edge.
 //!
 //! **Switching delays.** A valve opens t_on after its coil is energised and shuts
-//! t_off after it is released, so it is open for `pulse − t_on + t_off`. For an
-//! opening `d` the coil is energised for `p = d + t_on − t_off`, except that
+//! t_off after it is released. For an opening `d` the coil is energised for `p`:
+//!
+//! ```text
+//! d = p − t_on + t_off          p = d + t_on − t_off
+//! ```
+//!
+//! except that
 //!
 //! * a pulse below `t_on + margin` may not open the valve at all: it is not sent;
 //! * a gap below `t_off + margin` may not shut it: the pulse becomes full.
 //!
-//! So the openings that can be had are 0, more than `t_off + margin`, up to
+//! So the openings that can be had are 0, at least `t_off + margin`, up to
 //! about `period − t_on − margin`, and the whole period. The law bridges the first gap with
 //! [`crate::joint::JointGains::dead_zone_duty`].
 //!
@@ -23,6 +28,10 @@
 //! that acts. A command of zero ends it at the next tick edge, however short. Once
 //! ended, it does not begin again within the period. A valve switches at most
 //! twice per period, and a valve with nothing to do not at all.
+//!
+//! Source: pulse-width modulation of on/off valves in ticks, DERIVED (docs/decisions/0003-valve-timing.md).
+//!
+//! Assumes: delays that stay within the margin of those specified, the same for every pulse.
 
 use crate::valve::{VALVE_COUNT, ValveOpenings};
 use core::hash::{Hash, Hasher};

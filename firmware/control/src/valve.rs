@@ -7,6 +7,12 @@
 //! at once (the topology and the count of Hodgson, Le, Tavakoli and Pham,
 //! Mechatronics 22, 2012; the enumeration is DERIVED). Two more serve as
 //! commands: exhaust, and the literal blow-through.
+//!
+//! ```text
+//! u > 0: fill A and vent B open for |u| · period      u < 0: fill B and vent A open for |u| · period
+//! ```
+//!
+//! Assumes: one period and one conductance for all four valves.
 
 use wheeleg_units::{Duty, Micros, shift_right_round_inner};
 

@@ -37,22 +37,22 @@ findings! {
         "Check its supply, its bus plug and its fuse; where several are lost at once, the bus line and its termination.";
     OtherInterface: "Its firmware was built from another interface definition than the master's.",
         "Flash master and board from the same version.";
-    WrongRole: "It answers as another kind of board than its address stands for.",
+    WrongRole: "It answers as a different kind of board than its address is for.",
         "Check the address straps, and that the right image is flashed.";
     ForeignBoard: "It is not the board that was commissioned at this address.",
-        "Put the right board in, or commission the robot anew.";
+        "Install the right board, or commission the robot again.";
     OtherParameters: "Its parameters in force are not those of the robot file.",
-        "Write the file's parameters to it and save them, or take its own over into the file.";
-    SlotBabble: "It sends rubbish in its own slot, where its driver-enable guard lets it through.",
+        "Write the file's parameters to it and save them, or copy its own into the file.";
+    SlotBabble: "It sends garbage in its own slot, where its driver-enable guard lets it through.",
         "Switch the robot off and replace this board: its processor or line driver is damaged.";
-    SlotsOverlap: "Its replies and those of the board in the slot before fall on one another: the clock of one of the two runs wrong.",
-        "One of the two will say that it cannot keep to its slot: check the clock of that one, before supplies and plugs.";
-    BusBabble: "The bus is full of rubbish, and no slot tells who babbles: source unknown, the board's driver-enable guard is broken too.",
+    SlotsOverlap: "Its replies collide with those of the board in the slot before: the clock of one of the two is wrong.",
+        "One of the two will report that it cannot keep to its slot: check the clock of that one first, then supplies and plugs.";
+    BusBabble: "The bus is full of garbage, and no slot shows which board babbles: source unknown, the board's driver-enable guard is broken too.",
         "Unplug the boards one by one until the line is quiet: the last one unplugged babbles.";
-    Babbler: "It heard nothing of the rubbish that all others heard: it babbled itself, and its driver-enable guard is broken.",
+    Babbler: "It did not hear the garbage that all others heard: it babbled itself, and its driver-enable guard is broken.",
         "Switch the robot off and replace this board.";
-    LeftArmed: "It was still armed while nobody was, and has been asked to disarm.",
-        "Find out why the master started again, or why its request did not arrive.";
+    LeftArmed: "It was still armed while no other board was, and has been asked to disarm.",
+        "Find out why the master restarted, or why its request did not arrive.";
     LineFull: "It fills the line with frames that nobody asked for.",
         "Unplug this board or tool, or flash it with the master's version.";
 }

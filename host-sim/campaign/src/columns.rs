@@ -1,6 +1,7 @@
 //! Columns of the table of a campaign: known before the first case, so that every part has the
 //! same.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use wheeleg_config::plan::{Distribution, Factor, Plan, Resolver, Sets, Value, Values};
 use wheeleg_studies::analysis::Analyser;
@@ -12,7 +13,7 @@ use crate::pages::{MOST_COLUMNS, NAMES_MOST};
 pub(crate) const FACT: &str = "wheeleg.columns";
 
 /// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Whole numbers.
@@ -26,7 +27,7 @@ pub enum Kind {
 }
 
 /// A column: its name, what it holds, and what that means.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Column {
     /// Name.
     pub name: String,

@@ -17,6 +17,7 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
@@ -31,10 +32,10 @@ use crate::{CampaignError, host, part, program};
 /// Name of the plan in the folder.
 pub(crate) const PLAN_FILE: &str = "plan.json";
 /// Version of the form of `plan.json`.
-const FORMAT: u32 = 1;
+pub(crate) const FORMAT: u32 = 1;
 
 /// `plan.json`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PlanFile {
     /// Version of this form.
     pub format: u32,

@@ -1,4 +1,4 @@
-//! Bars: what a run's way over the ground is held against, each a measure with its band.
+//! Bars: limits on how the robot travels over the ground, each a measure with its band.
 
 use super::keys;
 use super::params::FieldSpec;
@@ -45,21 +45,21 @@ macro_rules! measures {
 measures! {
     /// Mean forward speed from 3 s on.
     Speed = "speed", Velocity, "mm/s";
-    /// Way of the middle of the axle, forward positive.
+    /// Distance travelled by the middle of the axle, forward positive.
     Distance = "distance", Length, "m";
-    /// Height that the middle of the axle has gained.
+    /// Height gained by the middle of the axle.
     Climb = "climb", Length, "m";
-    /// Mean slip of the wheels from 3 s on: 1 - way of the chassis / way of the rims.
+    /// Mean slip of the wheels from 3 s on: 1 - travel of the chassis / travel of the rims.
     Slip = "slip", Number, "1";
     /// Share of the time from 3 s on with at least one foot loaded (more than 1 N).
     Supported = "supported", Number, "%";
-    /// Largest roll to either side, against the start.
+    /// Largest roll to either side, relative to the start.
     Roll = "roll", Angle, "deg";
-    /// Largest pitch to either side, against the start.
+    /// Largest pitch to either side, relative to the start.
     Pitch = "pitch", Angle, "deg";
-    /// Heading at the end, to the left positive, against the start; full turns count.
+    /// Heading at the end, positive to the left, relative to the start; full turns count.
     Heading = "heading", Angle, "deg";
-    /// Way over change of heading, from 3 s on.
+    /// Distance travelled divided by the change of heading, from 3 s on.
     Radius = "radius", Length, "m";
     /// Largest force of the ground on the chassis: nose, tail or belly.
     ChassisForce = "chassis-force", Force, "N";
@@ -67,21 +67,21 @@ measures! {
     Steps = "steps", Count, "1";
     /// Time at which the robot gives up and stands (event `stuck`).
     StuckAfter = "stuck-after", Time, "s";
-    /// Faults that boards have latched.
+    /// Faults latched by the boards.
     Faults = "faults", Count, "1";
     /// Mean time from one swing to the next, of both legs, from 3 s on.
     StepTime = "step-time", Time, "s";
-    /// Air (ANR) that is taken from the source from 3 s on, for each swing.
+    /// Air (ANR) drawn from the source from 3 s on, per swing.
     AirPerStep = "air-per-step", Volume, "dm3";
-    /// The same for each metre forward.
+    /// The same per metre forward.
     AirPerMetre = "air-per-metre", VolumePerLength, "dm3/m";
-    /// Index of the leg's design: mean over its workspace of the smallest over the largest singular value of its Jacobian; 1 is isotropic.
+    /// Design index of the leg: mean over its workspace of the ratio of the smallest to the largest singular value of its Jacobian; 1 is isotropic.
     Conditioning = "conditioning", Number, "1";
-    /// Index of the leg's design: mean over its workspace of the product of these singular values (Yoshikawa's manipulability).
+    /// Design index of the leg: mean over its workspace of the product of these singular values (Yoshikawa's manipulability).
     Manipulability = "manipulability", Number, "1";
-    /// Index of the leg's design: volume that its foot reaches within the strokes.
+    /// Design index of the leg: volume that its foot can reach within the strokes.
     Workspace = "workspace", Volume, "dm3";
-    /// Index of the leg's design: smallest half-axis of its force ellipsoid in the workspace, each cylinder with its force at the pressure of the supply.
+    /// Design index of the leg: smallest semi-axis of its force ellipsoid in the workspace, with each cylinder at its force at supply pressure.
     FootForce = "foot-force", Force, "N";
 }
 

@@ -179,20 +179,26 @@ fn quantity(r: &mut Reader, entry: &Entry, argument: &'static Argument) -> Optio
     values.first().copied()
 }
 
+/// The dimension of an argument's kind; numbers without one are counts.
+#[must_use]
+pub const fn argument_dimension(kind: ArgumentKind) -> Dimension {
+    match kind {
+        ArgumentKind::Length(_) => Dimension::Length,
+        ArgumentKind::Velocity(_) => Dimension::Velocity,
+        ArgumentKind::Acceleration(_) => Dimension::Acceleration,
+        ArgumentKind::Rate(_) => Dimension::AngularVelocity,
+        ArgumentKind::Time(_) => Dimension::Time,
+        ArgumentKind::Flag => Dimension::Flag,
+        _ => Dimension::Count,
+    }
+}
+
 /// An argument that is a quantity, as a field of a file.
 pub(super) const fn spec(argument: &Argument) -> FieldSpec {
     let [min, max] = bounds(argument);
     FieldSpec {
         key: argument.name,
-        dimension: match argument.kind {
-            ArgumentKind::Length(_) => Dimension::Length,
-            ArgumentKind::Velocity(_) => Dimension::Velocity,
-            ArgumentKind::Acceleration(_) => Dimension::Acceleration,
-            ArgumentKind::Rate(_) => Dimension::AngularVelocity,
-            ArgumentKind::Time(_) => Dimension::Time,
-            ArgumentKind::Flag => Dimension::Flag,
-            _ => Dimension::Count,
-        },
+        dimension: argument_dimension(argument.kind),
         min,
         max,
         components: 1,

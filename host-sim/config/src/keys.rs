@@ -1,4 +1,4 @@
-//! Keys of scenario files: what the reader takes, and what the reference says of it. One table.
+//! Keys of scenario files: what the reader accepts, and what the reference says about it. One table.
 
 /// A key.
 #[derive(Debug, Clone, Copy)]
@@ -37,14 +37,18 @@ pub const TOP: [Key; 12] = [
     key(
         "robot",
         "text",
-        "a built-in robot, or the path of a robot file, counted from the scenario's folder",
+        "a built-in robot, or the path of a robot file, relative to the scenario's folder",
     ),
     key(
         "duration",
         "time",
-        "simulated after the start pose is reached",
+        "simulated time, once the start pose is reached",
     ),
-    key("seed", "whole number", "of all noise; `--seed` replaces it"),
+    key(
+        "seed",
+        "whole number",
+        "seed of all noise; `--seed` overrides it",
+    ),
     key(
         "targets",
         "one of the sets below",
@@ -54,23 +58,27 @@ pub const TOP: [Key; 12] = [
     key(
         "behaviours",
         "section",
-        "which behaviours of a walk are off; all are on where left out",
+        "which behaviours of a walk are off; by default all are on",
     ),
-    key("events", "sections", "what happens to it; may be left out"),
+    key(
+        "events",
+        "sections",
+        "what happens during the run; optional",
+    ),
     key(
         "terrain",
         "sections",
-        "what it stands on; a level floor where left out",
+        "what it stands on; by default a level floor",
     ),
     key(
         "faults",
         "list of texts",
-        "faults to inject, as `--fault` takes them; may be left out",
+        "faults to inject, in the form of `--fault`; optional",
     ),
     key(
         "bars",
         "sections",
-        "what its way over the ground must keep to; may be left out",
+        "limits on how the robot travels; optional",
     ),
 ];
 
@@ -88,23 +96,23 @@ pub const SINUSOID: [Key; 5] = [
     key(
         "length",
         "length",
-        "way of the foot over the whole arch: `forward` of the command `FootTrajectory`",
+        "travel of the foot over the whole arch: `forward` of the command `FootTrajectory`",
     ),
-    key("height", "length", "of the arch, as of that command"),
+    key("height", "length", "height of the arch, as in that command"),
     key(
         "rate",
         "angular rate",
-        "of the sine's argument, as of that command",
+        "rate of the sine's argument, as in that command",
     ),
 ];
 /// With `kind = "walk"`.
 pub const WALK: [Key; 6] = [
     KIND,
-    key("speed", "velocity", "as of the command `Walk`"),
-    key("turn", "angular rate", "as of that command"),
-    key("pattern", "text", "as of that command"),
-    key("lift", "length", "as of that command"),
-    key("nose", "length", "as of that command"),
+    key("speed", "velocity", "as in the command `Walk`"),
+    key("turn", "angular rate", "as in that command"),
+    key("pattern", "text", "as in that command"),
+    key("lift", "length", "as in that command"),
+    key("nose", "length", "as in that command"),
 ];
 
 /// Kinds of motion.
@@ -120,7 +128,7 @@ pub const EVENT: [Key; 3] = [
     key(
         "at",
         "time",
-        "from the begin of the motion, within `duration`",
+        "time from the start of the motion, within `duration`",
     ),
     key(
         "action",
@@ -130,7 +138,7 @@ pub const EVENT: [Key; 3] = [
     key(
         "command",
         "text",
-        "with `action = \"command\"`: a command of the master, its arguments beside it",
+        "with `action = \"command\"`: a command of the master; each argument is a key of its own",
     ),
 ];
 
@@ -142,6 +150,6 @@ pub const BAR: [Key; 4] = [
     key(
         "info",
         "true or false",
-        "true: it informs only, and may be without an end; false where left out",
+        "true: reported but not judged, and needs no limit; default false",
     ),
 ];

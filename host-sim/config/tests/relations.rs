@@ -552,7 +552,7 @@ fn no_advice_is_looked_for_where_very_much_is_wrong() {
     assert_eq!(advised(19).0, 2);
     let (count, help) = advised(20);
     assert_eq!(count, 0, "{help}");
-    assert!(help.contains("mend what else is wrong first"), "{help}");
+    assert!(help.contains("correct the other errors first"), "{help}");
 }
 
 /// What the plant refuses for itself is told by its field, in the unit of the file.

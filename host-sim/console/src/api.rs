@@ -22,13 +22,13 @@ use wheeleg_telemetry::channel_index;
 
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Peer, Place};
-use crate::hex;
 use crate::hub::LONGEST_S;
 use crate::page::Page;
 use crate::record::folder;
-use crate::request::FRAME_MAX;
 use crate::session::{self, Context};
 use crate::table::{prefers_csv, table};
+use wheeleg_access::hex;
+use wheeleg_access::request::FRAME_MAX;
 
 /// Subprotocol of the socket.
 pub const SUBPROTOCOL: &str = "wheeleg.console.v1";

@@ -16,8 +16,9 @@ use self::url::Stream;
 pub use self::url::Url;
 use crate::api::SUBPROTOCOL;
 use crate::error::ConsoleError;
-use crate::hex;
-use crate::mac::{Key, Transcript};
+use wheeleg_access::Key;
+use wheeleg_access::hex;
+use wheeleg_access::mac::Transcript;
 
 /// Largest answer over HTTP, bytes.
 const LARGEST_ANSWER: usize = 1 << 20;

@@ -21,14 +21,14 @@ use wheeleg_telemetry::channels;
 use self::history::{History, Reader};
 use crate::catalogue::Catalogue;
 use crate::close::Close;
-use crate::desk::{ClientId, Desk};
 use crate::foxglove::Viewers;
 use crate::live::{Answer, Input, Moving, Report, Robot, Signals, Status};
 use crate::messages::{done, refused};
 use crate::outbox::Outbox;
-use crate::reason::Reason;
 use crate::record;
-use crate::request::{BadRequest, Body};
+use wheeleg_access::desk::{ClientId, Desk};
+use wheeleg_access::reason::Reason;
+use wheeleg_access::request::{BadRequest, Body};
 
 /// How often the rings are emptied.
 pub(crate) const PERIOD: Duration = Duration::from_millis(5);

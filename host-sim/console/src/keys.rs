@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use wheeleg_config::open_file;
 
 use crate::error::ConsoleError;
-use crate::hex;
-use crate::mac::Key;
+use wheeleg_access::Key;
+use wheeleg_access::hex;
 
 /// File of the control key.
 pub const CONTROL_FILE: &str = "control.key";

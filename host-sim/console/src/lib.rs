@@ -9,26 +9,19 @@
 //! * **control**: the right to give commands; a lease of the master, held by one client
 //! * **beat**: what keeps the control: the holder has seen the robot as it was at a master time
 //! * **outbox**: what waits for one client
-//! * **desk**: who of the clients is in control
-//! * **door**: lets in the frames of one session
 //! * **viewer**: a client by the protocol of Foxglove and Lichtblick: looks, and may stop
 //! * **recording**: a folder with the log of a live robot and all that it was given, in which it can be repeated
 
 mod api;
-mod arguments;
 mod catalogue;
 pub mod client;
 mod close;
-pub mod desk;
-pub mod door;
 mod error;
 pub mod foxglove;
 mod guard;
-mod hex;
 mod hub;
 pub mod keys;
 mod live;
-mod mac;
 mod mailbox;
 mod messages;
 mod notices;
@@ -36,11 +29,8 @@ mod outbox;
 mod page;
 mod parameters;
 mod progress;
-mod rate;
-pub mod reason;
 mod record;
 pub mod replay;
-pub mod request;
 mod server;
 mod session;
 mod table;
@@ -48,10 +38,9 @@ mod tls;
 pub mod unpack;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list};
+pub use catalogue::command_list;
 pub use error::ConsoleError;
 pub use live::{Live, Port};
-pub use mac::Key;
 pub use record::{FOLDER, Summary};
-pub use server::{ADDRESS, Options, Protection, Server};
+pub use server::{ADDRESS, Options, Prepared, Protection, Server};
 pub use tls::{Files, Fingerprint};

@@ -7,7 +7,7 @@ use wheeleg_telemetry::event::reject_name;
 use wheeleg_telemetry::messages::reject;
 
 use crate::live::Answer;
-use crate::reason::Reason;
+use wheeleg_access::reason::Reason;
 
 /// An event, with its number since power-up.
 pub(crate) fn event_json(number: u64, t_ns: u64, event: &EventSample) -> Value {

@@ -9,7 +9,7 @@ use wheeleg_config::{NodeParams, allowed_values, in_unit};
 use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
-use crate::arguments;
+use wheeleg_access::arguments;
 
 /// Name under which viewers look for the robot.
 pub(crate) const DESCRIPTION: &str = "/robot_description";

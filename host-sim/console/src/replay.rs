@@ -20,7 +20,7 @@ use crate::live::Live;
 use crate::record::Summary;
 use crate::record::folder::{INPUTS, ROBOT, SCENARIO, SUMMARY, opened, summary};
 use crate::record::inputs::{Input, LINE_MAX, Line};
-use crate::request::Order;
+use wheeleg_access::request::Order;
 
 /// Longest session that is repeated, ms: a month.
 const LONGEST_MS: u64 = 31 * 24 * 3_600_000;

@@ -112,157 +112,214 @@ impl std::fmt::Debug for Server {
     }
 }
 
-impl Server {
-    /// Powers the robot up and lets clients in.
-    ///
-    /// # Errors
-    /// As [`Self::start_with`].
-    pub fn start(options: Options) -> Result<Self, ConsoleError> {
-        Self::start_with(options, || ())
-    }
+/// A server that has read all that it was given, and listens. It has written nothing yet, lets nobody
+/// in, and its robot has no power.
+pub struct Prepared {
+    options: Options,
+    certificate: Option<Certificate>,
+    page: Page,
+    runtime: Runtime,
+    listener: TcpListener,
+    address: SocketAddr,
+    robot_json: String,
+    about: About,
+    address_of: AddressOf,
+}
 
-    /// The same; `begins` is called before the first file is written, and after the last one that is
-    /// given was read.
+impl std::fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Prepared")
+            .field("options", &self.options)
+            .field("address", &self.address)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Prepared {
+    /// Checks the options, reads the files that they name, and listens.
     ///
     /// # Errors
     /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
-    /// not there, the robot cannot be built, or the recording's folder cannot be made.
-    pub fn start_with(options: Options, begins: impl FnOnce()) -> Result<Self, ConsoleError> {
-        Self::start_among(options, |peer| peer.ip(), begins)
+    /// not there, or the robot cannot be drawn.
+    pub fn new(options: Options) -> Result<Self, ConsoleError> {
+        ensure_names(&options)?;
+        let certificate = certificate(&options)?;
+        let page = Page::new(options.page.as_deref())?;
+        let runtime = runtime()?;
+        let (listener, address) = {
+            let _inside = runtime.enter();
+            bind(options.listen)?
+        };
+        let robot_json = robot_json(&options.live);
+        let about = about(&options.live)?;
+        Ok(Self {
+            options,
+            certificate,
+            page,
+            runtime,
+            listener,
+            address,
+            robot_json,
+            about,
+            address_of: |peer| peer.ip(),
+        })
     }
 
-    /// The same, where `address_of` says which address a client has.
-    fn start_among(
-        options: Options,
-        address_of: AddressOf,
-        begins: impl FnOnce(),
-    ) -> Result<Self, ConsoleError> {
+    /// Powers the robot up and lets clients in.
+    ///
+    /// # Errors
+    /// [`ConsoleError`] if the robot cannot be built, or the recording's folder cannot be made.
+    pub fn start(self) -> Result<Server, ConsoleError> {
         let Options {
             live,
             recordings,
             record,
             listen,
             names,
-            protection,
             keys,
-            page,
             viewer_pages,
             viewers_write,
-        } = options;
-        if let Some(page) = viewer_pages.iter().find(|page| !is_origin(page)) {
-            return Err(ConsoleError::other(
-                format!("{page:?} is not the origin of a page"),
-                "give scheme, name and port alone, such as https://app.example.org",
-            ));
-        }
-        let outside = !listen.ip().is_loopback();
-        if listen.ip().is_unspecified() && names.is_empty() {
-            return Err(ConsoleError::Listen {
-                address: listen.to_string(),
-                what: "the server listens at every address, and has no name under which it answers"
-                    .to_owned(),
-                help: "give the names that clients use with --name NAME, or listen at one address"
-                    .to_owned(),
-            });
-        }
-        if let Some(name) = names.iter().find(|name| !is_host(name)) {
-            return Err(ConsoleError::other(
-                format!("{name:?} is not a host name"),
-                "give names or addresses without scheme and port, such as robot.example",
-            ));
-        }
-        let certificate = match protection {
-            Protection::Tls(files) => Some(Certificate::read(&files)?),
-            Protection::AsNeeded if outside => {
-                let own = (!listen.ip().is_unspecified()).then(|| listen.ip().to_string());
-                let all = own.into_iter().chain(names.iter().cloned());
-                let all: BTreeSet<String> = all.chain(["localhost".to_owned()]).collect();
-                Some(Certificate::make(all.into_iter().collect())?)
-            }
-            Protection::AsNeeded | Protection::Plain => None,
-        };
-        let look_only = outside && certificate.is_none();
-        let page = Page::new(page.as_deref())?;
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(WORKERS)
-            .thread_name("console")
-            .enable_all()
-            .build()
-            .map_err(|e| {
-                let what = format!("the server's threads cannot be started: {e}");
-                ConsoleError::other(what, "end other programs, then try again")
-            })?;
-        let (listener, address) = {
-            let _inside = runtime.enter();
-            bind(listen)?
-        };
+            ..
+        } = self.options;
         let name = live.robot.name.clone();
-        let drawing = Drawing::of(&live.robot);
-        // The level floor needs no grid, and what real boards stand on nobody knows.
-        let ground = &live.scenario.ground;
-        let uneven = live.port.is_none() && !ground.parts.is_empty();
-        let relief = uneven.then(|| Relief::of(&ground.terrain));
-        let robot_json = json!({
-            "name": name,
-            "drawing": drawing,
-            "relief": relief,
-            "simulated": live.port.is_none(),
-            "unmeasured": unmeasured(live.port.is_some()),
-        })
-        .to_string();
-        let about = About::new(
-            &live.robot,
-            &live.robot_toml,
-            &live.scenario,
-            &live.scenario_toml,
-        )?;
-        let about = About {
-            // Nobody can give real boards the same once more.
-            repeatable: live.port.is_none(),
-            ..about
-        };
+        let look_only = !listen.ip().is_loopback() && self.certificate.is_none();
+
         let (contact_sink, contacts) = foxglove::contacts();
-        let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
-        begins();
-        let (feed, recordings) = record::start(&recordings, about, record)?;
-        let shared = Arc::clone(&recordings.shared);
-        let recorded = Arc::clone(&shared);
+        let viewers = Viewers::new(self.about.scene.clone(), &live.robot.node, contacts);
+        let (feed, recordings) = record::start(&recordings, self.about, record)?;
+        let recorded = Arc::clone(&recordings.shared);
         let robot = live::start(live, feed, contact_sink)?;
         let goes_first = robot.goes_first;
-        let (hub, robot) = Hub::new(robot, name, shared, viewers);
+        let (hub, robot) = Hub::new(robot, name, recordings.shared, viewers);
         let notices = Arc::new(Notices::default());
         let server = Arc::new(api::Server {
             context: Arc::new(Context {
                 hub: Arc::clone(&hub),
-                robot_json,
+                robot_json: self.robot_json,
                 keys,
                 wrong_keys: WrongKeys::default(),
                 notices: Arc::clone(&notices),
                 recordings: recordings.root,
                 look_only,
             }),
-            hosts: Hosts::new(address, &names, certificate.is_some()),
+            hosts: Hosts::new(self.address, &names, self.certificate.is_some()),
             viewer_pages,
             viewers_write,
-            page,
+            page: self.page,
         });
-        runtime.spawn(turn(Arc::clone(&hub)));
-        let fingerprint = certificate.as_ref().map(|c| c.fingerprint);
-        let tls = certificate.map(|c| TlsAcceptor::from(c.config));
-        runtime.spawn(accept(listener, server, tls, address_of));
-        Ok(Self {
-            address,
+        let fingerprint = self.certificate.as_ref().map(|c| c.fingerprint);
+        let tls = self.certificate.map(|c| TlsAcceptor::from(c.config));
+        self.runtime.spawn(turn(Arc::clone(&hub)));
+        self.runtime
+            .spawn(accept(self.listener, server, tls, self.address_of));
+        Ok(Server {
+            address: self.address,
             name: names.into_iter().next(),
             fingerprint,
             look_only,
             goes_first,
             notices,
             hub,
-            runtime: Some(runtime),
+            runtime: Some(self.runtime),
             robot: Some(robot),
             recorder: Some(recordings.thread),
             recorded,
         })
+    }
+}
+
+/// Refuses names that are not of the form that a name must have, and an address without one.
+fn ensure_names(options: &Options) -> Result<(), ConsoleError> {
+    if let Some(page) = options.viewer_pages.iter().find(|page| !is_origin(page)) {
+        return Err(ConsoleError::other(
+            format!("{page:?} is not the origin of a page"),
+            "give scheme, name and port alone, such as https://app.example.org",
+        ));
+    }
+    if options.listen.ip().is_unspecified() && options.names.is_empty() {
+        return Err(ConsoleError::Listen {
+            address: options.listen.to_string(),
+            what: "the server listens at every address, and has no name under which it answers"
+                .to_owned(),
+            help: "give the names that clients use with --name NAME, or listen at one address"
+                .to_owned(),
+        });
+    }
+    match options.names.iter().find(|name| !is_host(name)) {
+        None => Ok(()),
+        Some(name) => Err(ConsoleError::other(
+            format!("{name:?} is not a host name"),
+            "give names or addresses without scheme and port, such as robot.example",
+        )),
+    }
+}
+
+/// The certificate that the options name, or a new one where others are on the way.
+fn certificate(options: &Options) -> Result<Option<Certificate>, ConsoleError> {
+    let ip = options.listen.ip();
+    match &options.protection {
+        Protection::Tls(files) => Certificate::read(files).map(Some),
+        Protection::AsNeeded if !ip.is_loopback() => {
+            let own = (!ip.is_unspecified()).then(|| ip.to_string());
+            let all = own.into_iter().chain(options.names.iter().cloned());
+            let all: BTreeSet<String> = all.chain(["localhost".to_owned()]).collect();
+            Certificate::make(all.into_iter().collect()).map(Some)
+        }
+        Protection::AsNeeded | Protection::Plain => Ok(None),
+    }
+}
+
+/// Threads of the server.
+fn runtime() -> Result<Runtime, ConsoleError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(WORKERS)
+        .thread_name("console")
+        .enable_all()
+        .build()
+        .map_err(|e| {
+            let what = format!("the server's threads cannot be started: {e}");
+            ConsoleError::other(what, "end other programs, then try again")
+        })
+}
+
+/// What the page draws of the robot.
+fn robot_json(live: &Live) -> String {
+    let is_real = live.port.is_some();
+    // The level floor needs no grid, and what real boards stand on nobody knows.
+    let ground = &live.scenario.ground;
+    let uneven = !is_real && !ground.parts.is_empty();
+    json!({
+        "name": live.robot.name,
+        "drawing": Drawing::of(&live.robot),
+        "relief": uneven.then(|| Relief::of(&ground.terrain)),
+        "simulated": !is_real,
+        "unmeasured": unmeasured(is_real),
+    })
+    .to_string()
+}
+
+/// What a recording is of.
+fn about(live: &Live) -> Result<About, ConsoleError> {
+    let about = About::new(
+        &live.robot,
+        &live.robot_toml,
+        &live.scenario,
+        &live.scenario_toml,
+    )?;
+    Ok(About {
+        // Nobody can give real boards the same once more.
+        repeatable: live.port.is_none(),
+        ..about
+    })
+}
+
+impl Server {
+    /// [`Prepared::new`] and [`Prepared::start`] in one.
+    ///
+    /// # Errors
+    /// Those of the two.
+    pub fn start(options: Options) -> Result<Self, ConsoleError> {
+        Prepared::new(options)?.start()
     }
 
     /// Whether the system has granted the robot's thread to run before ordinary ones.
@@ -499,7 +556,12 @@ mod tests {
             viewer_pages: Vec::new(),
             viewers_write: false,
         };
-        let server = Server::start_among(options, address_of, || ()).expect("it starts");
+        let prepared = Prepared::new(options).expect("it listens");
+        let prepared = Prepared {
+            address_of,
+            ..prepared
+        };
+        let server = prepared.start().expect("it starts");
         let url = Url::parse(&server.address().to_string()).expect("an address");
         let connect = |name| Client::connect(&url, "control", name, &keys.control).expect("let in");
         let (mut driver, mut other) = (connect("driver"), connect("other"));

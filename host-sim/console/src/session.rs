@@ -12,15 +12,16 @@ use serde_json::json;
 use tokio::time::timeout;
 
 use crate::close::Close;
-use crate::door::{Door, Entered};
 use crate::guard::{Peer, WrongKeys};
-use crate::hex;
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;
-use crate::mac::{Key, Transcript};
 use crate::notices::Notices;
 use crate::outbox::Outbox;
 use crate::progress::PROGRESS;
+use wheeleg_access::Key;
+use wheeleg_access::door::{Door, Entered};
+use wheeleg_access::hex;
+use wheeleg_access::mac::Transcript;
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);

@@ -14,8 +14,8 @@ use rustls::{ClientConfig, DigitallySignedStruct, ServerConfig, SignatureScheme}
 use sha2::{Digest as _, Sha256};
 
 use crate::error::ConsoleError;
-use crate::hex;
 use crate::keys;
+use wheeleg_access::hex;
 
 /// Largest file of a certificate or key, bytes.
 const PEM_MAX: u64 = 1 << 20;

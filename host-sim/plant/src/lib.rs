@@ -2,9 +2,9 @@
 //!
 //! SI units throughout, in `f64`, with the unit in each name. The model (built once
 //! from parameters) is separate from the state, which can be cloned,
-//! serialised and hashed. Nothing here knows of fixed point, ticks of a
-//! controller or frames of a bus: the crossing to machine units happens in the
-//! simulator's board models.
+//! serialised and hashed. Sensors give what the real parts give,
+//! codes of a converter and edges of an encoder. Nothing else here knows machine units: fixed point,
+//! ticks of a controller and frames of a bus belong to the simulator's board models.
 //!
 //! Determinism: no wall clock, no threads, no iteration over unordered maps, one random
 //! stream per signal, and `exp`, `sin` and their kin from the crate `libm`, because the C library's

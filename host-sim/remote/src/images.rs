@@ -101,7 +101,7 @@ impl Image {
     pub(super) fn warn(&self) {
         if !self.same_sources {
             eprintln!(
-                "warning: {}; build it anew with: {}",
+                "warning: {}; rebuild it with: {}",
                 self.of_other_sources(),
                 self.kind.build_command()
             );

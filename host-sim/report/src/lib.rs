@@ -1,5 +1,5 @@
 //! What every result page is made of: charts ([`plot`]), the page's frame, tables beside the
-//! pictures, the folder that they go to ([`output`]), and statistics ([`stats`]).
+//! pictures, the folder that they go to ([`output`]) and its names ([`results`]), and statistics ([`stats`]).
 //!
 //! # Glossary
 //!
@@ -12,6 +12,7 @@ pub mod number;
 pub mod output;
 mod page;
 pub mod plot;
+pub mod results;
 mod script;
 pub mod stats;
 mod table;

@@ -15,34 +15,16 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::ReportError;
+use crate::{ReportError, results};
 
-/// Everything that a run writes, and what other commands make of its log beside it.
-const RESULTS: [&str; 13] = [
-    "log.mcap",
-    "summary.json",
-    "report.html",
-    "node-parameters.toml",
-    "csv",
-    "figures",
-    NATIVE,
-    "log.html",
-    "log-recovered.mcap",
-    "log-recovered.html",
-    "compared.html",
-    "parquet",
-    "ros2",
-];
 /// The file that a run holds while it writes into a folder.
 const LOCK: &str = ".lock";
-/// Folder below of the native run that a run was compared with (`--compare-sil`).
-pub const NATIVE: &str = "sil";
 /// Where the results of the run before stay.
 const PREVIOUS: &str = "previous";
 
 /// All results of a kind of run that writes `also`, too.
 fn results(also: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
-    RESULTS.into_iter().chain(also.iter().copied())
+    results::ALL.into_iter().chain(also.iter().copied())
 }
 
 /// The result that has the place of a file in a folder, or of the folder that the file is in: a run
@@ -313,6 +295,7 @@ fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<Path
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::NATIVE;
     use std::fs;
 
     #[test]

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use miette::Diagnostic;
 use thiserror::Error;
 use wheeleg_config::ConfigError;
-use wheeleg_console::ConsoleError;
 use wheeleg_remote_host::RemoteError;
 use wheeleg_report::ReportError;
 use wheeleg_scene::SceneError;
@@ -46,11 +45,6 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Remote(#[from] RemoteError),
-
-    /// A console cannot be started, or does not answer.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Console(#[from] ConsoleError),
 
     /// The simulation could not be built or continued.
     #[error(transparent)]

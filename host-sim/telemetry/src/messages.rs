@@ -72,7 +72,7 @@ impl fmt::Display for Cause {
             }
             Self::LineErrors(link) => write!(f, "master: {}", line_errors(link)),
             Self::LineBroken(why) => write!(f, "line: broken: {why}"),
-            Self::LineMended => f.write_str("line: there again; the axes are disarmed"),
+            Self::LineMended => f.write_str("line: restored; the axes are disarmed"),
             Self::Failed(why) => f.write_str(why),
         }
     }
@@ -119,7 +119,7 @@ fn service(board: Address, parameter: &str, outcome: &ServiceOutcome) -> String 
         ServiceOutcome::Changed { raw } => {
             format!("{board}: parameter {parameter} CHANGED, raw {raw}")
         }
-        ServiceOutcome::NotGiven => format!("{board} does not tell its parameter {parameter}"),
+        ServiceOutcome::NotGiven => format!("{board} does not report its parameter {parameter}"),
     }
 }
 
@@ -176,11 +176,11 @@ fn master(event: &MasterEvent) -> String {
             belongs,
         } => {
             let belongs = belongs.map_or_else(
-                || "was commissioned nowhere".to_owned(),
+                || "is not in the list".to_owned(),
                 |home| format!("belongs to {}", board(home)),
             );
             format!(
-                "at the address of {} stands the board {}, which {belongs}; commissioned is {}: will not arm. {}",
+                "the board at the address of {} is {}, which {belongs}; commissioned is {}: will not arm. {}",
                 board(node),
                 hex(found),
                 hex(commissioned),
@@ -384,7 +384,7 @@ fn diagnosis(node: u8, record: &FaultRecord, ago_us: u32) -> String {
     if record.disarm_reason == DisarmReason::Reset || record.reset_cause.is_fault() {
         let cause = record.reset_cause;
         parts.push(format!(
-            "it has started anew: {} {}",
+            "it has restarted: {} {}",
             cause.text(),
             cause.remedy()
         ));
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_says_its_first_fault_and_why_it_started_anew() {
+    fn a_board_says_its_first_fault_and_why_it_restarted() {
         let says = |first_fault, reset_cause| {
             let record = FaultRecord {
                 active: FaultBits::NONE,
@@ -467,7 +467,7 @@ mod tests {
         ] {
             let text = says(FaultCode::NONE, cause);
             let told = [cause.text(), cause.remedy()];
-            assert!(text.starts_with("master: wheel 8 says why: it has started anew"));
+            assert!(text.starts_with("master: wheel 8 says why: it has restarted"));
             assert!(told.iter().all(|part| text.contains(part)), "{text}");
         }
     }

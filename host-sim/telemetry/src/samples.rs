@@ -281,7 +281,7 @@ samples! {
         pitch_rate_deg_s: f64, "deg/s", 4, Plant;
         /// Yaw rate.
         yaw_rate_deg_s: f64, "deg/s", 4, Plant;
-        /// Ground force normal to what the chassis lies on; 0 unless it lies.
+        /// Ground force normal to the surface under nose, tail or belly; 0 while the chassis is clear of the ground.
         chassis_force_n: f64, "N", 3, Plant;
     }
 
@@ -303,7 +303,7 @@ samples! {
         cycle: u32, "1", 0, Bus;
         /// Bytes on the wire in this cycle, both directions.
         bytes: u32, "byte", 0, Bus;
-        /// Part of the cycle in which the wire was busy.
+        /// Share of the cycle in which the wire was busy.
         load: f64, "1", 5, Bus;
         /// Nodes that answered in their slot.
         replies: u8, "1", 0, Bus;
@@ -349,13 +349,13 @@ samples! {
         right: u8, "code", 0, Master;
         /// Behaviours that may act: bit 0 overload to bit 10 stroke governor.
         enabled: u16, "bits", 0, Master;
-        /// Share of the walk's speed at which the wheels go.
+        /// Share of the walk's speed at which the wheels turn.
         pace: f64, "1", 4, Master;
-        /// Acts since the start of the robot: axes overloaded.
+        /// How often each behaviour has acted since the start of the robot: axes overloaded.
         overload: u32, "1", 0, Master;
-        /// Tip guard.
+        /// Tip guard: wheels stopped.
         tip_guard: u32, "1", 0, Master;
-        /// Touchdowns that the switches ended.
+        /// Touchdowns ended by the switches.
         touchdown: u32, "1", 0, Master;
         /// Legs at full length without ground.
         search: u32, "1", 0, Master;
@@ -363,7 +363,7 @@ samples! {
         bump: u32, "1", 0, Master;
         /// Standing feet that lost the ground.
         lost_contact: u32, "1", 0, Master;
-        /// Slip of the wheels.
+        /// Wheels that slipped.
         slip: u32, "1", 0, Master;
         /// Feet hooked.
         hook: u32, "1", 0, Master;
@@ -381,7 +381,7 @@ samples! {
         plant: String, "hex", 0, Host;
     }
 
-    /// What a board has heard on the bus since it started, as it tells when the master asks. Counters stop at their largest value.
+    /// What a board has heard on the bus since it started, as it reports when the master asks. Counters stop at their largest value.
     LinkSample = "wheeleg.Link" {
         /// Sound frames.
         frames: u32, "1", 0, Node;
@@ -407,7 +407,7 @@ samples! {
         parameters: u32, "1", 0, Node;
     }
 
-    /// Something that happened. Filter by the fields; the text is for the eye.
+    /// Something that happened. Filter by the fields; the text is for people.
     EventSample = "wheeleg.Event" {
         /// Kind: info, scenario, command, mode, fault, contact, log.
         kind: EventKind, "text", 0, Host;
@@ -415,9 +415,9 @@ samples! {
         code: EventCode, "text", 0, Host;
         /// Mode entered, reason, finding, record of a board's log, side of a foot, parameter or fault injected; empty where there is none.
         detail: String, "text", 0, Host;
-        /// Bus address of the board that it is about, 1 to 8; 0: none.
+        /// Bus address of the board concerned, 1 to 8; 0: none.
         board: u8, "code", 0, Host;
-        /// Number of the fault or warning that it is about, as in the protocol's tables; 0: none.
+        /// Number of the fault or warning, as in the protocol's tables; 0: none.
         fault: u8, "code", 0, Host;
         /// Code of the user's command that it answers, as in the master's table of commands; 0: none.
         command: u16, "code", 0, Host;
@@ -435,9 +435,9 @@ samples! {
         late_p99_ms: f64, "ms", 3, Host;
         /// The same, largest.
         late_max_ms: f64, "ms", 3, Host;
-        /// Simulated over wall time.
+        /// Ratio of simulated to wall time.
         factor: f64, "1", 3, Host;
-        /// How often the base of the clock was shifted since the start, because a cycle began too late to be caught up with.
+        /// How often the base of the clock was shifted since the start, because a cycle began too late to catch up.
         shifts: u32, "1", 0, Host;
         /// Clients and viewers that are connected.
         clients: u32, "1", 0, Host;
@@ -463,7 +463,7 @@ samples! {
         text: String, "text", 0, Host;
     }
 
-    /// What a log is of.
+    /// What a log is a recording of.
     ProvenanceSample = "wheeleg.Run" {
         /// Kind: program, scenario, robot, seed, fault, parameter.
         kind: String, "text", 0, Host;

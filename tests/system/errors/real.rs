@@ -118,8 +118,6 @@ fn logs(folder: &Path, all: &mut Vec<Driven>) {
 fn clients(folder: &Path, all: &mut Vec<Driven>) {
     let no_key = || keys::read(&folder.join("none.key")).expect_err("no key");
     all.push(("ConsoleError::Key", Box::new(no_key()), vec!["none.key"]));
-    let study = StudyError::from(no_key());
-    all.push(("StudyError::Console", Box::new(study), vec!["none.key"]));
     let kept = folder.join("keys");
     let _keys = Keys::open(&kept).expect("made");
     let key = keys::read(&kept.join(VIEW_FILE)).expect("a key");

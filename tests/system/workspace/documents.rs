@@ -100,6 +100,25 @@ fn continuous_integration_runs_the_command_of_the_readme() {
     }));
 }
 
+/// The book's summary and the first page list the same guide, in the same order and with the same titles.
+#[test]
+fn the_guide_has_one_order() {
+    let guide = |name: &str| -> Vec<String> {
+        let text = fs::read_to_string(root().join(name)).expect(name);
+        let links = text
+            .split('[')
+            .filter_map(|link| link.split_once("](guide/"));
+        let links = links.map(|(title, rest)| {
+            let page = rest.split(')').next().expect("a page");
+            format!("{title}: {page}")
+        });
+        links.collect()
+    };
+    let book = guide("docs/SUMMARY.md");
+    assert!(book.len() > 20, "{book:?}");
+    assert_eq!(guide("docs/README.md"), book);
+}
+
 /// Links and file names in documents: a move that forgets them sends a newcomer nowhere.
 #[test]
 fn documents_point_to_what_exists() {

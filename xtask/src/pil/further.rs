@@ -24,7 +24,7 @@ const PREDICTIVE: &str = "wheeleg";
 enum Reported {
     /// A board latches the fault of this number in the protocol's table.
     Fault(u8),
-    /// A board tells the master that it has started anew.
+    /// A board tells the master that it has restarted.
     Restart,
 }
 
@@ -252,7 +252,7 @@ mod tests {
     fn what_a_run_reports_is_read_from_its_events() {
         let events = "time [s],kind [text],code [text],detail [text],board [code],fault [code],text [text]\n\
             1.0,fault,fault_latched,no_motion,3,44,\"joint 3: It does not move, or (39)\"\n\
-            1.1,fault,diagnosis,fault,3,39,\"it has started anew\"\n";
+            1.1,fault,diagnosis,fault,3,39,\"it has restarted\"\n";
         assert!(ensure_reported(events, &NO_MOTION).is_ok());
         assert!(ensure_reported(events, &EMERGENCY_STOP).is_err());
         assert!(ensure_reported(events, &Reported::Restart).is_err());

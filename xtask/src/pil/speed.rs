@@ -48,7 +48,7 @@ pub(super) fn speed_verdict(runs: &[Speed]) -> Result<String, String> {
     } else if runs.iter().any(|run| was_alone(*run)) {
         "MISSED"
     } else {
-        "NOT JUDGED: run it again while nobody else is at work"
+        "NOT JUDGED: run it again on an otherwise idle machine"
     };
     let line = format!(
         "speed: {} times real time, target at least {SPEED_LEAST:.1} where others use at most \

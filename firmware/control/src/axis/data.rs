@@ -1,4 +1,8 @@
-//! What a controller is told about its axis, in physical units.
+//! The data of an axis that a controller needs, in physical units: mm, cm³, dm³/(s·bar), kPa, kg, N, N·s/m and µs.
+//! Each field states its unit and range.
+//!
+//! Source: the parameters of the board (`protocol`, parameters of a joint), which `wheeleg tune` or
+//! `wheeleg identify` derives from an axis file; there each value names its own source.
 
 use crate::gain::Gain;
 use fixed::types::I16F16;

@@ -1,4 +1,22 @@
 //! The coefficients of the predictive law, made of an axis's data.
+//!
+//! ```text
+//! A_A = π/4 bore²     A_B = A_A − π/4 rod²       L_i = dead volume_i / A_i
+//! F   = p_A A_A − p_B A_B − p_amb (A_A − A_B)
+//! w_i = C ρ0 R T0 / A_i                          speed at which a choked outlet of side i lets the piston go
+//! T_d = 1.5 ticks + t_on + line                  dead time
+//! k   = SLOPE / T_d     D = DAMPING / T_d        slope of the speed law, gain of the speed error
+//! v_top = min(w_B, TOP_SPEED w_A)     a_b = BRAKE k v_top
+//! Ḟ   = n/2 · C ρ0 R T0 Σ p_i A_i / V_i          how fast the force can change, at mid-stroke
+//! m_n = NIMBLE Ḟ / (a_b k)                       mass up to which the valves can follow the speed law
+//! T²  = 4 π² m / k_air                           oscillation on the air of both chambers
+//! ```
+//!
+//! Names in capitals are factors of [`crate::tuning`]. Gains of the observer: fading memory, `observer/motion.rs`.
+//!
+//! Source: conductance and critical ratio by ISO 6358; ρ0 and T0 of the reference atmosphere by ISO 8778; the rest DERIVED.
+//!
+//! Assumes: all four valves have the same conductance; supply, friction and valve delays are as specified.
 
 use super::data::{AxisData, AxisField};
 use crate::observer::flow::FlowCurve;
@@ -80,7 +98,7 @@ pub struct AxisModel {
     pub moment: i32,
     /// Period in s × 2^32.
     pub period: i32,
-    /// Mass, kg × 2^16, as told.
+    /// Mass, kg × 2^16, as specified.
     pub mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
     pub nimble_mass: i32,

@@ -1,4 +1,5 @@
-//! The joint tick.
+//! The joint tick: from reference and position to valve openings. The equations are those of the module
+//! above ([`crate::joint`]), of `modes.rs` and `settle.rs`; the predictive law ([`crate::law`]) has its own tick.
 
 use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
 use super::modes;

@@ -35,6 +35,13 @@
 //! of the duty: on/off, P and PID replace Kp e + correction; the sliding law
 //! replaces the duty by one of seven valve modes. The predictive law
 //! ([`crate::law`]) shares the input alone and times each pulse itself.
+//!
+//! The term Kf · reference velocity belongs to both forms of u.
+//!
+//! Source: PAPER §8 for P with a fuzzy correction of PD or ID type. Anti-windup (conditional integration), the fade after a
+//! change, dead zone and rest are ASSUMED: the paper does not describe them.
+//!
+//! Assumes: a supply that keeps its pressure, and valves whose delays are within the margin of those specified.
 
 mod config;
 mod controller;

@@ -1,4 +1,20 @@
 //! The usual laws: on/off, P, PID, and sliding mode on seven valve modes.
+//!
+//! ```text
+//! e = reference − measured              ė = reference velocity − velocity
+//! on/off    u = sign e
+//! P         u = Kp e + Kf · reference velocity
+//! PID       u = Kp e + Ki ∫e + Kd ė + Kf · reference velocity
+//! sliding   s = e + T ė
+//!           |s| ≤ settle band: hold
+//!           |s| ≤ error scale: one valve, which vents the counter chamber, or fills it to brake
+//!           else: push or pull, by the sign of s
+//! ```
+//!
+//! Source: textbook laws; seven-mode sliding control after Hodgson, Le, Tavakoli and Pham, Mechatronics 22 (2012).
+//! Its two bounds on s are ASSUMED: those of rest and of the fuzzy correction.
+//!
+//! Assumes: a velocity without much noise ([`crate::paper::velocity`]), and a period much shorter than the move.
 
 use super::config::JointGains;
 use super::types::Law;

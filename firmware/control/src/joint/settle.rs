@@ -1,4 +1,12 @@
 //! Rest detection: two bands, two dwells.
+//!
+//! ```text
+//! settles    |e| ≤ settle band, |v| and |reference velocity| ≤ settle velocity, for the settle dwell
+//! releases   |e| > release band for the release dwell, or |reference velocity| > settle velocity at once
+//! ```
+//!
+//! Source: hysteresis with dwell, DERIVED. Assumes: a release band wider than the settle band by more than the noise
+//! of the position.
 
 use super::config::JointConfig;
 use wheeleg_units::{PositionMm, VelocityMmS};

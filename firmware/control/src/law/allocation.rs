@@ -15,7 +15,7 @@
 //! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls:
 //! the force is there as soon as either chamber can make it. Source: this project (decision 38).
 //!
-//! Assumes: areas, supply and atmosphere as told. If the supply is lower, the drive chamber does not reach its pressure,
+//! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its pressure,
 //! and the force is less than asked for. For the swap: that the counter chamber's pressure is estimated to 10 kPa.
 //!
 //! Config [`AxisModel`], state [`PressureSwap`], update [`PressureSwap::targets`].

@@ -14,7 +14,7 @@
 //! Source: control of a plant with dead time by its predicted state (Smith 1957; Manitius and Olbrot 1979); one step of
 //! the trapezoidal rule.
 //!
-//! Assumes: valve delays, supply and friction as told; the load that is estimated, unchanged in the dead time; a force
+//! Assumes: valve delays, supply and friction as specified; the load that is estimated, unchanged in the dead time; a force
 //! that changes in proportion to time in it.
 //!
 //! Config [`AxisModel`]; no state of its own; update [`PredictedState::new`].

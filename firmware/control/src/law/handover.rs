@@ -1,6 +1,6 @@
-//! Who decides about the valves: the law, or somebody else.
+//! Which part of the firmware commands the valves: the law, or another one.
 //!
-//! The estimates live on what was sent. Where somebody else drives (exhaust, precharge, hold), who tells it by
+//! The estimates live on what was sent. Where another part drives (exhaust, precharge, hold), and reports it by
 //! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
 //! that is cut counts as far as it was sent.
 

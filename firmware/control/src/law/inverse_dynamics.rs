@@ -25,7 +25,7 @@
 //! is faded out where the piston does not come to rest: more than there is makes a relay. The ramp is an integral that is
 //! forgotten with each new target.
 //!
-//! Assumes: friction and supply as told: neither is learnt. Load and mass are those of the observer. The force that is
+//! Assumes: friction and supply as specified: neither is learnt. Load and mass are those of the observer. The force that is
 //! asked for is there at the end of the dead time, as far as the pulses of one period can make it.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and

@@ -21,7 +21,7 @@
 //! | `standstill` | when the valves stay shut: a state machine |
 //! | `seat` | a force instead of a position at an end stop |
 //! | `preload` | the edge of slipping ahead of an announced move |
-//! | `handover` | who decides about the valves, the law or others |
+//! | `handover` | which part of the firmware commands the valves |
 //!
 //! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
 //! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
@@ -32,7 +32,10 @@
 //!
 //! Assumes: a stroke that is true. A potentiometer that is open, shorted or loose, or frozen, is not noticed here but in
 //! the node (`firmware/node/src/sensor.rs`, `firmware/node/src/joint/no_motion_detector.rs`). Delays of the valves are as
-//! told; `wheeleg tune` looks for them on the axis.
+//! specified; `wheeleg tune` identifies them on the axis.
+//!
+//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its error shows as
+//! load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction has to stop the piston.
 
 mod allocation;
 mod dead_time_predictor;
@@ -158,7 +161,7 @@ impl Predictive {
         self.observer.pressures()
     }
 
-    /// Mass in use, kg × 2^16: as told, or learnt.
+    /// Mass in use, kg × 2^16: as specified, or learnt.
     #[must_use]
     pub const fn mass(&self) -> i32 {
         self.observer.inertia.mass

@@ -15,7 +15,7 @@
 //! cannot open for less.
 //!
 //! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected one
-//! alone; delays of the valves as told within their margin; supply and atmosphere as told.
+//! alone; delays of the valves as specified within their margin; supply and atmosphere as specified.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 

@@ -15,7 +15,7 @@
 //! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
 //! and Craig 1981).
 //!
-//! Assumes: the length of the stroke, as told, is right to 0.5 mm; break-away friction and supply as told; chambers that a
+//! Assumes: the length of the stroke, as specified, is right to 0.5 mm; break-away friction and supply as specified; chambers that a
 //! precharge has filled, so that the expected force is right to a quarter.
 
 use super::Predictive;

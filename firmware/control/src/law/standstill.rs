@@ -24,14 +24,14 @@
 //! e: error, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m: mass, kg; n = 1.2; p, V:
 //! mean pressure, Pa, and volume of each chamber at mid stroke, m³; AA, AB: areas, m²; k_air: N/m; T_o: s.
 //!
-//! Assumes: friction of at least 0.85 of what is told, where it is counted on; that shut valves hold the air, so that a
+//! Assumes: friction of at least 0.85 of the specified one, where it is counted on; that shut valves hold the air, so that a
 //! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
 //! rest stays there: nothing of it asks for air. One on its way may lack the force to arrive: it stays in SERVO, its
-//! band widens no further than 2.4 times, and supervision sees the error. REST tells the force nothing: a load that
+//! band widens no further than 2.4 times, and supervision sees the error. REST learns nothing about the force: a load that
 //! grows beyond friction moves the piston out of the band of release, and SERVO acts again.
 //!
-//! The hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
-//! pause are ours, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
+//! Source: hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
+//! pause are our own, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
 //!
 //! Config [`AxisModel`], state [`Standstill`], update [`Standstill::update`].
 

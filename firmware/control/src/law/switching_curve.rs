@@ -20,7 +20,7 @@
 //! serves 1 and 400 mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are
 //! searched ([`crate::tuning`]). e_l does not depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as told, the mass that is in use; and that a force can be built up within
+//! Assumes: dead time, supply and conductance as specified, the mass that is in use; and that a force can be built up within
 //! about a dead time, which the nimble mass stands for.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! q: mass flow, kg/s; p₁, p₂: pressure upstream and downstream, Pa absolute; C: sonic conductance, m³/(s Pa);
-//! b: critical pressure ratio, told by the axis data as C is; ρ0 = 1.185 kg/m³: density of the reference atmosphere of
+//! b: critical pressure ratio, given by the axis data, as is C; ρ0 = 1.185 kg/m³: density of the reference atmosphere of
 //! ISO 8778 (20 °C, 1 bar, 65 %). Source: ISO 6358-1, with its factor √(T0/T1) taken as 1.
 //!
 //! Assumes: all air upstream at 293 K (20 K more are 3 % less flow); one C and one b for filling and venting; a valve

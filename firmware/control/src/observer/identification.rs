@@ -7,11 +7,13 @@
 //!   wA = AA (pA⁺ − pA⁻)      width of the bounds, as a force        u: error of the pressure as a share of it
 //! ```
 //!
-//! J in mN · periods, w in mN, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's error fades as a chamber is filled, is vented or grows, in a way that the widths
-//! have in common with it; that tells it from mass and load. Normal equations of the four unknowns, with a ridge that holds
-//! the shares at nothing where the move says little (Ljung, System Identification, ch. 7; Hoerl and Kennard 1970).
+//! J in mN · periods, w in mN, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's error fades as a chamber is filled, is vented or grows, in the same way as the
+//! widths; that distinguishes it from mass and load. Normal equations of the four unknowns, with a ridge that holds
+//! the shares at zero where the move reveals little.
 //!
-//! Assumes: load and friction that are constant in the move. At a standstill nothing is learnt: then no pressure can be told
+//! Source: Ljung, System Identification, ch. 7; ridge: Hoerl and Kennard 1970.
+//!
+//! Assumes: load and friction that are constant in the move. At a standstill nothing is learnt: then a pressure cannot be distinguished
 //! from a load (Pandian et al. 2002).
 //!
 //! Config [`AxisModel`], state [`Regression`], updates [`Regression::add`] and [`Regression::solve`].

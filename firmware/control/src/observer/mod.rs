@@ -43,7 +43,7 @@ pub struct Observer {
     pub(crate) motion: Motion,
     /// Pressure force at the moment, mN.
     pub(crate) force: i32,
-    /// What follows from the mass, as told or learnt.
+    /// What follows from the mass, as specified or learnt.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
     trajectory: PeriodTrajectory,

@@ -10,7 +10,7 @@
 //!           load += c m (1 − θ)³ ε / T²                     not while stuck, nor in a cushion
 //! ```
 //!
-//! Gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
+//! Source: gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
 //! Fundamentals of Kalman Filtering, ch. 7), which has one parameter, θ. The load takes what the pressures
 //! have wrong, too, so only a share c of its gain is used, and the filter is slower than its θ says: of its
 //! three poles the slow one is 0.81 a period, 19 ms.
@@ -19,14 +19,13 @@
 //! |---|---|---|
 //! | x, v | mm, mm/s | stroke, speed; positive extends |
 //! | F, load | mN | pressure force; force from outside and what the model does not know |
-//! | Fc, Fb | mN | Coulomb and break-away friction, as told; the observer counts 0.92 of Fc |
-//! | d | mN s/mm (N s/m) | viscous friction, as told |
-//! | m | kg | mass, as told or learnt |
+//! | Fc, Fb | mN | Coulomb and break-away friction, as specified; the observer counts 0.92 of Fc |
+//! | d | mN s/mm (N s/m) | viscous friction, as specified |
+//! | m | kg | mass, as specified or learnt |
 //! | T | s | period |
 //!
 //! Assumes: a load that is constant but for corrections, the mass of the estimator beside it, friction between half and
-//! twice of what is told. That is what the bars are kept with (`tests/system/control_bars.rs`); what friction is off goes
-//! into the load.
+//! twice the specified one. With these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load.
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 

@@ -16,13 +16,14 @@
 //! | ψ | 1 | flow over choked flow, [`super::flow`] |
 //! | n | 1 | polytropic exponent, 1.2: between isothermal (1) and adiabatic (1.4) |
 //!
-//! Open loop: there is no pressure sensor. The chamber is that of Bobrow and McDonell 1998 and Pandian et al. 2002, the
-//! flow that of ISO 6358-1. Errors die out by themselves: a filling chamber
+//! Source: chamber of Bobrow and McDonell 1998 and Pandian et al. 2002; flow of ISO 6358-1.
+//!
+//! Open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber
 //! ends at the supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone
 //! in p, so both bounds keep their order, and their distance says how far the estimate can be off. Only the
 //! identification of a move uses the bounds (`identification`); they hold as long as the assumptions do.
 //!
-//! Assumes: supply and atmosphere as told, tight seals, no flow but through the valves.
+//! Assumes: supply and atmosphere as specified, tight seals, no flow but through the valves.
 //!
 //! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 

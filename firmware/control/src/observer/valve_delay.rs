@@ -6,11 +6,11 @@
 //! on for < t_on      it never opens          off for < t_off    it never shuts
 //! ```
 //!
-//! A pure dead time for each direction, as data sheets of on/off valves give it (SMC VQ100, Festo MHE2:
-//! "response time"), and the wave's way through the line at the speed of sound. Whole µs, on the
+//! A pure dead time for each direction, and the wave's travel time through the line at the speed of sound.
+//! Source: data sheets of on/off valves, "response time" (SMC series VQ100, Festo series MHE2). Whole µs, on the
 //! on-times that are sent.
 //!
-//! Assumes: delays as told, the same in every pulse, at every pressure and voltage; the margin of the axis data is for
+//! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data is for
 //! what they differ by. A valve that is open, or shut, and nothing between.
 //!
 //! Config [`ValveTimes`], state [`ValveTrack`], updates [`ValveTrack::energise`] and [`ValveTrack::passes`].

@@ -12,6 +12,8 @@
 //! Sets are NB NM NS ZE PS PM PB with vertices at ±1, ±0.5, ±0.2 and 0 of full
 //! scale: closer together near zero, where the piston is to come to rest.
 //! Neighbours cross at half membership, so at most four rules fire.
+//!
+//! Evaluated in `paper/fuzzy`: w_r = min(μ_i(a), μ_j(b)), output = Σ w_r c_r / Σ w_r.
 
 use crate::paper::fuzzy::{FuzzyError, GridRules, Partition};
 

@@ -25,6 +25,9 @@
 //! of at most 1.5 × step × fs / N.
 //!
 //! Not modelled: unequal sample spacing. A missed tick is a fault of the board.
+//!
+//! Source: least squares for equally spaced samples; in filters, the first derivative of Savitzky and Golay (Analytical
+//! Chemistry 36, 1964) for a straight line. Delay and noise gain are DERIVED.
 
 use wheeleg_units::{PositionMm, VelocityMmS, divide};
 

@@ -1,4 +1,12 @@
 //! Modes, flags and the output port.
+//!
+//! ```text
+//! position, trapezoidal, integral velocity   MC = D(z) (command − actual)
+//! proportional velocity                      MC = (K/4)(command − actual velocity)
+//! PWM = MC limited to ±100
+//! ```
+//!
+//! Source: HCTL-1100 data sheet pp. 14–35 (DATASHEET); deviations are listed at [`WheelController`].
 
 use super::filter::{FilterMemory, MotorCommand};
 use super::profile::{Profile, Ramp};

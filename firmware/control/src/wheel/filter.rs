@@ -1,4 +1,14 @@
 //! The lead filter.
+//!
+//! ```text
+//! D(z) = K (z − A/256) / (4 (z + B/256))
+//! MC_n = (K/4) X_n − (A/256)(K/4) X_{n−1} − (B/256) MC_{n−1}
+//! ```
+//!
+//! X is the position error in counts, MC the motor command, limited to 8 bits.
+//!
+//! Source: HCTL-1100 data sheet, filter equations (DATASHEET). That the limited command is fed back is ASSUMED, for the
+//! reason given at `FilterMemory`.
 
 use super::types::LeadFilter;
 use wheeleg_units::{saturate_i32, shift_right_round, shift_right_round_i32};

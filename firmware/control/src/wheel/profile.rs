@@ -1,5 +1,13 @@
 //! Trapezoidal profile and velocity ramp.
 //!
+//! ```text
+//! profile   v_n = the largest v ≤ min(v_{n−1} + a, v_max) after which steps of a still stop at the target
+//!           one sample at v and the stop after it cover (k + 1) v − a k (k + 1)/2,   k = ⌊v/a⌋
+//! ramp      v_n = v_{n−1} towards the command by at most a;   x_n = x_{n−1} + v_n
+//! ```
+//!
+//! Source: modes of the HCTL-1100 (DATASHEET); its sequence of points is not published, and this one is DERIVED.
+//!
 //! Positions in 1/256 count, velocities in 1/256 count per sample,
 //! accelerations in 1/256 count per sample².
 

@@ -288,7 +288,7 @@ mod tests {
         questions.on_reply(4, Some(&boot), &idle);
         assert_eq!(asked(&mut questions, 50), [], "power-up");
         questions.on_reply(4, Some(&idle), &boot);
-        assert_eq!(asked(&mut questions, 50).len(), 1, "started anew");
+        assert_eq!(asked(&mut questions, 50).len(), 1, "asked again");
         questions.lost(4);
         assert_eq!(asked(&mut questions, 50), [], "nobody answers");
         questions.on_reply(4, None, &idle);

@@ -45,7 +45,7 @@ pub enum FmuError {
     #[error("the token {given} is not that of this unit, {expected}")]
     #[diagnostic(
         code(wheeleg::fmu::token),
-        help("the description was changed or is of another unit: export it anew")
+        help("the description was changed or belongs to another unit: export it again")
     )]
     Token {
         /// What the importer gave.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::plan::Plan;
 use wheeleg_report::stats;
@@ -22,7 +23,7 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 const BOOTSTRAP: usize = 500;
 
 /// How often something held.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Rate {
     /// How often.
     pub met: u64,
@@ -46,7 +47,7 @@ impl Rate {
 }
 
 /// A quantile with its intervals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Quantile {
     /// Share of the values below it.
     pub share: f64,
@@ -59,7 +60,7 @@ pub struct Quantile {
 }
 
 /// A target in a cell.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct InCell {
     /// The cell, in words.
     pub cell: String,
@@ -72,7 +73,7 @@ pub struct InCell {
 }
 
 /// A target.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OfTarget {
     /// Its column: name, unit, meaning, limits.
     pub column: Column,
@@ -81,7 +82,7 @@ pub struct OfTarget {
 }
 
 /// What a scenario stands on, as its file has it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OfScenario {
     /// Its name.
     pub scenario: String,
@@ -90,7 +91,7 @@ pub struct OfScenario {
 }
 
 /// What a table says.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
     /// Rows.
     pub rows: u64,

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::plan::Plan;
 use wheeleg_report::stats;
@@ -12,7 +13,7 @@ use crate::CampaignError;
 use crate::columns::Column;
 
 /// A yes or no of pairs, before and after.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Split {
     /// Yes before, no after.
     pub lost: u64,
@@ -25,7 +26,7 @@ pub struct Split {
 }
 
 /// One target of pairs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TargetSplit {
     /// Its column.
     pub column: Column,
@@ -38,7 +39,7 @@ pub struct TargetSplit {
 }
 
 /// Pairs of two values of a paired factor.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Paired {
     /// The two, in words.
     pub what: String,
@@ -51,7 +52,7 @@ pub struct Paired {
 }
 
 /// Pairs of two tables.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Pairs {
     /// The comparison; before is the other table.
     pub paired: Paired,

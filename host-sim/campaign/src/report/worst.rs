@@ -1,5 +1,6 @@
 //! The cases that are furthest outside of a limit; of those that passed, the nearest to one.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::plan::Value;
 
@@ -14,7 +15,7 @@ const WORST: usize = 20;
 const NOTHING: f64 = 1e-9;
 
 /// A case with what was missed in it, or what was nearest to be.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Worst {
     /// Identity.
     pub case: String,

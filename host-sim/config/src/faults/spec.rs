@@ -268,7 +268,7 @@ impl FromStr for FaultSpec {
                     target.map_or_else(String::new, |t| format!(":{t}")),
                     v.default
                 ),
-                _ => format!("`{name}` is over by itself, so it takes no end"),
+                _ => format!("`{name}` ends on its own, so it takes no end"),
             };
             return Err(wrong(lasts));
         }

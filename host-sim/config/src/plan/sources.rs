@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml_edit::Document;
 
@@ -12,7 +13,7 @@ use crate::error::ConfigError;
 use crate::terrain::{Data, named_files};
 
 /// A file: its name for messages, and what is in it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Text {
     /// Name for messages.
     pub file: String,
@@ -21,7 +22,7 @@ pub struct Text {
 }
 
 /// A plan's own text and those of every scenario and robot that it names.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Sources {
     /// The plan.
     pub plan: Text,
@@ -33,6 +34,7 @@ pub struct Sources {
     pub robot_of: BTreeMap<String, String>,
     /// Data files of each scenario, by the names that it has for them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(with = "BTreeMap<String, BTreeMap<String, String>>")]
     pub data: BTreeMap<String, BTreeMap<String, Data>>,
 }
 

@@ -220,17 +220,17 @@ impl Relation {
     }
 
     /// Why it does not hold, and what is allowed.
-    fn told(&self, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) -> (String, String) {
+    fn message(&self, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) -> (String, String) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
         };
         let allowed = match (advice::text(accepted), broken.words.as_str()) {
             (offers, "") if offers.is_empty() && untried => {
-                "what is allowed depends on other fields: mend what else is wrong first".to_owned()
+                "what is allowed depends on other fields: correct the other errors first".to_owned()
             }
             (offers, "") if offers.is_empty() => {
-                "no value of a single field is enough: the rest of the file refuses it".to_owned()
+                "no value of a single field is enough: the rest of the file rules it out".to_owned()
             }
             (offers, words) if offers.is_empty() => words.to_owned(),
             (offers, "") => offers,
@@ -240,7 +240,7 @@ impl Relation {
     }
 
     fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) {
-        let (why, allowed) = self.told(broken, accepted, untried);
+        let (why, allowed) = self.message(broken, accepted, untried);
         let mut fields = self.fields.to_vec();
         fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         r.contradiction(&fields, &why, &allowed, advice::values(accepted));

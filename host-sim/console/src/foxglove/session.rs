@@ -15,8 +15,8 @@ use super::request::{Malformed, Request, parse_binary, parse_text};
 use crate::close::Close;
 use crate::hub::{Hub, Looking, StopsUnderWay};
 use crate::progress::PROGRESS;
-use crate::rate::Bucket;
 use crate::session::{SILENCE, send_all};
+use wheeleg_access::rate::Bucket;
 
 /// What a viewer is offered.
 pub(crate) struct Viewing {

@@ -12,10 +12,10 @@ use tokio::time::timeout;
 use super::outbox::status;
 use super::request::Setting;
 use super::viewers::ViewerId;
-use crate::hex;
 use crate::hub::{Asking, Hub, Role};
 use crate::outbox::Outbox;
-use crate::request::{Body, Spoken};
+use wheeleg_access::hex;
+use wheeleg_access::request::{Body, Spoken};
 
 /// Name of the session.
 const NAME: &str = "foxglove";

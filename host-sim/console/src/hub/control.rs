@@ -6,11 +6,11 @@ use serde_json::{Map, Value, json};
 use wheeleg_master::command::{Command, CommandCode};
 
 use super::{Asked, Client, Inner, Pending, Role, TICKET};
-use crate::desk::{ClientId, Denied, Ended};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
-use crate::reason::Reason;
-use crate::request::{HostCommand, Order, Spoken};
+use wheeleg_access::desk::{ClientId, Denied, Ended};
+use wheeleg_access::reason::Reason;
+use wheeleg_access::request::{HostCommand, Order, Spoken};
 
 const RELEASE: CommandCode = CommandCode::ReleaseControl;
 /// The holder of the control is told of one who asks for it so often at most: who asks without end

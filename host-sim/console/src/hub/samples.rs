@@ -10,9 +10,9 @@ use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::{EventCode, OwnedSample};
 
 use super::{Client, EVENTS, Inner, Subscription};
-use crate::desk::ClientId;
 use crate::live::Moving;
 use crate::messages::event_json;
+use wheeleg_access::desk::ClientId;
 
 impl Inner {
     pub(super) fn subscribe(&mut self, id: ClientId, channels: &[u16], hz: Option<u32>) {

@@ -6,9 +6,9 @@ use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::phase;
 
 use super::Inner;
-use crate::desk::Ended;
 use crate::messages::rounded;
 use crate::record::inputs::fault_name;
+use wheeleg_access::desk::Ended;
 
 impl Inner {
     pub(super) fn active_faults(&self) -> Vec<String> {

@@ -21,7 +21,7 @@ use wheeleg_remote_host::serial::HilOptions;
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::OwnedSample;
 
-use crate::request::{HostCommand, Spoken};
+use wheeleg_access::request::{HostCommand, Spoken};
 
 pub(crate) use robot::{Robot, start};
 

@@ -23,10 +23,10 @@ use super::sink::RingSink;
 use super::{
     Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
 };
-use crate::catalogue::SPEED_OF_CONTROL;
 use crate::foxglove::ContactSink;
 use crate::record::{Feed, FeedSink, Given};
-use crate::request::{HostCommand, Spoken};
+use wheeleg_access::host::SPEED_OF_CONTROL;
+use wheeleg_access::request::{HostCommand, Spoken};
 
 /// Both rings are read so often, ns of simulated time.
 const TICK_NS: u64 = 1_000_000;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use wheeleg_config::faults::FaultSpec;
 
 use super::Given;
-use crate::request::Spoken;
+use wheeleg_access::request::Spoken;
 
 /// Longest line: a frame of a client and what is around it.
 pub(crate) const LINE_MAX: usize = 8 * 1024;

@@ -24,7 +24,7 @@ use wheeleg_telemetry::Contact;
 
 use crate::error::ConsoleError;
 use crate::live::Moving;
-use crate::request::Spoken;
+use wheeleg_access::request::Spoken;
 
 pub(crate) use feed::{Feed, FeedSink};
 pub use folder::Summary;

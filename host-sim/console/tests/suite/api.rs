@@ -58,7 +58,7 @@ fn every_answer_is_as_the_document_says() {
         schema(&document, "/events", "get", 400).is_valid(&answer),
         "{answer}"
     );
-    let nobody = wheeleg_console::Key::new([0; 32]);
+    let nobody = wheeleg_access::Key::new([0; 32]);
     let (status, answer) = http(&rig.url, "GET", "state", &nobody).expect("answered");
     assert_eq!(status, 401);
     assert!(

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tungstenite::client::ClientRequestBuilder;
 use tungstenite::{Message, WebSocket};
-use wheeleg_console::Key;
+use wheeleg_access::Key;
 use wheeleg_console::client::{Outcome, http};
 
 use crate::common::{PAGE, TestRig, done, look, refusal};

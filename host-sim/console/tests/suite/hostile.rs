@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use wheeleg_console::Key;
+use wheeleg_access::Key;
 use wheeleg_console::client::{Client, Outcome, http};
 
 use crate::common::{TestRig, closed, done, look};

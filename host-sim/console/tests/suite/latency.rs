@@ -2,8 +2,8 @@
 //! carries it, and to the board that has it: in simulated time, at every place of the bus cycle.
 
 use serde_json::json;
+use wheeleg_access::request::{Order, Spoken};
 use wheeleg_config::builtin;
-use wheeleg_console::request::{Order, Spoken};
 use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::Request;
 use wheeleg_master::layer0::operator::{OPERATOR_CLIENT, STOP_CLIENT};

@@ -33,6 +33,7 @@ use crate::axis_sim::{Kind, design, optimal};
 use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, STACK, Settings, Stopped};
 use wheeleg_config::AxisConfig;
+use wheeleg_report::results::CSV;
 
 /// What is compared.
 #[derive(Debug, Clone)]
@@ -245,7 +246,7 @@ impl Comparison {
         };
         let summary = json(&cases, stopped.as_ref());
         job.finish(self, summary, stopped, |job, comparison| {
-            let folder = job.subfolder("csv");
+            let folder = job.subfolder(CSV);
             job.keep(folder.and_then(|folder| table(&folder.join("cases.csv"), &comparison.rows)));
             let drawn = job.draw(charts::figures(comparison));
             (page::render(comparison, &drawn), drawn)

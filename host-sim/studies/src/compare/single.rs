@@ -10,6 +10,7 @@ use crate::axis_sim::Trace;
 use crate::study::schema::json;
 use crate::study::{Finished, Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
+use wheeleg_report::results::{CSV, FIGURES, SUMMARY};
 
 /// A case that was played alone.
 #[derive(Debug, Clone)]
@@ -66,22 +67,22 @@ impl Single {
         let cases = std::slice::from_ref(&self.row);
         let judged = &[];
         let summary = json(&Cases { cases, judged }, None);
-        job.keep(job.save("summary.json", &summary));
+        job.keep(job.save(SUMMARY, &summary));
         let Some(played) = &self.played else {
             return Ok(job.end(Vec::new(), summary, None));
         };
-        job.keep(job.subfolder("csv"));
+        job.keep(job.subfolder(CSV));
         let first = std::iter::once(("first".to_owned(), &played.first));
         let measured = played.measured.iter().enumerate();
         let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
         let mut figures = Vec::new();
         for (name, trace) in all {
-            job.keep(job.save(&format!("csv/{name}.csv"), &rows(trace)));
+            job.keep(job.save(&format!("{CSV}/{name}.csv"), &rows(trace)));
             figures.push(figure(&name, &self.row.case.id, trace));
         }
         let drawn = job.draw(figures);
         job.keep(job.save_figures(&drawn));
-        let plots = job.folder().join("figures");
+        let plots = job.folder().join(FIGURES);
         let paths = drawn
             .iter()
             .map(|(f, _)| plots.join(format!("{}.svg", f.id)));

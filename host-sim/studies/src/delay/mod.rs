@@ -38,6 +38,7 @@ use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, Settings};
 use trial::{BusPath, Outcome, Trial};
 use wheeleg_config::RobotConfig;
+use wheeleg_report::results::CSV;
 use wheeleg_report::stats;
 
 /// The paper's delay, and the band that counts as explained \[s\].
@@ -298,7 +299,7 @@ pub fn write(
     let study = collected.study(robot, options);
     let study = study.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
     let finished = job.finish(study, summary, None, |job, study| {
-        let folder = job.subfolder("csv");
+        let folder = job.subfolder(CSV);
         job.keep(folder.and_then(|folder| tables::write(&folder, study)));
         let drawn = job.draw(charts::figures(study));
         (page::render(study, &drawn), drawn)

@@ -3,13 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use wheeleg_report::results::LOG;
+
 use crate::StudyError;
 
 /// The log of a run: `run` is its folder, or the log itself.
 #[must_use]
 pub fn log_of(run: &Path) -> PathBuf {
     if run.is_dir() {
-        run.join("log.mcap")
+        run.join(LOG)
     } else {
         run.to_path_buf()
     }

@@ -23,6 +23,7 @@ use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings};
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
+use wheeleg_report::results::CSV;
 
 /// Instants of a curve, less one.
 const INSTANTS: usize = 2000;
@@ -200,7 +201,7 @@ pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyErro
     let results = collected.results();
     let results = results.ok_or_else(|| StudyError::refused("a part is missing", ""))?;
     let finished = job.finish(results, summary, None, |job, results| {
-        let folder = job.subfolder("csv");
+        let folder = job.subfolder(CSV);
         job.keep(folder.and_then(|folder| tables::write(&folder, results)));
         let drawn = job.draw(charts::figures(results));
         (page::render(results, &drawn), drawn)

@@ -196,7 +196,7 @@ impl Columns {
         match others.find(|(i, _)| !known.contains(i)) {
             Some((_, name)) => Err(StudyError::refused(
                 format!(
-                    "{file}, line {line}: the column `{}` is not known, or stands there twice",
+                    "{file}, line {line}: the column `{}` is unknown, or occurs twice",
                     shown(name)
                 ),
                 help,

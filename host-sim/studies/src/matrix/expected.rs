@@ -36,7 +36,7 @@ pub enum Expected {
     FoundAt(u8, Finding),
     /// This board says that the fault was its first.
     SaysFault(u8, Fault),
-    /// This board says that it has started anew, for this cause.
+    /// This board says that it has restarted, for this cause.
     SaysReset(u8, ResetCause),
     /// Two boards answer at this address.
     Duplicate(u8),
@@ -176,7 +176,7 @@ impl fmt::Display for Expected {
                 write!(f, "{} says why: first fault {}", board(who), fault.name())
             }
             Self::SaysReset(who, cause) => {
-                write!(f, "{} says why: started anew, {}", board(who), cause.name())
+                write!(f, "{} says why: restarted, {}", board(who), cause.name())
             }
             Self::Duplicate(who) => write!(f, "two boards at the address of {}", board(who)),
             Self::OtherInterface(who) => {

@@ -117,7 +117,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
         }
         Expect::GoesOn { deviation_mm } => goes_on(&mut f, deviation_mm, &m),
         Expect::Degrades => degrades(&mut f, &after_all, &m),
-        Expect::StartsAnew { board } => starts_anew(&mut f, board, ran, &m),
+        Expect::Restarts { board } => restarts(&mut f, board, ran, &m),
         Expect::NoArming => no_arming(&mut f, ran),
         Expect::NotImplemented => {}
     }
@@ -266,7 +266,7 @@ fn stop(f: &mut Failures, row: &Row, expected: &Stop, after_all: &AfterAll, m: &
     }
 }
 
-fn starts_anew(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
+fn restarts(f: &mut Failures, board: u8, ran: &Ran, m: &Measured) {
     f.check(!m.drives, || "an axis drives".to_owned());
     let rows = Node::new(board).and_then(|node| ran.recording.joints.get(node.index()));
     let last = rows.and_then(|rows| rows.last()).map(|row| row.v.mode);

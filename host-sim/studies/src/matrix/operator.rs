@@ -4,10 +4,10 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use wheeleg_console::Key;
-use wheeleg_console::desk::{ClientId, Desk};
-use wheeleg_console::door::{Door, Entered};
-use wheeleg_console::request::{Body, Order};
+use wheeleg_access::Key;
+use wheeleg_access::desk::{ClientId, Desk};
+use wheeleg_access::door::{Door, Entered};
+use wheeleg_access::request::{Body, Order};
 use wheeleg_master::command::CommandCode;
 use wheeleg_master::dispatcher::Request;
 use wheeleg_master::layer0::operator::OPERATOR_CLIENT;

@@ -13,7 +13,7 @@ use wheeleg_report::page;
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// What must come of a row, in words.
+/// The required response of a row, in words.
 pub(super) fn reaction(row: &Row) -> String {
     match row.expect {
         Expect::Stop(stop) => {
@@ -29,8 +29,8 @@ pub(super) fn reaction(row: &Row) -> String {
         }
         Expect::GoesOn { .. } => "the motion continues".to_owned(),
         Expect::Degrades => "continues, or all axes stop; no wrong data are acted on".to_owned(),
-        Expect::StartsAnew { board } => {
-            format!("board {board} starts anew, disarmed, with the old parameters or the new ones")
+        Expect::Restarts { board } => {
+            format!("board {board} restarts disarmed, with either the old or the new parameters")
         }
         Expect::NoArming => "the robot does not arm".to_owned(),
         Expect::NotImplemented => row.not_implemented().unwrap_or_default().to_owned(),

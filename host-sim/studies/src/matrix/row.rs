@@ -72,7 +72,7 @@ pub enum Expect {
     /// the line is not acted on.
     Degrades,
     /// This board, disarmed, is reset and stays disarmed; nothing else happens.
-    StartsAnew {
+    Restarts {
         /// Bus address.
         board: u8,
     },

@@ -119,13 +119,13 @@ pub const ROWS: &[Row] = &[
     row("babble/guarded", &[at("babble:joint5", 0.3)], Phase::Push,
         stop_axis(5, [0.0, 12.0], 13.0, ABSENT_SHUT_MS),
         &[Lost(5), FoundAt(5, Finding::SlotBabble), SaysFault(5, Fault::SlotOverrun)]).answering(7)
-        .noted("the other seven boards' slots are unaffected; the board that is cut off stops by itself"),
+        .noted("the other seven boards' slots are unaffected; the board that is cut off stops on its own"),
     row("babble/unguarded", &[at("babble-unguarded:joint5", 0.3)], Phase::Push,
         stop([9.0, 60.0], LINK_SHUT_MS),
         &[Found(Finding::BusBabble), FoundAt(5, Finding::Babbler)]),
     row("duplicate-address/joint", &[at("duplicate-address:joint4", LONG_S)], Phase::Push,
         stop(ABSENT_MS, ABSENT_SHUT_MS), &[Duplicate(4)])
-        .noted("a board that is plugged in is silent for its self-test; its first reply collides after that"),
+        .noted("a board that is plugged in stays silent during its self-test; its first reply collides after that"),
     row("duplicate-address/wheel", &[at("duplicate-address:wheel8", LONG_S)], Phase::Push,
         stop(ABSENT_MS, ABSENT_SHUT_MS), &[Duplicate(8)])
         .noted("as above"),
@@ -170,7 +170,7 @@ pub const ROWS: &[Row] = &[
         goes_on(0.001), &[LEFT_REAR_OPEN]).lasting(9.0),
     row("foot-switch-on/reflex", &[at("foot-switch-on:left.front", FOR_GOOD)], Phase::Flight,
         goes_on(10.0), &[LEFT_FRONT_CLOSED]).of(Variant::Reflex).lasting(9.0)
-        .noted("the reflex stops the lowering where it believes the ground: the foot stays higher than it should"),
+        .noted("the reflex stops the lowering where it takes the ground to be: the foot stays higher than it should"),
     row("foot-switch-off/reflex", &[at("foot-switch-off:left.back", FOR_GOOD)], Phase::Flight,
         goes_on(0.001), &[LEFT_REAR_OPEN]).of(Variant::Reflex).lasting(9.0),
     // Encoder.
@@ -221,15 +221,15 @@ pub const ROWS: &[Row] = &[
     row("brown-out/supply-board", &[at("brown-out:wheel7=30", FOR_GOOD)], Phase::Push,
         stop_axis(7, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &[Lost(7), SaysReset(7, ResetCause::PowerUp)]),
     row("brown-out/save", &[later("brown-out:joint3=30", 0.02, FOR_GOOD)], Phase::Stand,
-        Expect::StartsAnew { board: 3 },
+        Expect::Restarts { board: 3 },
         &[Refused(CommandCode::SaveParameters, 3), SaysReset(3, ResetCause::PowerUp), Parameter(3, FOLLOWING, 60.0)])
         .asking(&SAVE)
-        .noted("the power fails while the page for the new set is erased; every other instant of a save, in the tests of the store and of `sil`, and on the emulated board"),
+        .noted("the power fails while the page for the new set is erased; the tests of the store, of `sil` and of the emulated board cover every other instant of a save"),
     row("brown-out/saved", &[later("brown-out:joint3=30", 0.3, FOR_GOOD)], Phase::Stand,
-        Expect::StartsAnew { board: 3 },
+        Expect::Restarts { board: 3 },
         &[Done(CommandCode::SaveParameters), SaysReset(3, ResetCause::PowerUp), Parameter(3, FOLLOWING, 55.0)])
         .asking(&SAVE)
-        .noted("the power fails when the parameters are stored: the new set is there"),
+        .noted("the power fails once the parameters are stored: the new set is in force"),
     missing("brown-out/update"),
     // Processor.
     row("processor-hang", &[at("node-hang:joint3", FOR_GOOD)], Phase::Flight,
@@ -237,16 +237,16 @@ pub const ROWS: &[Row] = &[
         .noted("the watchdog period is 50 ms (firmware/board/BOARD.md), not the 20 ms of the matrix: a flash save stalls the board for about 20 ms"),
     row("stack-overflow", &[at("processor-fault:joint2", FOR_GOOD)], Phase::Push,
         stop_axis(2, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &[SaysReset(2, ResetCause::ProcessorFault)])
-        .noted("the stack lies below all variables, so that one that overflows is a processor fault (in emulation the image's own handler runs: tests/system/pil_faults.rs); the images' worst stack is bounded by `cargo xtask sizes`"),
+        .noted("the stack lies below all variables, so an overflow is a processor fault (in emulation the image's own handler runs: tests/system/pil_faults.rs); `cargo xtask sizes` bounds the worst stack of the images"),
     row("panic", &[at("processor-fault:wheel8", FOR_GOOD)], Phase::Push,
         stop_axis(8, [0.0, 41.0], 1.1, ABSENT_SHUT_MS), &[SaysReset(8, ResetCause::ProcessorFault)])
-        .noted("the handler of panics does what that of faults does; the link check proves that no panic is reachable"),
+        .noted("the panic handler does the same as the fault handler; the link check proves that no panic is reachable"),
     // Time.
     row("clock-drift/200ppm", &[at("clock-drift:joint6=200", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     row("clock-drift/beyond", &[at("clock-drift:joint6=-30000", LONGER_S)], Phase::Flight,
         stop([0.0, 500.0], 540.0), &[FoundAt(7, Finding::SlotsOverlap), LatchedBy(6, Fault::SlotOverrun)])
         .silent_about(&[Found(Finding::SlotBabble), Found(Finding::Babbler)]).lasting(3.5)
-        .noted("the neighbours' slots overlap at once; that its clock is wrong the board says after 1.7 s"),
+        .noted("the neighbours' slots overlap at once; the board reports its wrong clock after 1.7 s"),
     row("cycle-jitter/1ms", &[at("cycle-jitter=1", FOR_GOOD)], Phase::Flight, goes_on(10.0), &[]),
     // Master's layers.
     row("fifo-full", &[at("command-flood=100", 0.5)], Phase::Flight, goes_on(0.001), &[FloodRefused(Layer::Zero)]),
@@ -256,28 +256,28 @@ pub const ROWS: &[Row] = &[
         stop([89.0, 111.0], 140.0), &[Hold(HoldReason::LayerOneStalled)]),
     row("layer1-panic", &[at("master-reset=1000", FOR_GOOD)], Phase::Push,
         stop(LINK_MS, LINK_SHUT_MS), &[Latched(Fault::LinkLost)])
-        .noted("both layers are one program: it ends, the boards see a master that is silent, and later one that starts anew"),
+        .noted("both layers are one program: when it ends, the boards see a silent master, and later one that restarts"),
     // User interface.
     row("ui-link-lost", &[], Phase::Flight, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
         .of_connection(Connection::Lost),
     row("ui-half-open", &[], Phase::Push, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
         .of_connection(Connection::HalfOpen)
-        .noted("beats go on, about a robot that was seen before: they gain nothing"),
+        .noted("heartbeats continue, but acknowledge nothing new: they do not extend control"),
     row("ui-slow", &[], Phase::Flight, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
         .of_connection(Connection::Slow)
-        .noted("beats arrive, each later than an operator may be"),
+        .noted("heartbeats arrive, each later than an operator may be"),
     row("ui-reconnects", &[], Phase::Push, stop(OPERATOR_MS, OPERATOR_SHUT_MS), OPERATOR_GONE)
         .of_connection(Connection::Reconnects)
         .silent_about(&[Done(CommandCode::JointReference)])
-        .noted("of 1,000 commands that waited in the client, and 100 of the session before, none is carried out"),
+        .noted("none of the 1,000 commands that waited in the client, and of the 100 from the previous session, is executed"),
     row("ui-second-client", &[], Phase::Flight, goes_on(0.001), &[])
         .of_connection(Connection::SecondClient)
         .silent_about(&[Hold(HoldReason::OperatorLost)])
-        .noted("it has the key of control; that it may stop is tested over sockets"),
+        .noted("it has the control key; that it may stop is tested over sockets"),
     row("ui-bad-mac", &[], Phase::Flight, goes_on(0.001), &[])
         .of_connection(Connection::BadMac)
         .silent_about(&[Hold(HoldReason::OperatorLost)])
-        .noted("every frame of the holder, with each of its bits the other way"),
+        .noted("every frame of the holder, with each of its bits flipped"),
     row("ui-replay", &[], Phase::Push, goes_on(0.001), &[])
         .of_connection(Connection::Replay)
         .silent_about(&[Hold(HoldReason::OperatorLost)]),
@@ -296,5 +296,5 @@ pub const ROWS: &[Row] = &[
     row("log-writer-slow",
         &[later("disk-full", 0.0, 0.1), later("disk-full", 0.3, 0.1), later("disk-full", 0.6, 0.1)],
         Phase::Flight, goes_on(0.0), &[MessagesLost])
-        .noted("a writer that cannot keep up takes nothing for a third of the time"),
+        .noted("a slow writer accepts nothing for a third of the time"),
 ];

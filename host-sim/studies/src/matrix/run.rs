@@ -251,10 +251,7 @@ fn simulate(
         },
         Err(e) => (LineAudit::default(), Some(e)),
     };
-    let (recording, error) = match recorder.finish() {
-        Ok(recording) => (recording, error),
-        Err(e) => (Recording::default(), error.or(Some(e.into()))),
-    };
+    let (recording, error) = recorded(recorder, error);
     Some(Ran {
         at_s: 0.0,
         faults: Vec::new(),
@@ -265,6 +262,14 @@ fn simulate(
         outputs,
         error,
     })
+}
+
+/// What was recorded, and what failed first.
+fn recorded(recorder: Recorder<'_>, failed: Option<SimError>) -> (Recording, Option<SimError>) {
+    match recorder.finish() {
+        Ok(recording) => (recording, failed),
+        Err(e) => (Recording::default(), failed.or(Some(e.into()))),
+    }
 }
 
 /// The same with an operator in control, whose connection goes wrong at `at_s`.
@@ -291,10 +296,7 @@ fn operated(
         Ok(Some(line)) => (line, None),
         Err(e) => (LineAudit::default(), Some(e)),
     };
-    let (recording, error) = match recorder.finish() {
-        Ok(recording) => (recording, error),
-        Err(e) => (Recording::default(), error.or(Some(e.into()))),
-    };
+    let (recording, error) = recorded(recorder, error);
     Some(Ran {
         at_s,
         faults: Vec::new(),

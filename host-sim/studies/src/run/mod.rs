@@ -24,6 +24,7 @@ use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, LawChoice, Motion, RobotConfig, Scenario, builtin};
 use wheeleg_remote_host::Nodes;
+use wheeleg_report::results::{CSV, LOG};
 use wheeleg_scene::Scene;
 use wheeleg_sim::faults;
 use wheeleg_sim::{Boards, DownTimes, Session, SimError};
@@ -178,10 +179,10 @@ fn run_with(
     let job = Job::begin(&scenario.name, settings, &reads)?;
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
-    let log = job.folder().join("log.mcap");
+    let log = job.folder().join(LOG);
     let recorder = Recorder::new(keep(scenario))
         .with(LogFile::create(&log)?.with(scene)?)
-        .with(Tables::create(&job.subfolder("csv")?, CSV_RATE_HZ)?);
+        .with(Tables::create(&job.subfolder(CSV)?, CSV_RATE_HZ)?);
     let duration_ms = (scenario.duration_s * 1e3).round() as u64;
     job.progress.begin(
         format!("{:.0} s simulated", scenario.duration_s),

@@ -22,6 +22,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_report::output::Folder;
 use wheeleg_report::plot::{Figure, ensure_png};
+use wheeleg_report::results::{FIGURES, REPORT, SUMMARY};
 use wheeleg_report::{page, subfolder};
 
 pub use progress::STACK;
@@ -206,12 +207,12 @@ impl Job {
     /// that was asked for.
     fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
         if self.png {
-            let path = self.folder().join(format!("figures/{}.png", figure.id));
+            let path = self.folder().join(format!("{FIGURES}/{}.png", figure.id));
             figure.png(&path).inspect_err(|_| {
                 let _ = std::fs::remove_file(&path);
             })?;
         }
-        self.save(&format!("figures/{}.svg", figure.id), svg)?;
+        self.save(&format!("{FIGURES}/{}.svg", figure.id), svg)?;
         Ok(())
     }
 
@@ -234,7 +235,7 @@ impl Job {
     /// # Errors
     /// [`StudyError`]: one for all that are missing.
     pub fn save_figures(&self, drawn: &[Drawn]) -> Result<(), StudyError> {
-        self.subfolder("figures")?;
+        self.subfolder(FIGURES)?;
         self.progress.begin("pictures", drawn.len() as u64);
         let failed: Vec<StudyError> = progress::on_workers(|| {
             let failed = drawn.par_iter().filter_map(|(figure, svg)| {
@@ -289,9 +290,9 @@ impl Job {
         stopped: Option<Stopped>,
         rest: impl FnOnce(&Self, &T) -> (Result<String, StudyError>, Vec<Drawn>),
     ) -> Finished<T> {
-        self.keep(self.save("summary.json", &summary));
+        self.keep(self.save(SUMMARY, &summary));
         let (page, drawn) = rest(&self, &result);
-        self.keep(page.and_then(|page| self.save("report.html", &page)));
+        self.keep(page.and_then(|page| self.save(REPORT, &page)));
         if !drawn.is_empty() {
             self.keep(self.save_figures(&drawn));
         }
@@ -305,7 +306,7 @@ impl Job {
         Finished {
             result,
             summary,
-            report: self.folder().join("report.html"),
+            report: self.folder().join(REPORT),
             stopped,
             unwritten,
         }

@@ -1,4 +1,5 @@
-//! The form of each study's `summary.json`, published as a JSON schema.
+//! The form of each study's `summary.json`, and of other JSON that the program writes, published as
+//! JSON schemas.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde::{Serialize, Serializer};
@@ -46,16 +47,64 @@ pub fn json<T: Summary>(body: &T, stopped: Option<&Stopped>) -> String {
     text
 }
 
+/// JSON that a command prints, in a published form.
+pub trait Form: Serialize + JsonSchema {
+    /// Name and version of the form, as of [`Summary::SCHEMA`].
+    const SCHEMA: &'static str;
+}
+
+/// JSON of a command with the name of its form.
+#[derive(Serialize, JsonSchema)]
+struct Printed<'a, T> {
+    /// Name and version of this form.
+    schema: &'static str,
+    #[serde(flatten)]
+    body: &'a T,
+}
+
+/// What a command prints, as a line of JSON.
+#[must_use]
+pub fn line<T: Form>(body: &T) -> String {
+    let schema = T::SCHEMA;
+    let mut text = serde_json::to_string(&Printed { schema, body }).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// The same, indented.
+#[must_use]
+pub fn indented<T: Form>(body: &T) -> String {
+    let schema = T::SCHEMA;
+    let mut text = serde_json::to_string_pretty(&Printed { schema, body }).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
 /// The schema of a summary, with its name.
 #[must_use]
 pub fn schema<T: Summary + 'static>() -> (&'static str, Value) {
+    named(of_file::<Document<'static, T>>(T::SCHEMA))
+}
+
+/// The schema of what a command prints, with its name.
+#[must_use]
+pub fn of_form<T: Form + 'static>() -> (&'static str, Value) {
+    named(of_file::<Printed<'static, T>>(T::SCHEMA))
+}
+
+/// The schema of a file that does not hold the name of its form.
+#[must_use]
+pub fn of_file<T: JsonSchema>(name: &'static str) -> (&'static str, Value) {
     let generator = SchemaSettings::draft2020_12()
         .for_serialize()
         .into_generator();
-    let mut schema = generator
-        .into_root_schema_for::<Document<'static, T>>()
-        .to_value();
-    schema["title"] = T::SCHEMA.into();
-    schema["properties"]["schema"]["const"] = T::SCHEMA.into();
-    (T::SCHEMA, schema)
+    let mut schema = generator.into_root_schema_for::<T>().to_value();
+    schema["title"] = name.into();
+    (name, schema)
+}
+
+/// A schema in which the field `schema` has the name.
+fn named((name, mut schema): (&'static str, Value)) -> (&'static str, Value) {
+    schema["properties"]["schema"]["const"] = name.into();
+    (name, schema)
 }

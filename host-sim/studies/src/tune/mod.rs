@@ -29,6 +29,7 @@ use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
 use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
+use wheeleg_report::results::BOARD_PARAMETERS;
 
 /// Section of a robot file that the parameters are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,11 +167,7 @@ impl study::Summary for Summary<'_> {
     const SCHEMA: &'static str = "wheeleg.tune/2";
 }
 
-/// File of the tuned parameters, below the folder of the results. A tuning that was stopped
-/// writes none, because not all of its tests were played, nor does one that made a move worse.
-pub const PARAMETERS: &str = "node-parameters.toml";
-
-/// Tunes an axis and writes report, figures, `summary.json` and [`PARAMETERS`] into the folder
+/// Tunes an axis and writes report, figures, `summary.json` and [`BOARD_PARAMETERS`] into the folder
 /// of the settings that `settings` makes of the axis's name.
 ///
 /// # Errors
@@ -336,13 +333,13 @@ impl Tuned {
         }
     }
 
-    /// Writes report, figures, `summary.json` and [`PARAMETERS`].
+    /// Writes report, figures, `summary.json` and [`BOARD_PARAMETERS`].
     fn write(self, job: Job) -> Finished<Self> {
         let stopped = self.stopped.clone();
         let summary = json(&self.summary(), stopped.as_ref());
         job.finish(self, summary, stopped, |job, tuned| {
             if tuned.is_accepted() {
-                job.keep(job.save(PARAMETERS, &tuned.toml));
+                job.keep(job.save(BOARD_PARAMETERS, &tuned.toml));
             }
             let drawn = job.draw(page::figures(tuned));
             (page::render(tuned, &drawn), drawn)

@@ -16,6 +16,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use wheeleg_config::{Drawing, builtin};
+use wheeleg_report::results::COMPARED_PAGE;
 
 use self::content::{Content, Span};
 pub use self::plain::{acts, plain};
@@ -171,7 +172,7 @@ fn geometry(options: &Options, log: &Content) -> Result<(Drawing, Option<String>
 fn beside(logs: &[PathBuf]) -> PathBuf {
     let first = logs.first().map_or(Path::new("log"), PathBuf::as_path);
     match logs {
-        [_, _] => first.with_file_name("compared.html"),
+        [_, _] => first.with_file_name(COMPARED_PAGE),
         _ => first.with_extension("html"),
     }
 }

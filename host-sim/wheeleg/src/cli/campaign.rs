@@ -140,6 +140,9 @@ struct MergeArgs {
     /// Merge even if cases are missing: a table of the finished cases, for example of a pilot.
     #[arg(long)]
     partial: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -357,7 +360,11 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
         tell("stopped; no table was written, and the parts are unchanged");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
-    Ok(print(&print::merged(&merged, &args.out))?)
+    Ok(print(&if args.json {
+        print::merged_json(&merged, &args.out)
+    } else {
+        print::merged(&merged, &args.out)
+    })?)
 }
 
 fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {

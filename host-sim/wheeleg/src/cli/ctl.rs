@@ -14,16 +14,16 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
+use wheeleg_access::Key;
+use wheeleg_access::host::{SPEED, STEP_MAX};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
 use wheeleg_console::unpack::unpack;
-use wheeleg_console::{Key, SPEED, STEP_MAX};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
 
 use super::exit::{self, LOST};
-use super::serve::refused;
 use super::{print, say, stop_on_signals, tell, tell_error, whole};
 use param::ParamCommand;
 use reach::{Reach, ended, not_answered};
@@ -123,7 +123,7 @@ fn parse_pace(text: &str) -> Result<f64, String> {
 }
 
 /// Does what is asked of the server.
-pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
+pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
     let CtlArgs { reach, command } = args;
     let host = |name: &str, arguments: Value| {
         let end = reach.give(name, &arguments)?;
@@ -136,8 +136,8 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
         CtlCommand::Top => top::top(reach, &reach.key(VIEW_FILE)?),
         CtlCommand::Stop => {
             let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
-            stopped.or_else(|why| match why {
-                StudyError::Stdout(_) => Err(why),
+            stopped.or_else(|why| match why.downcast_ref() {
+                Some(StudyError::Stdout(_)) => Err(why),
                 // Whatever kept the answer away, nobody knows of a stop.
                 _ => {
                     tell_error(why);
@@ -161,13 +161,13 @@ pub(super) fn command(args: &CtlArgs) -> Result<ExitCode, StudyError> {
     }
 }
 
-fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
-    let (code, state) = http(&reach.url(), "GET", "state", key).map_err(refused)?;
+fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
+    let (code, state) = http(&reach.url(), "GET", "state", key)?;
     if code != 200 {
         return Ok(not_answered(&state));
     }
     if reach.json {
-        return print(&format!("{state:#}\n"));
+        return Ok(print(&format!("{state:#}\n"))?);
     }
     let word = |value: &Value| match value {
         Value::String(text) => text.clone(),
@@ -211,18 +211,18 @@ fn status(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
             let _ = writeln!(text, "         {cause} {remedy}");
         }
     }
-    print(&text)
+    Ok(print(&text)?)
 }
 
-fn stop(reach: &Reach, key: &Key) -> Result<ExitCode, StudyError> {
+fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let url = reach.url().prompt();
     if url.is_exposed() {
         return stop_by_session(reach, &url, key);
     }
-    let (code, answer) = http(&url, "POST", "stop", key).map_err(refused)?;
+    let (code, answer) = http(&url, "POST", "stop", key)?;
     match code {
-        200 if reach.json => print(&format!("{answer}\n")),
-        200 => print("stopped: the stop is in SYNC, and latched\n"),
+        200 if reach.json => Ok(print(&format!("{answer}\n"))?),
+        200 => Ok(print("stopped: the stop is in SYNC, and latched\n")?),
         504 => Ok(not_confirmed()),
         403 => stop_by_session(reach, &url, key),
         _ => {
@@ -248,7 +248,7 @@ fn holder(state: &Value) -> Option<String> {
 const ENDS: Duration = Duration::from_secs(3);
 
 /// Revokes control, and waits until the lease of its holder is over, which takes long where the clock is slow or paused.
-fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
+fn revoke(reach: &Reach) -> miette::Result<ExitCode> {
     let mut client = reach.control()?;
     let before = match state_when(&mut client, |_| true) {
         Ok(state) => state,
@@ -256,7 +256,7 @@ fn revoke(reach: &Reach) -> Result<ExitCode, StudyError> {
     };
     // Also where nobody is in control yet: somebody may have asked for it.
     let end = client.carry_out("Revoke", &json!({}), 1_000);
-    let end = end.map_err(refused)?;
+    let end = end?;
     if end != Outcome::Done {
         return reach.print_outcome(&end);
     }
@@ -307,9 +307,9 @@ fn state_when(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Va
 }
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.
-fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(url, "view", "ctl", key).map_err(refused)?;
-    let stopped = client.prompt(json!({ "op": "stop" })).map_err(refused)?;
+fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> miette::Result<ExitCode> {
+    let mut client = Client::connect(url, "view", "ctl", key)?;
+    let stopped = client.prompt(json!({ "op": "stop" }))?;
     match stopped {
         Outcome::Done => reach.print_outcome(&Outcome::Done),
         Outcome::Unknown | Outcome::Lost => Ok(not_confirmed()),
@@ -326,11 +326,11 @@ fn not_confirmed() -> ExitCode {
     ExitCode::from(LOST)
 }
 
-fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> Result<ExitCode, StudyError> {
-    let mut client = Client::connect(&reach.url(), "view", "ctl", key).map_err(refused)?;
+fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> miette::Result<ExitCode> {
+    let mut client = Client::connect(&reach.url(), "view", "ctl", key)?;
     if !topics.is_empty() {
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
-        let n = client.send(frame).map_err(refused)?;
+        let n = client.send(frame)?;
         if let end @ (Outcome::Refused { .. } | Outcome::Lost) = client.outcome(n) {
             return reach.print_outcome(&end);
         }
@@ -365,7 +365,7 @@ fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> Result<ExitCod
             Ok(()) => {}
             // The reader has gone away (`| head`).
             Err(e) if e.kind() == ErrorKind::BrokenPipe => return Ok(ExitCode::SUCCESS),
-            Err(e) => return Err(StudyError::Stdout(e)),
+            Err(e) => return Err(StudyError::Stdout(e).into()),
         }
     }
 }
@@ -410,7 +410,7 @@ fn argument(text: &str) -> Result<(String, Value), StudyError> {
     Ok((name.to_owned(), parsed.unwrap_or_else(|| json!(value))))
 }
 
-fn take(reach: &Reach, words: &[String]) -> Result<ExitCode, StudyError> {
+fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
     let Some((name, arguments)) = words.split_first() else {
         return Ok(ExitCode::SUCCESS);
     };
@@ -418,10 +418,8 @@ fn take(reach: &Reach, words: &[String]) -> Result<ExitCode, StudyError> {
     for text in arguments {
         let (argument, value) = argument(text)?;
         if given.insert(argument.clone(), value).is_some() {
-            return Err(StudyError::refused(
-                format!("`{argument}` is given twice"),
-                "give each argument once",
-            ));
+            let twice = format!("`{argument}` is given twice");
+            return Err(StudyError::refused(twice, "give each argument once").into());
         }
     }
     let stop = stop_on_signals()?;

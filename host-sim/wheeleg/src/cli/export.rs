@@ -12,6 +12,7 @@ use wheeleg_config::{AxisConfig, builtin};
 use wheeleg_fmu::archive;
 use wheeleg_fmu::description::Fmi;
 use wheeleg_fmu::{FmuError, Kind, Model};
+use wheeleg_report::results::{PARQUET, ROS2};
 use wheeleg_scene::urdf;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::Kind as Law;
@@ -125,7 +126,7 @@ pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
         Format::Fmu(args) => unit(args),
         Format::Layout(args) => write(layout::LAYOUT, args, &[]),
         Format::Parquet(args) => {
-            let out = args.out("parquet");
+            let out = args.out(PARQUET);
             exported(args, |progress| {
                 let tables = parquet::export(&log_of(&args.run), &out, progress)?;
                 Ok(tables.map(|t| {
@@ -136,7 +137,7 @@ pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
             })
         }
         Format::Ros2(args) => {
-            let out = args.out("ros2");
+            let out = args.out(ROS2);
             exported(args, |progress| {
                 let bag = ros2::export(&log_of(&args.run), &out, progress)?;
                 Ok(bag.map(|bag| {

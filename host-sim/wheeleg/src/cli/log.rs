@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::{FAILED, print, stop_on_signals, tell};
+use wheeleg_report::results::RECOVERED;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::export::log_of;
 use wheeleg_studies::study::Signal;
@@ -58,5 +59,5 @@ pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
 
 fn beside(log: &Path) -> PathBuf {
     let stem = log.file_stem().unwrap_or_default().to_string_lossy();
-    log.with_file_name(format!("{stem}-recovered.mcap"))
+    log.with_file_name(format!("{stem}{RECOVERED}"))
 }

@@ -131,37 +131,41 @@ pub(crate) fn main() -> ExitCode {
             "a file that reaches the limit on its size will end the program without a message: {error}"
         ));
     }
-    let result = match cli.command {
-        None => run::scenario(DEFAULT_SCENARIO, &cli.options),
-        Some(Command::Run(args)) => run::command(&args),
-        Some(Command::Replay(args)) => replay::command(&args),
-        Some(Command::Serve(args)) => serve::command(&args),
-        #[cfg(unix)]
-        Some(Command::Boards(args)) => boards::command(&args),
-        Some(Command::Campaign(args)) => campaign::command(&args),
-        Some(Command::Ctl(args)) => ctl::command(&args),
-        Some(Command::Faults(args)) => faults::command(&args),
-        Some(Command::List(args)) => list::command(&args),
-        Some(Command::Params(args)) => params::command(&args),
-        Some(Command::Channels(args)) => channels::command(&args),
-        Some(Command::Commands(args)) => commands::command(&args),
-        Some(Command::Export(args)) => export::command(&args),
-        Some(Command::Commission(args)) => commission::command(&args),
-        Some(Command::Figures(args)) => figures::command(&args),
-        Some(Command::Field(args)) => field::command(&args),
-        Some(Command::Delay(args)) => delay::command(&args),
-        Some(Command::Compare(args)) => compare::command(&args),
-        Some(Command::Tune(args)) => tune::command(&args),
-        Some(Command::Identify(args)) => identify::command(&args),
-        Some(Command::Plant(args)) => plant::command(&args),
-        Some(Command::Check(args)) => check::command(&args),
-        Some(Command::View(args)) => view::command(&args),
-        Some(Command::Log(args)) => log::command(&args),
-        Some(Command::Interface(args)) => interface::command(&args),
-    };
-    result.unwrap_or_else(|error| {
+    run_command(cli).unwrap_or_else(|error| {
         tell_error(error);
         ExitCode::from(FAILED)
+    })
+}
+
+/// Does what the command line says.
+fn run_command(cli: Cli) -> miette::Result<ExitCode> {
+    Ok(match cli.command {
+        None => run::scenario(DEFAULT_SCENARIO, &cli.options)?,
+        Some(Command::Run(args)) => run::command(&args)?,
+        Some(Command::Replay(args)) => replay::command(&args)?,
+        Some(Command::Serve(args)) => serve::command(&args)?,
+        #[cfg(unix)]
+        Some(Command::Boards(args)) => boards::command(&args)?,
+        Some(Command::Campaign(args)) => campaign::command(&args)?,
+        Some(Command::Ctl(args)) => ctl::command(&args)?,
+        Some(Command::Faults(args)) => faults::command(&args)?,
+        Some(Command::List(args)) => list::command(&args)?,
+        Some(Command::Params(args)) => params::command(&args)?,
+        Some(Command::Channels(args)) => channels::command(&args)?,
+        Some(Command::Commands(args)) => commands::command(&args)?,
+        Some(Command::Export(args)) => export::command(&args)?,
+        Some(Command::Commission(args)) => commission::command(&args)?,
+        Some(Command::Figures(args)) => figures::command(&args)?,
+        Some(Command::Field(args)) => field::command(&args)?,
+        Some(Command::Delay(args)) => delay::command(&args)?,
+        Some(Command::Compare(args)) => compare::command(&args)?,
+        Some(Command::Tune(args)) => tune::command(&args)?,
+        Some(Command::Identify(args)) => identify::command(&args)?,
+        Some(Command::Plant(args)) => plant::command(&args)?,
+        Some(Command::Check(args)) => check::command(&args)?,
+        Some(Command::View(args)) => view::command(&args)?,
+        Some(Command::Log(args)) => log::command(&args)?,
+        Some(Command::Interface(args)) => interface::command(&args)?,
     })
 }
 
@@ -187,8 +191,8 @@ fn tell(line: &str) {
 }
 
 /// Tells an error in the form that all have: its code, what is wrong, and what can be done.
-fn tell_error(error: impl miette::Diagnostic + Send + Sync + 'static) {
-    tell(&format!("{:?}", miette::Report::new(error)));
+fn tell_error(error: impl Into<miette::Report>) {
+    tell(&format!("{:?}", error.into()));
 }
 
 /// What every study that draws can be asked for.

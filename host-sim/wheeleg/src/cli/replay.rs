@@ -13,7 +13,6 @@ use wheeleg_studies::study::Progress;
 use wheeleg_studies::view::plain;
 
 use super::exit::{self, FAILED, TARGETS_MISSED};
-use super::serve::refused;
 use super::{print, stop_on_signals, tell, tell_unwritten};
 
 /// Arguments of `wheeleg replay`.
@@ -51,13 +50,13 @@ fn outside(log: &Path, recording: &Path) -> Result<(), StudyError> {
 }
 
 /// Repeats and compares.
-pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
+pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
     let stop = stop_on_signals()?;
     let progress = Progress::new("replay", stop.clone());
     if let Some(log) = &args.log {
         outside(log, &args.folder)?;
     }
-    let recorded = recorded(&args.folder).map_err(refused)?;
+    let recorded = recorded(&args.folder)?;
     // What cannot be repeated costs no earlier log.
     if let Some(log) = &args.log {
         make_room(log, &[])?;
@@ -76,7 +75,7 @@ pub(super) fn command(args: &ReplayArgs) -> Result<ExitCode, StudyError> {
         }
     });
     progress.clear();
-    let mut replayed = replayed.map_err(refused)?;
+    let mut replayed = replayed?;
     let unwritten = replayed.unwritten.take().map(StudyError::from);
     let printed = if args.json {
         print(&format!("{:#}\n", as_json(&replayed)))

@@ -12,7 +12,7 @@ use super::{Drawing, end, place, stop_on_signals, tell};
 use wheeleg_config::LawChoice;
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_remote_host::{self as pil, NodeChoice, NodeKind, Nodes, PilSummary};
-use wheeleg_report::output;
+use wheeleg_report::results::{LOG, NATIVE};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::{Judgement, Target};
 use wheeleg_studies::run::{self, Options, Run, Summary};
@@ -142,7 +142,7 @@ fn compare_sil(
 ) -> Result<Option<Stopped>, StudyError> {
     let folder = finished.report.parent().unwrap_or(Path::new("."));
     let run = &finished.result;
-    let native = run::repeat_natively(options, stop, run, folder.join(output::NATIVE))?;
+    let native = run::repeat_natively(options, stop, run, folder.join(NATIVE))?;
     if let Some(stopped) = native.stopped {
         tell(&format!(
             "the logs are not compared: the native run was {stopped}"
@@ -154,8 +154,8 @@ fn compare_sil(
         tell("the log is bit-identical to that of the native run");
         return Ok(None);
     }
-    let here = folder.join(output::NATIVE).join("log.mcap");
-    let first = telemetry::first_difference(&here, &folder.join("log.mcap"))?;
+    let here = folder.join(NATIVE).join(LOG);
+    let first = telemetry::first_difference(&here, &folder.join(LOG))?;
     let first = match first {
         Some(first) => format!("first difference: {first}"),
         None => "no difference in the parts that could be written".to_owned(),

@@ -8,11 +8,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use wheeleg_access::host::SPEED;
 use wheeleg_console::keys::{self, CONTROL_FILE, Keys, VIEW_FILE};
-use wheeleg_console::{
-    ADDRESS, ConsoleError, FOLDER, Files, Live, Options, Port, Protection, SPEED, Server,
-};
-use wheeleg_studies::StudyError;
+use wheeleg_console::{ADDRESS, FOLDER, Files, Live, Options, Port, Prepared, Protection};
 
 use super::{print, stop_on_signals, tell};
 
@@ -110,16 +108,16 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
 }
 
 /// Serves until it is told to stop.
-pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
+pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
-    let folder = keys::folder().map_err(refused)?;
+    let folder = keys::folder()?;
     let open = if args.new_key {
         Keys::renew
     } else {
         Keys::open
     };
-    let keys = open(&folder).map_err(refused)?;
+    let keys = open(&folder)?;
     let control = keys.control.to_hex();
     let live = Live {
         speed: match args.speed {
@@ -149,8 +147,10 @@ pub(super) fn command(args: &ServeArgs) -> Result<ExitCode, StudyError> {
         viewer_pages: args.allow_origin.clone(),
         viewers_write: args.foxglove_write,
     };
-    // Until there a signal ends the program at once: a file that is given may be a pipe.
-    let server = Server::start_with(options, || stop.begin()).map_err(refused)?;
+    // Until here a signal ends the program at once: a file that is given may be a pipe.
+    let prepared = Prepared::new(options)?;
+    stop.begin();
+    let server = prepared.start()?;
     let url = server.url();
     let mut text = String::new();
     if server.is_look_only() {
@@ -224,13 +224,4 @@ fn tell_cut_short(failure: Option<String>, told: &mut Option<String>) {
         tell(&format!("the recording is cut short: {why}"));
     }
     *told = failure;
-}
-
-/// An error of the console as the program tells it.
-pub(super) fn refused(error: ConsoleError) -> StudyError {
-    match error {
-        ConsoleError::Sim(error) => StudyError::Sim(error),
-        ConsoleError::Config(error) => StudyError::Config(error),
-        other => StudyError::Console(other),
-    }
 }

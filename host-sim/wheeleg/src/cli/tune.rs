@@ -9,10 +9,11 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::{Drawing, end, place, stop_on_signals, whole};
 use wheeleg_report::number::or_dash;
+use wheeleg_report::results::BOARD_PARAMETERS;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::valve_resolution::COARSE;
 use wheeleg_studies::study::Settings;
-use wheeleg_studies::tune::{self, PARAMETERS, Section, Tuned};
+use wheeleg_studies::tune::{self, Section, Tuned};
 
 /// Arguments of `wheeleg tune`.
 #[derive(Debug, Args)]
@@ -122,7 +123,7 @@ fn text(tuned: &Tuned, report: &Path) -> String {
         valve.t_on_s * 1e3,
         resolution,
     );
-    let parameters = report.with_file_name(PARAMETERS);
+    let parameters = report.with_file_name(BOARD_PARAMETERS);
     for worse in &tuned.worse {
         let _ = writeln!(text, "worse          {}", worse.message());
     }

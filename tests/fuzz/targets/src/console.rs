@@ -2,8 +2,8 @@
 //! PROTOCOL.md, texts and binary messages of Foxglove's protocol. No panic; what is read is read
 //! the same again, is no larger than what came, and a command says what its sender wrote.
 
+use wheeleg_access::request::{Body, FRAME_MAX, Order, parse};
 use wheeleg_console::foxglove::{self, Request, parse_binary, parse_text};
-use wheeleg_console::request::{Body, FRAME_MAX, Order, parse};
 
 /// The first byte chooses the reader.
 pub fn run(data: &[u8]) {
@@ -33,7 +33,7 @@ fn frame(json: &[u8]) {
             assert!((1_000..=5_000_000).contains(&valid_us), "{valid_us}");
             // What a recording keeps is what was given.
             let kept = serde_json::to_string(&spoken).expect("JSON");
-            let again: wheeleg_console::request::Spoken =
+            let again: wheeleg_access::request::Spoken =
                 serde_json::from_str(&kept).expect("the same");
             let again = again.order().expect("the same");
             if !matches!(order, Order::Host(_)) {

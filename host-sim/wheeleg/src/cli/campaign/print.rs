@@ -5,12 +5,13 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use serde_json::json;
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
 use wheeleg_campaign::{
-    Cases, Cause, Causes, Merged, Ran, Replayed, Shard, State, Status, Store, Submission,
+    CAUSES, Cases, Causes, MergeForm, Merged, Ran, Replayed, ReportForm, Shard, State, Status,
+    StatusForm, Store, Submission,
 };
 use wheeleg_studies::StudyError;
+use wheeleg_studies::study::schema;
 
 /// Prints cases: place, identity, seed, and the value of each factor.
 pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError> {
@@ -83,9 +84,6 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -
     out
 }
 
-/// Causes that are told; of more there is the number.
-const CAUSES: usize = 20;
-
 /// Why cases failed, those without a result first.
 fn causes(causes: &Causes) -> String {
     let mut out = String::new();
@@ -108,6 +106,11 @@ pub(super) fn merged(merged: &Merged, table: &Path) -> String {
     let _ = writeln!(out, "hash    {}", merged.hash);
     let _ = writeln!(out, "table   {}", table.display());
     out
+}
+
+/// The same as JSON.
+pub(super) fn merged_json(merged: &Merged, table: &Path) -> String {
+    schema::indented(&MergeForm::of(merged, table))
 }
 
 /// What would be given to Slurm.
@@ -162,38 +165,7 @@ pub(super) fn state(state: &State, store: &Store) -> String {
 
 /// The same as a line of JSON.
 pub(super) fn state_json(state: &State) -> String {
-    let counts = Status::ALL.iter().zip(state.by_status);
-    let counts: serde_json::Map<String, serde_json::Value> = counts
-        .map(|(s, n)| (s.name().to_owned(), json!(n)))
-        .collect();
-    let bad = state
-        .bad
-        .iter()
-        .map(|(path, why)| json!({ "part": path, "why": why }));
-    let causes = state.causes.first(CAUSES).into_iter();
-    let causes = causes.map(|(cause, cases)| match cause {
-        Cause::NoResult { status, message } => {
-            json!({ "cause": status.name(), "message": message, "cases": cases })
-        }
-        Cause::Missed { target } => json!({ "cause": "missed", "target": target, "cases": cases }),
-        Cause::NotMeasured { target } => {
-            json!({ "cause": "not-measured", "target": target, "cases": cases })
-        }
-    });
-    let line = json!({
-        "cases": state.cases,
-        "rows": state.rows,
-        "partial": state.partial,
-        "begun": state.begun,
-        "unsaved": state.unsaved,
-        "failed": state.failed,
-        "causes": causes.collect::<Vec<_>>(),
-        "other_causes": state.causes.kinds().saturating_sub(CAUSES),
-        "status": counts,
-        "missing_blocks": state.missing,
-        "bad_parts": bad.collect::<Vec<_>>(),
-    });
-    format!("{line}\n")
+    schema::line(&StatusForm::of(state))
 }
 
 /// A case that was run again.
@@ -265,7 +237,6 @@ fn pair(p: &Paired) -> String {
 }
 
 /// The same as JSON.
-pub(super) fn findings_json(findings: &Findings, pairs: Option<&Pairs>) -> String {
-    let text = json!({ "findings": findings, "against": pairs });
-    format!("{text:#}\n")
+pub(super) fn findings_json(findings: &Findings, against: Option<&Pairs>) -> String {
+    schema::indented(&ReportForm { findings, against })
 }

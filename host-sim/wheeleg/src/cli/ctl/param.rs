@@ -9,7 +9,6 @@ use wheeleg_console::keys::CONTROL_FILE;
 use wheeleg_protocol::Node;
 use wheeleg_studies::StudyError;
 
-use super::super::serve::refused;
 use super::super::{print, whole};
 use super::reach::{Reach, not_answered};
 
@@ -53,7 +52,7 @@ fn value(text: &str) -> Result<Value, String> {
 }
 
 /// Does what is asked of a board.
-pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode, StudyError> {
+pub(super) fn command(reach: &Reach, command: &ParamCommand) -> miette::Result<ExitCode> {
     let read = |board: u8, parameter: &str| {
         let arguments = json!({ "board": board, "parameter": parameter });
         ("ReadParameter", arguments)
@@ -81,7 +80,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
         return reach.print_outcome(&end);
     }
     let key = reach.key(CONTROL_FILE)?;
-    let (code, all) = http(&reach.url(), "GET", "parameters", &key).map_err(refused)?;
+    let (code, all) = http(&reach.url(), "GET", "parameters", &key)?;
     if code != 200 {
         return Ok(not_answered(&all));
     }
@@ -94,12 +93,12 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
     if reach.json {
         let answer =
             json!({ "board": board, "parameter": parameter, "value": value, "unit": unit });
-        return print(&format!("{answer}\n"));
+        return Ok(print(&format!("{answer}\n"))?);
     }
-    print(&match unit {
+    Ok(print(&match unit {
         "1" => format!("{value}\n"),
         unit => format!("{value} {unit}\n"),
-    })
+    })?)
 }
 
 /// Value and unit of a parameter that its board has told, in the answer of `/api/v1/parameters`.

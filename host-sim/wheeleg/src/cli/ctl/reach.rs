@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
+use wheeleg_access::Key;
+use wheeleg_access::request::FRAME_MAX;
 use wheeleg_console::client::{Client, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
-use wheeleg_console::request::FRAME_MAX;
-use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint, Key};
+use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint};
 use wheeleg_master::command::CommandCode;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Stop;
 use wheeleg_studies::view::plain;
 
 use super::super::exit::{LOST, REFUSED};
-use super::super::serve::refused;
 use super::super::{print, tell, tell_error};
 
 /// What is said where the control could not be given back.
@@ -56,23 +56,23 @@ impl Reach {
     }
 
     /// The key that is given, or that of `file`.
-    pub(super) fn key(&self, file: &str) -> Result<Key, StudyError> {
+    pub(super) fn key(&self, file: &str) -> miette::Result<Key> {
         let path = match &self.key {
             Some(path) => path.clone(),
-            None => keys::folder().map_err(refused)?.join(file),
+            None => keys::folder()?.join(file),
         };
-        keys::read(&path).map_err(refused)
+        Ok(keys::read(&path)?)
     }
 
     /// A session that may drive.
-    pub(super) fn control(&self) -> Result<Client, StudyError> {
+    pub(super) fn control(&self) -> miette::Result<Client> {
         let key = self.key(CONTROL_FILE)?;
-        Client::connect(&self.url(), "control", "ctl", &key).map_err(refused)
+        Ok(Client::connect(&self.url(), "control", "ctl", &key)?)
     }
 
     /// Takes the control, gives commands up to the first that is not done, and releases the control;
     /// how the last one ended.
-    pub(super) fn in_control(&self, commands: &[(&str, Value)]) -> Result<Outcome, StudyError> {
+    pub(super) fn in_control(&self, commands: &[(&str, Value)]) -> miette::Result<Outcome> {
         let ended = self.in_control_unless(commands, &Stop::default())?;
         Ok(ended.unwrap_or(Outcome::Unknown))
     }
@@ -83,13 +83,13 @@ impl Reach {
         &self,
         commands: &[(&str, Value)],
         stop: &Stop,
-    ) -> Result<Option<Outcome>, StudyError> {
+    ) -> miette::Result<Option<Outcome>> {
         for (name, arguments) in commands {
             ensure_fits(name, arguments)?;
         }
         let mut client = self.control()?;
         let taken = client.carry_out("TakeControl", &json!({}), VALID_MS);
-        let mut end = taken.map_err(refused)?;
+        let mut end = taken?;
         client.keep_control(true);
         if end != Outcome::Done {
             return Ok(Some(end));
@@ -97,7 +97,7 @@ impl Reach {
         // From here on a signal has to leave the robot at rest.
         stop.begin();
         for (name, arguments) in commands {
-            let n = client.give(name, arguments, VALID_MS).map_err(refused)?;
+            let n = client.give(name, arguments, VALID_MS)?;
             match client.outcome_unless(n, &|| stop.is_asked()) {
                 Some(ended) => end = ended,
                 None => {
@@ -111,7 +111,7 @@ impl Reach {
         }
         if end != Outcome::Lost {
             let released = client.carry_out("ReleaseControl", &json!({}), VALID_MS);
-            if released.map_err(refused)? != Outcome::Done {
+            if released? != Outcome::Done {
                 tell(NOT_RELEASED);
             }
         }
@@ -119,14 +119,14 @@ impl Reach {
     }
 
     /// Gives a command to the simulation; how it ended.
-    pub(super) fn give(&self, name: &str, arguments: &Value) -> Result<Outcome, StudyError> {
+    pub(super) fn give(&self, name: &str, arguments: &Value) -> miette::Result<Outcome> {
         ensure_fits(name, arguments)?;
         let mut client = self.control()?;
-        client.carry_out(name, arguments, VALID_MS).map_err(refused)
+        Ok(client.carry_out(name, arguments, VALID_MS)?)
     }
 
     /// Prints how a request ended; its exit code.
-    pub(super) fn print_outcome(&self, end: &Outcome) -> Result<ExitCode, StudyError> {
+    pub(super) fn print_outcome(&self, end: &Outcome) -> miette::Result<ExitCode> {
         let (status, code, reason, text) = match end {
             Outcome::Done => ("done", 0, "", ""),
             Outcome::Refused { reason, text } => {
@@ -154,15 +154,12 @@ impl Reach {
 
 /// Ends what the command `name` has begun, and releases the control: a walk with both feet down,
 /// anything else where it is.
-fn bring_to_rest(client: &mut Client, name: &str) -> Result<(), StudyError> {
+fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
     let is_gait = matches!(
         CommandCode::of_name(name),
         Some(CommandCode::Walk | CommandCode::StartGait)
     );
-    let mut give = |name: &str| {
-        let end = client.carry_out(name, &json!({}), VALID_MS);
-        end.map_err(refused)
-    };
+    let mut give = |name: &str| client.carry_out(name, &json!({}), VALID_MS);
     if !is_gait || give("StopGait")? != Outcome::Done {
         // Refused where nothing is armed: then nothing moves.
         give("Hold")?;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
-use wheeleg_console::Key as AccessKey;
+use wheeleg_access::Key as AccessKey;
 use wheeleg_console::client::{Client, Incoming};
 use wheeleg_sim::unmeasured;
 use wheeleg_studies::StudyError;
@@ -13,7 +13,6 @@ use wheeleg_studies::study::Suspend;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
 
-use super::super::serve::refused;
 use super::super::{no_handler, stop_on_signals};
 use super::reach::{Reach, ended};
 use super::sample;
@@ -56,7 +55,7 @@ struct Seen {
 }
 
 /// Draws until somebody leaves, or the connection ends.
-pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError> {
+pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
     let mut client = connect(reach, key)?;
     let stop = stop_on_signals()?;
     let suspend = Suspend::on_signals().map_err(|e| no_handler(&e))?;
@@ -66,7 +65,8 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
         return Err(StudyError::refused(
             "`ctl top` needs a terminal with cursor control",
             "use `wheeleg ctl watch`, or `wheeleg ctl status`",
-        ));
+        )
+        .into());
     };
     let mut seen = Seen::default();
     let (mut heard, mut drawn) = (Instant::now(), None::<Instant>);
@@ -135,8 +135,8 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> Result<ExitCode, StudyError
 }
 
 /// A client that looks at what is drawn.
-fn connect(reach: &Reach, key: &AccessKey) -> Result<Client, StudyError> {
-    let mut client = Client::connect(&reach.url(), "view", "top", key).map_err(refused)?;
+fn connect(reach: &Reach, key: &AccessKey) -> miette::Result<Client> {
+    let mut client = Client::connect(&reach.url(), "view", "top", key)?;
     let topics = (1..=6).map(|n| format!("/joint/{n}"));
     let others = WHEELS
         .iter()
@@ -144,7 +144,7 @@ fn connect(reach: &Reach, key: &AccessKey) -> Result<Client, StudyError> {
         .map(|(topic, _)| (*topic).to_owned());
     let topics: Vec<String> = topics.chain(others).collect();
     let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
-    client.send(frame).map_err(refused)?;
+    client.send(frame)?;
     Ok(client)
 }
 

@@ -8,13 +8,13 @@ use wheeleg_master::command::{Command, CommandCode, TABLE};
 use wheeleg_telemetry::channel_index;
 
 use crate::arguments::{self, meant};
-use crate::catalogue::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
+use crate::host::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
 use crate::reason::Reason;
 
 /// Largest frame of a client, MAC included.
 pub const FRAME_MAX: usize = 4096;
 /// Fastest subscription, Hz.
-pub(crate) const HZ_MAX: u64 = 50;
+const HZ_MAX: u64 = 50;
 /// Longest life of a command, ms.
 const VALID_MAX_MS: u64 = 1_000;
 /// Longest life of a command about parameters, ms.

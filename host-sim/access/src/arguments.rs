@@ -3,7 +3,7 @@
 
 use fixed::types::I16F16;
 use serde_json::{Map, Value as Json};
-use wheeleg_config::{Dimension, allowed_raw, allowed_values, closest, pretty};
+use wheeleg_config::{Dimension, allowed_raw, allowed_values, argument_dimension, closest, pretty};
 use wheeleg_master::argument::{self, Argument, ArgumentKind, Value};
 use wheeleg_master::command::{Command, CommandCode, CommandInfo, Given};
 use wheeleg_protocol::Node;
@@ -46,7 +46,8 @@ pub(crate) fn meant<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) ->
 }
 
 /// The raw number of a value that a parameter may have.
-pub(crate) fn raw(info: &ParamInfo, json: &Json) -> Option<i32> {
+#[must_use]
+pub fn raw(info: &ParamInfo, json: &Json) -> Option<i32> {
     match (json, info.format) {
         (Json::Bool(flag), Format::Flag) => allowed_raw(info, f64::from(u8::from(*flag))),
         (Json::Number(number), _) => allowed_raw(info, number.as_f64()?),
@@ -144,14 +145,10 @@ fn without_unit(kind: ArgumentKind, text: &str) -> Option<String> {
     if unit.is_empty() || unit == kind.unit() {
         return Some(number.to_owned());
     }
-    let dimension = match kind {
-        ArgumentKind::Length(_) => Dimension::Length,
-        ArgumentKind::Velocity(_) => Dimension::Velocity,
-        ArgumentKind::Acceleration(_) => Dimension::Acceleration,
-        ArgumentKind::Rate(_) => Dimension::AngularVelocity,
-        ArgumentKind::Time(_) => Dimension::Time,
-        _ => return None,
-    };
+    let dimension = argument_dimension(kind);
+    if matches!(dimension, Dimension::Flag | Dimension::Count) {
+        return None;
+    }
     let factor = dimension.factor(unit)? / dimension.factor(kind.unit())?;
     Some(pretty(value * factor))
 }

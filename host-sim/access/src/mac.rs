@@ -9,7 +9,7 @@ use subtle::ConstantTimeEq as _;
 use crate::hex;
 
 /// Bytes of the code before a client frame.
-pub(crate) const FRAME_MAC: usize = 16;
+const FRAME_MAC: usize = 16;
 
 /// A secret of 32 bytes, which no log shows.
 #[derive(Clone)]
@@ -35,7 +35,7 @@ impl Key {
     }
 
     /// Whether `bytes` are this key, in a time that does not tell where they differ.
-    pub(crate) fn is(&self, bytes: &[u8; 32]) -> bool {
+    pub fn is(&self, bytes: &[u8; 32]) -> bool {
         self.0.ct_eq(bytes).into()
     }
 
@@ -66,7 +66,7 @@ impl Key {
     }
 
     /// The JSON of a client frame, if its code is right; this is the session's key.
-    pub(crate) fn open<'a>(&self, frame: &'a [u8]) -> Option<&'a [u8]> {
+    pub fn open<'a>(&self, frame: &'a [u8]) -> Option<&'a [u8]> {
         let (mac, json) = frame.split_at_checked(FRAME_MAC)?;
         self.mac(&[b"f1", json]).verify_truncated_left(mac).ok()?;
         Some(json)
@@ -75,21 +75,21 @@ impl Key {
 
 /// What both sides of a handshake must have seen alike.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Transcript<'a> {
+pub struct Transcript<'a> {
     /// Nonce of the server.
-    pub(crate) nonce_s: &'a [u8; 32],
+    pub nonce_s: &'a [u8; 32],
     /// Nonce of the client.
-    pub(crate) nonce_c: &'a [u8; 32],
+    pub nonce_c: &'a [u8; 32],
     /// Role that is asked for.
-    pub(crate) role: &'a str,
+    pub role: &'a str,
     /// Name of the client.
-    pub(crate) name: &'a str,
+    pub name: &'a str,
     /// `Host` that the client speaks to.
-    pub(crate) host: &'a str,
+    pub host: &'a str,
     /// Hash of the channels.
-    pub(crate) layout: &'a str,
+    pub layout: &'a str,
     /// Hash of the commands.
-    pub(crate) commands: &'a str,
+    pub commands: &'a str,
 }
 
 impl Transcript<'_> {
@@ -107,29 +107,29 @@ impl Transcript<'_> {
     }
 
     /// Proof of the client that it has the key.
-    pub(crate) fn of_client(&self, key: &Key) -> [u8; 32] {
+    pub fn of_client(&self, key: &Key) -> [u8; 32] {
         key.mac(&self.fields(b"c1")).finalize().into_bytes().into()
     }
 
     /// Whether `mac` is the client's proof.
-    pub(crate) fn is_client(&self, key: &Key, mac: &[u8; 32]) -> bool {
+    pub fn is_client(&self, key: &Key, mac: &[u8; 32]) -> bool {
         key.mac(&self.fields(b"c1")).verify_slice(mac).is_ok()
     }
 
     /// Proof of the server that it has the key.
-    pub(crate) fn of_server(&self, key: &Key, session: &str) -> [u8; 32] {
+    pub fn of_server(&self, key: &Key, session: &str) -> [u8; 32] {
         let fields = [&self.fields(b"s1")[..], &[session.as_bytes()]].concat();
         key.mac(&fields).finalize().into_bytes().into()
     }
 
     /// Whether `mac` is the server's proof.
-    pub(crate) fn is_server(&self, key: &Key, session: &str, mac: &[u8; 32]) -> bool {
+    pub fn is_server(&self, key: &Key, session: &str, mac: &[u8; 32]) -> bool {
         let fields = [&self.fields(b"s1")[..], &[session.as_bytes()]].concat();
         key.mac(&fields).verify_slice(mac).is_ok()
     }
 
     /// The key of the session.
-    pub(crate) fn session_key(&self, key: &Key) -> Key {
+    pub fn session_key(&self, key: &Key) -> Key {
         let fields: [&[u8]; 3] = [b"k1", self.nonce_s, self.nonce_c];
         Key(key.mac(&fields).finalize().into_bytes().into())
     }

@@ -97,7 +97,7 @@ mod tests {
     /// The table of the contract has all reasons of the server, and names none that it has not.
     #[test]
     fn the_contract_lists_the_reasons() {
-        let contract = include_str!("../PROTOCOL.md");
+        let contract = include_str!("../../console/PROTOCOL.md");
         let (_, table) = contract.split_once("| `reason` | |\n").expect("the table");
         let rows = table.lines().take_while(|line| line.starts_with('|'));
         let mut listed: BTreeSet<&str> = BTreeSet::new();

@@ -9,13 +9,15 @@ const BURST: f64 = 200.0;
 
 /// A bucket of tokens.
 #[derive(Debug, Clone)]
-pub(crate) struct Bucket {
+pub struct Bucket {
     tokens: f64,
     filled: Instant,
 }
 
 impl Bucket {
-    pub(crate) fn new(now: Instant) -> Self {
+    /// A full bucket.
+    #[must_use]
+    pub fn new(now: Instant) -> Self {
         Self {
             tokens: BURST,
             filled: now,
@@ -23,7 +25,7 @@ impl Bucket {
     }
 
     /// Takes a token, if there is one.
-    pub(crate) fn take(&mut self, now: Instant) -> bool {
+    pub fn take(&mut self, now: Instant) -> bool {
         let passed = now.saturating_duration_since(self.filled).as_secs_f64();
         self.filled = now;
         self.tokens = (self.tokens + PER_S * passed).min(BURST);
