@@ -48,9 +48,11 @@ mod tls;
 pub mod unpack;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::{HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list};
+pub use catalogue::{
+    HOLD_S, HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list,
+};
 pub use error::ConsoleError;
-pub use live::{Live, Port};
+pub use live::{Live, Port, SlowAdapter};
 pub use mac::Key;
 pub use record::{FOLDER, Summary};
 pub use server::{ADDRESS, Options, Protection, Server};

@@ -216,10 +216,9 @@ impl Server {
             &live.scenario,
             &live.scenario_toml,
         )?;
-        let about = About {
-            // Nobody can give real boards the same once more.
-            repeatable: live.port.is_none(),
-            ..about
+        let about = match live.port {
+            Some(_) => about.of_boards(),
+            None => about,
         };
         let (contact_sink, contacts) = foxglove::contacts();
         let viewers = Viewers::new(about.scene.clone(), &live.robot.node, contacts);
@@ -509,7 +508,7 @@ mod tests {
         let taken = driver.carry_out("TakeControl", &json!({}), 1_000);
         assert_eq!(taken.expect("sent"), Outcome::Done);
         driver.keep_control(true);
-        let outcome = other.carry_out("Revoke", &json!({}), 1_000);
+        let outcome = other.carry_out("Revoke", &json!({ "hold": 2 }), 1_000);
         let end = Instant::now() + Duration::from_millis(500);
         let is_lost = loop {
             match driver.read() {
