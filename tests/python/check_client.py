@@ -4,7 +4,8 @@
 
 Every channel is read; a robot is armed, moved and recorded; what is wrong is refused by name; a viewer may
 look and stop; a program whose connection is cut loses the control. On a terminal `ctl top` shows the robot and stops it, and
-leaves the terminal as it was, also while it is suspended; `ctl revoke` takes the control away, also while the clock stands.
+leaves the terminal as it was, also while it is suspended; tables fit it. `ctl revoke` takes the control away, also while the
+clock stands.
 """
 
 import contextlib
@@ -196,13 +197,20 @@ def top(command, environment, robot):
 
 
 def revoke(command, environment, robot):
-    """Who is in control is so no more."""
-    asks = lambda: subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+    """Who is in control is so no more, and whoever revoked takes it with another command."""
+    environment = {**os.environ, **environment}
+    ctl = lambda *words: subprocess.run([*command, *words], env=environment, capture_output=True, text=True)
+    asks = lambda: ctl("revoke", "--hold", "5")
     with robot.control():
         robot.command("Arm")
         done = asks()
         assert done.returncode == 0 and "no longer in control" in done.stderr, done
         robot.until(lambda state: state["hold"] == "operator_lost", 5)
+        robot.until(lambda state: (state["reserved_for"] or {}).get("name") == "the robot's computer", 3)
+        refused("control_held", lambda: robot.command("TakeControl"))
+        done = ctl("take", "--", "ClearFault")
+        assert done.returncode == 0, done
+    robot.until(lambda state: state["reserved_for"] is None and state["control"] is None, 10)
     done = asks()
     assert done.returncode == 0 and "nobody is in control" in done.stderr, done
     # Nor is it kept by a clock that stands.
@@ -210,9 +218,25 @@ def revoke(command, environment, robot):
         robot.command("Pause")
         done = asks()
         assert done.returncode == 0 and "no longer in control" in done.stderr and "ctl resume" in done.stderr, done
-        assert robot.state()["control"]["ended"] == "revoked", robot.state()
+        robot.until(lambda state: (state["control"] or {}).get("ended") == "revoked", 3)
         robot.command("Resume")
-        robot.until(lambda state: state["control"] is None, 5)
+        robot.until(lambda state: state["reserved_for"] is None and state["control"] is None, 15)
+
+
+def tables(program, address, environment):
+    """On a terminal the lines of tables fit its width, and nothing is left out; a pipe gets them whole."""
+    longest = 0
+    lists = (["list"], ["commands"], ["channels"], ["faults", "list"], ["faults", "rows"], ["params"])
+    for words in (*lists, ["ctl", "--url", address, "status"]):
+        terminal = Terminal([program, *words], **environment)
+        assert terminal.end() == 0, words
+        lines = terminal.text.split("\r\n")
+        assert max(map(len, lines)) <= 100, (words, max(lines, key=len))
+        piped = subprocess.run([program, *words], env={**os.environ, **environment}, capture_output=True, text=True)
+        longest = max(longest, *map(len, piped.stdout.splitlines()))
+        # The state has the time in it.
+        assert words in lists and terminal.text.split() == piped.stdout.split() or "ctl" in words, words
+    assert longest > 100, longest
 
 
 def at_the_robot(program):
@@ -222,10 +246,11 @@ def at_the_robot(program):
         command = [program, "ctl", "--url", address]
         with Robot(address, keys["control"]) as robot:
             robot.until(lambda state: state["ready"])
-            revoke([*command, "revoke"], environment, robot)
+            revoke(command, environment, robot)
             with robot.control():
                 robot.command("ClearFault")
                 robot.command("Arm")
+            tables(program, address, environment)
             top([*command, "top"], environment, robot)
 
 

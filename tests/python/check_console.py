@@ -41,6 +41,11 @@ READY_S = 90
 # Longest time for which a button is held until the robot moves: a busy machine simulates slower than real time.
 HELD_S = 15
 
+# What is pressed on a tablet is at least so high, px.
+SMALL = """() => [...document.querySelectorAll('button, select, input, summary')]
+    .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < 44)
+    .map((one) => `${one.textContent.trim() || one.getAttribute('aria-label')}: ${one.getBoundingClientRect().height} px`)"""
+
 problems = []
 # What the browser reports by itself. It counts, whatever became of the step in which it came.
 reported = []
@@ -59,8 +64,9 @@ class Console:
         self.recordings = home / "recordings"
         arguments = [program, "serve", scenario, "--listen", listen, "--recordings", str(self.recordings), *options]
         self.process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True)
-        first = self.process.stdout.readline()
-        self.address = first.split()[1].rstrip("/")
+        # Before its address it may say that it is not protected.
+        words = next(line.split() for line in self.process.stdout if line.startswith("open "))
+        self.address = words[1].rstrip("/")
         folder = home / "wheeleg"
         self.keys = {name: (folder / f"{name}.key").read_text().strip() for name in ("control", "view")}
 
@@ -569,6 +575,8 @@ def journey(browser, console, folder):
     expect(waits(page, "State", ["disarmed"]), f"at first: {cell(page, 'State')}")
     records(page, True)
     expect(becomes_ready(page), f"Ready: {page.inner_text('.answer')!r}")
+    told = page.inner_text(".answer")
+    expect(re.search(r"Stand: done\s+0x0201, layer 1", told), f"code and layer of a command: {told!r}")
     page_hangs(page)
     with Robot(console.address, console.keys["view"], role="view") as robot:
         undisturbed(page, robot, slider)
@@ -701,6 +709,9 @@ def looks(page, folder, axe):
             hit = box["width"] >= 96 and box["height"] >= 56
             seen = box["y"] >= 0 and box["y"] + box["height"] <= height and box["x"] + box["width"] <= width
             expect(hit and seen, f"{name}: STOP is at {box}")
+            if width <= 1024:
+                small = page.evaluate(SMALL)
+                expect(not small, f"{name}: too small for a finger: {small[:5]}")
             page.screenshot(path=folder / f"{name}.png")
             page.screenshot(path=folder / f"{name}-whole.png", full_page=True)
             for finding in findings(page, axe):

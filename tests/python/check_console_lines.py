@@ -5,7 +5,7 @@
 A second browser is refused, is handed the control over and gives it back, and may stop. A line that goes dead in mid-walk, a page that freezes and one that is hidden
 lose the robot, which holds and says whose it was; when they are back they move nothing. What comes late over a slow
 line is marked as old. A server that is gone is told, and one that is there again moves nothing. Real boards are
-shown without what they do not tell.
+shown without what they do not tell. Over plain HTTP the page looks and stops.
 """
 
 import contextlib
@@ -75,6 +75,23 @@ def recovers(page):
     expect(becomes_ready(page), f"does not recover: {page.inner_text('.answer')!r}")
 
 
+def macs(page):
+    """The page's own HMAC-SHA256 is the browser's, of data of any length."""
+    differs = page.evaluate("""async () => {
+        const { hmac } = await import("/mac.js");
+        const key = Uint8Array.from({ length: 32 }, (_, i) => 7 * i + 3);
+        const theirs = await crypto.subtle.importKey("raw", key, { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
+        const differs = [];
+        for (let length = 0; length < 300; length += 1) {
+            const data = Uint8Array.from({ length }, (_, i) => 31 * i + length);
+            const wanted = new Uint8Array(await crypto.subtle.sign("HMAC", theirs, data));
+            if (hmac(key, data).join() !== wanted.join()) differs.push(length);
+        }
+        return differs;
+    }""")
+    expect(differs == [], f"MACs differ from the browser's at lengths {differs[:9]}")
+
+
 def second_browser(browser, console, first, robot):
     second = opened(browser, console, f"#k={console.keys['control']}")
     second.wait_for_selector(".joint")
@@ -100,7 +117,7 @@ def second_browser(browser, console, first, robot):
 def hands_over(first, second, robot):
     """Who is in control gives it to who has asked, and gets it back; neither is disturbed."""
     for giver, taker in ((first, second), (second, first)):
-        kept = False
+        reserved = False
         for _ in range(check_console.ATTEMPTS):
             giver.bring_to_front()
             if cell(giver, "Control") != "you":
@@ -111,12 +128,12 @@ def hands_over(first, second, robot):
                 give.wait_for(timeout=3000)
                 give.click(timeout=1000)
                 taker.wait_for_function("() => document.querySelector('.answer').textContent.includes('to you')", timeout=2000)
-            kept |= waits(taker, "Control", ["kept for you"], 0.3)
+            reserved |= waits(taker, "Control", ["reserved for you"], 0.3)
             taker.bring_to_front()
             taker.locator(".buttons button", has_text="Take control").dispatch_event("click")
             if waits(taker, "Control", ["you"], 3):
                 break
-        expect(kept, "the page does not show for whom control is kept")
+        expect(reserved, "the page does not show for whom control is reserved")
         expect(cell(taker, "Control") == "you", f"handed over: {taker.inner_text('.answer')!r}")
     expect(robot.state()["control"]["holder"] == "browser", "nobody is in control after a hand-over")
 
@@ -230,6 +247,41 @@ def real_boards(program, browser, home, folder):
         boards.wait()
 
 
+def plain_http(program, playwright, home, folder):
+    """Over plain HTTP from elsewhere a browser has no cryptography: the page looks and stops, says that it is not protected, and
+    sends no key."""
+    # A name that no browser takes for this computer.
+    rules = "--host-resolver-rules=MAP robot.test 127.0.0.1"
+    browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=[*FLAGS, rules])
+    console = Console(program, home, "0.0.0.0:0", "--name", "robot.test", "--plain-http")
+    sent = []
+    try:
+        expect(console.address.startswith("http://robot.test:"), f"served at {console.address}")
+        watched = lambda page: page.on("request", lambda request: sent.append(f"{request.url} {request.headers}"))
+        page = opened(browser, console, f"#v={console.keys['view']}", prepare=watched)
+        page.wait_for_selector(".joint")
+        expect(not page.evaluate("isSecureContext"), "the browser takes plain HTTP for secure")
+        expect(waits(page, "State", ["disarmed"]), f"over plain HTTP: {cell(page, 'State')}")
+        expect("Not protected" in page.inner_text("body"), "over plain HTTP the page does not say that it is not protected")
+        expect(page.locator(".buttons .btn:not([disabled])").count() == 0, "over plain HTTP buttons can be pressed")
+        page.screenshot(path=folder / "plain-http.png")
+        page.click(".stop")
+        expect(waits(page, "State", ["STOPPED"]), "over plain HTTP nobody can stop")
+        expect(page.locator(".banner.alarm").is_hidden(), "over plain HTTP a stop is not confirmed")
+        page.context.close()
+        page = opened(browser, console, f"#k={console.keys['control']}", prepare=watched)
+        page.wait_for_selector("[role=alert].alone")
+        expect("plain HTTP" in page.inner_text("body"), f"driving over plain HTTP: {page.inner_text('body')!r}")
+        page.context.close()
+        keys = [console.keys[name] for name in ("control", "view")]
+        expect(sent and not any(key in text for key in keys for text in sent), f"a key is sent: {sent}")
+        # The browser tells that a header of ours counts over HTTPS alone.
+        reported[:] = [line for line in reported if "Cross-Origin-Opener-Policy" not in line]
+    finally:
+        console.end()
+        browser.close()
+
+
 def main(program, folder, _axe=None):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -246,6 +298,7 @@ def main(program, folder, _axe=None):
                 page.wait_for_selector(".joint")
                 robot.until(lambda state: state["ready"])
                 recovers(page)
+                macs(page)
                 tried(page, folder, "second browser", second_browser, browser, console, page, robot)
                 for what, act in [
                     ("dead line", lambda: dead_line(page, robot, relay)),
@@ -261,6 +314,7 @@ def main(program, folder, _axe=None):
                 console = again or console
             console.end()
             tried(page, folder, "real boards", real_boards, program, browser, home, folder)
+            tried(page, folder, "plain HTTP", plain_http, program, playwright, home, folder)
         finally:
             console.end()
             browser.close()

@@ -53,12 +53,12 @@ def cursors(page):
     )
 
 
-def looks(browser, report, folder, axe):
+def looks(browser, report, folder, axe, shown=".plot-area canvas"):
     for width, height in SIZES:
         for scheme in ["light", "dark"]:
             page = opened(browser, report, width, height, scheme)
             name = f"{width}-{scheme}"
-            page.wait_for_selector(".plot-area canvas")
+            page.wait_for_selector(shown)
             wide = page.evaluate("document.documentElement.scrollWidth")
             expect(wide <= width, f"{name}: {wide} px wide")
             verdict = page.locator("h1").bounding_box()

@@ -78,6 +78,14 @@ pub(crate) fn lines() -> StepResult<String> {
     last_line(&mut console("tests/python/check_console_lines.py")?)
 }
 
+/// The reports of all studies.
+pub(crate) fn pages() -> StepResult<String> {
+    ensure_chromium()?;
+    let mut python = of_program("tests/python/check_pages.py")?;
+    python.arg(target_dir().join("page-shots")).arg(axe()?);
+    last_line(&mut python)
+}
+
 /// The memory of a page that is open for a day's work.
 pub(crate) fn page_hours() -> StepResult<String> {
     last_line(&mut console("tests/python/check_page_hours.py")?)

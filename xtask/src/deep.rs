@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 23] = [
+const CHECKS: [Check; 24] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -118,6 +118,12 @@ const CHECKS: [Check; 23] = [
         "the console's page whose line, server or view is gone, on an otherwise idle machine",
         5,
         browser::lines,
+    ),
+    Check(
+        "pages",
+        "the reports of all studies in a browser, at three sizes, without scripts and on paper",
+        5,
+        browser::pages,
     ),
     Check(
         "live-hour",

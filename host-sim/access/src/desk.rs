@@ -57,38 +57,82 @@ pub enum Denied {
     Revoked,
 }
 
-/// Time in which the control is kept for one client; then it is free.
-pub const KEPT: Duration = Duration::from_secs(2);
+/// Time for which the control is reserved for one client; then it is free.
+pub const RESERVED: Duration = Duration::from_secs(2);
 
-/// For whom the control is kept.
-#[derive(Debug)]
-pub struct Heir {
+/// Who asks.
+#[derive(Debug, Clone, Copy)]
+pub struct Asker<'a> {
     /// Which client.
     pub client: ClientId,
     /// Its name.
-    pub name: String,
+    pub name: &'a str,
     /// Its session.
-    pub session: String,
-    /// None while somebody's lease is not over.
-    until: Option<Instant>,
+    pub session: &'a str,
+    /// It is on the robot's own computer.
+    pub is_local: bool,
+}
+
+/// For whom the control is reserved.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Heir {
+    /// For the client to which it was handed over.
+    Client {
+        /// Which client.
+        client: ClientId,
+        /// Its name.
+        name: String,
+        /// Its session.
+        session: String,
+    },
+    /// For the clients on the robot's own computer, where it was revoked.
+    RobotsComputer {
+        /// The one that was in control.
+        except: ClientId,
+    },
 }
 
 impl Heir {
-    fn new(client: ClientId, (name, session): (&str, &str), until: Option<Instant>) -> Self {
-        Self {
-            client,
-            name: name.to_owned(),
-            session: session.to_owned(),
-            until,
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Client { name, .. } => name,
+            Self::RobotsComputer { .. } => "the robot's computer",
         }
     }
+
+    /// Its session; none of several clients.
+    #[must_use]
+    pub fn session(&self) -> Option<&str> {
+        match self {
+            Self::Client { session, .. } => Some(session),
+            Self::RobotsComputer { .. } => None,
+        }
+    }
+
+    fn is(&self, asker: &Asker<'_>) -> bool {
+        match self {
+            Self::Client { client, .. } => *client == asker.client,
+            Self::RobotsComputer { except } => asker.is_local && asker.client != *except,
+        }
+    }
+}
+
+/// A reservation, and how long it lasts.
+#[derive(Debug)]
+struct Reserved {
+    heir: Heir,
+    lasts: Duration,
+    /// None while somebody's lease is not over.
+    until: Option<Instant>,
 }
 
 /// The place of the one who drives.
 #[derive(Debug, Default)]
 pub struct Desk {
     holder: Option<Holder>,
-    heir: Option<Heir>,
+    reserved: Option<Reserved>,
 }
 
 impl Desk {
@@ -98,17 +142,18 @@ impl Desk {
         self.holder.as_ref()
     }
 
-    /// Name of the client that has the control, or for which it is kept.
+    /// Name of the client that has the control, or of whoever it is reserved for.
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         let holder = self.holder.as_ref().map(|holder| &*holder.name);
-        holder.or_else(|| Some(&*self.heir.as_ref()?.name))
+        holder.or_else(|| Some(self.reserved.as_ref()?.heir.name()))
     }
 
-    /// For whom the control is kept: for this client alone it is free.
+    /// For whom the control is reserved: for them alone it is free.
     #[must_use]
     pub fn heir(&self) -> Option<&Heir> {
-        self.heir.as_ref().filter(|_| self.holder.is_none())
+        let reserved = self.reserved.as_ref().filter(|_| self.holder.is_none());
+        reserved.map(|reserved| &reserved.heir)
     }
 
     /// Whether this client holds the control, or has asked for it, and is not at its end.
@@ -128,29 +173,24 @@ impl Desk {
     /// A client wants to give a command, or to take the control: then it has asked for it.
     ///
     /// # Errors
-    /// [`Denied`] if another holds it, if it is kept for another, or if the client does not hold it, or
-    /// no longer.
-    pub fn ask(
-        &mut self,
-        client: ClientId,
-        (name, session): (&str, &str),
-        takes: bool,
-    ) -> Result<(), Denied> {
-        let heir = self.heir.as_ref();
-        let kept = heir.is_some_and(|heir| heir.client != client);
+    /// [`Denied`] if another holds it, if it is reserved for another, or if the client does not hold it,
+    /// or no longer.
+    pub fn ask(&mut self, asker: Asker<'_>, takes: bool) -> Result<(), Denied> {
+        let reserved = self.reserved.as_ref();
+        let for_others = reserved.is_some_and(|reserved| !reserved.heir.is(&asker));
         match &self.holder {
-            Some(holder) if holder.client == client => match holder.ended {
+            Some(holder) if holder.client == asker.client => match holder.ended {
                 None => Ok(()),
                 Some(Ended::Revoked) => Err(Denied::Revoked),
                 Some(Ended::Gone) => Err(Denied::NotInControl),
             },
             Some(_) if takes => Err(Denied::Held),
-            None if takes && kept => Err(Denied::Held),
+            None if takes && for_others => Err(Denied::Held),
             None if takes => {
                 self.holder = Some(Holder {
-                    client,
-                    name: name.to_owned(),
-                    session: session.to_owned(),
+                    client: asker.client,
+                    name: asker.name.to_owned(),
+                    session: asker.session.to_owned(),
                     granted_us: None,
                     ended: None,
                 });
@@ -168,7 +208,7 @@ impl Desk {
         };
         holder.granted_us.get_or_insert(time_us);
         let holds = holder.ended.is_none();
-        self.heir.take_if(|_| holds);
+        self.reserved.take_if(|_| holds);
         holds
     }
 
@@ -183,34 +223,59 @@ impl Desk {
         self.holder.take_if(|h| h.client == client);
     }
 
-    /// A client has released it for another, which has [`KEPT`] from `now` on to take it.
+    /// A client has released it for another, which has [`RESERVED`] from `now` on to take it.
     pub fn hand_over(&mut self, client: ClientId, to: ClientId, who: (&str, &str), now: Instant) {
         self.release(client);
-        self.heir = Some(Heir::new(to, who, Some(now + KEPT)));
+        let (name, session) = who;
+        self.reserved = Some(Reserved {
+            heir: Heir::Client {
+                client: to,
+                name: name.to_owned(),
+                session: session.to_owned(),
+            },
+            lasts: RESERVED,
+            until: Some(now + RESERVED),
+        });
     }
 
     /// Who holds the control, or has asked for it, does so no longer, and is returned. Its lease ends
-    /// without it; from then on whoever revoked has [`KEPT`] to take the control.
-    pub fn revoke(&mut self, by: ClientId, who: (&str, &str)) -> Option<&Holder> {
+    /// without it; from then on the clients on the robot's own computer have so much time to take the
+    /// control. A command line ends with each of its commands, so it is not reserved for one of them.
+    pub fn revoke(&mut self, lasts: Duration) -> Option<&Holder> {
         let holder = self.holder.as_mut()?;
         holder.ended = Some(Ended::Revoked);
-        self.heir = Some(Heir::new(by, who, None));
+        self.reserved = Some(Reserved {
+            heir: Heir::RobotsComputer {
+                except: holder.client,
+            },
+            lasts,
+            until: None,
+        });
         Some(&*holder)
     }
 
-    /// It is `now`: what was kept for too long is free.
+    /// It is `now`: what was reserved for too long is free.
     pub fn free(&mut self, now: Instant) {
-        if let (Some(heir), None) = (&mut self.heir, &self.holder) {
-            heir.until.get_or_insert(now + KEPT);
+        if let (Some(reserved), None) = (&mut self.reserved, &self.holder) {
+            reserved.until.get_or_insert(now + reserved.lasts);
         }
-        self.heir
-            .take_if(|heir| heir.until.is_some_and(|until| now >= until));
+        self.reserved
+            .take_if(|reserved| reserved.until.is_some_and(|until| now >= until));
     }
 
-    /// A client is gone: nothing is kept for it, and it commands nothing. Its lease ends with its
+    /// How long the control is still reserved.
+    #[must_use]
+    pub fn reserved_for(&self, now: Instant) -> Duration {
+        let until = self.reserved.as_ref().and_then(|reserved| reserved.until);
+        until.map_or(Duration::ZERO, |until| until.saturating_duration_since(now))
+    }
+
+    /// A client is gone: nothing is reserved for it, and it commands nothing. Its lease ends with its
     /// beats, at the master.
     pub fn leave(&mut self, client: ClientId) {
-        self.heir.take_if(|heir| heir.client == client);
+        self.reserved.take_if(
+            |reserved| matches!(reserved.heir, Heir::Client { client: heir, .. } if heir == client),
+        );
         if let Some(holder) = self.holder.as_mut().filter(|h| h.client == client) {
             holder.ended.get_or_insert(Ended::Gone);
         }
@@ -227,17 +292,30 @@ impl Desk {
 mod tests {
     use super::*;
 
-    const A: (&str, &str) = ("a", "1");
     const B: (&str, &str) = ("b", "2");
+
+    /// A client, on another computer; those from [`LOCAL`] on are on the robot's own.
+    fn client(client: ClientId) -> Asker<'static> {
+        const NAMES: [&str; 5] = ["", "a", "b", "c", "d"];
+        let name = NAMES[client as usize];
+        Asker {
+            client,
+            name,
+            session: name,
+            is_local: client >= LOCAL,
+        }
+    }
+
+    const LOCAL: ClientId = 3;
 
     #[test]
     fn one_drives_until_it_releases_or_the_master_says_that_it_is_gone() {
         let mut desk = Desk::default();
-        assert_eq!(desk.ask(1, A, false), Err(Denied::NotInControl));
-        assert_eq!(desk.ask(1, A, true), Ok(()));
+        assert_eq!(desk.ask(client(1), false), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(client(1), true), Ok(()));
         // Asked for, and not yet granted.
-        assert_eq!(desk.ask(2, B, true), Err(Denied::Held));
-        assert_eq!(desk.ask(2, B, false), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(client(2), true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(2), false), Err(Denied::NotInControl));
         assert!(!desk.grant(2, 10) && desk.grant(1, 10));
         desk.withdraw(1);
         desk.release(2);
@@ -248,7 +326,7 @@ mod tests {
         assert!(desk.holds(1));
         desk.look(11, false);
         assert_eq!(desk.holder(), None);
-        assert_eq!(desk.ask(2, B, true), Ok(()));
+        assert_eq!(desk.ask(client(2), true), Ok(()));
         desk.withdraw(1);
         assert!(desk.holds(2));
         desk.withdraw(2);
@@ -256,11 +334,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_handed_over_is_kept_for_one_and_then_free() {
+    fn what_is_handed_over_is_reserved_for_one_and_then_free() {
         let now = Instant::now();
         let held_by_a = || {
             let mut desk = Desk::default();
-            assert_eq!(desk.ask(1, A, true), Ok(()));
+            assert_eq!(desk.ask(client(1), true), Ok(()));
             desk.grant(1, 10);
             desk.hand_over(1, 2, B, now);
             desk
@@ -268,31 +346,35 @@ mod tests {
         let mut desk = held_by_a();
         assert_eq!((desk.holder(), desk.name()), (None, Some("b")));
         for other in [1, 3] {
-            assert_eq!(desk.ask(other, A, true), Err(Denied::Held));
+            assert_eq!(desk.ask(client(other), true), Err(Denied::Held));
         }
         // It is nobody's yet, the heir's neither.
-        assert_eq!(desk.ask(2, B, false), Err(Denied::NotInControl));
-        assert_eq!(desk.ask(2, B, true), Ok(()));
-        // The master may refuse it; it is kept all the same.
+        assert_eq!(desk.ask(client(2), false), Err(Denied::NotInControl));
+        assert_eq!(desk.ask(client(2), true), Ok(()));
+        // The master may refuse it; it stays reserved.
         desk.withdraw(2);
-        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
-        assert_eq!(desk.ask(2, B, true), Ok(()));
+        assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(2), true), Ok(()));
         desk.grant(2, 20);
         desk.release(2);
-        assert_eq!(desk.ask(3, A, true), Ok(()), "kept once, not for ever");
+        assert_eq!(
+            desk.ask(client(3), true),
+            Ok(()),
+            "reserved once, not for ever"
+        );
 
         let mut desk = held_by_a();
-        desk.free(now + KEPT / 2);
-        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
-        desk.free(now + KEPT);
+        desk.free(now + RESERVED / 2);
+        assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
+        desk.free(now + RESERVED);
         assert_eq!(desk.name(), None);
-        assert_eq!(desk.ask(3, A, true), Ok(()));
+        assert_eq!(desk.ask(client(3), true), Ok(()));
 
         let mut desk = held_by_a();
         desk.leave(3);
-        assert_eq!(desk.ask(3, A, true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
         desk.leave(2);
-        assert_eq!(desk.ask(3, A, true), Ok(()));
+        assert_eq!(desk.ask(client(3), true), Ok(()));
     }
 
     /// Its lease ends in the master's time, which may stand. Until then nobody takes the control, and
@@ -301,7 +383,7 @@ mod tests {
     fn who_is_gone_keeps_the_lease_and_nothing_else() {
         let mut desk = Desk::default();
         assert!(desk.may_command_host(2));
-        assert_eq!(desk.ask(1, A, true), Ok(()));
+        assert_eq!(desk.ask(client(1), true), Ok(()));
         desk.grant(1, 10);
         assert!(desk.may_command_host(1) && !desk.may_command_host(2));
         desk.leave(2);
@@ -309,56 +391,78 @@ mod tests {
         desk.leave(1);
         assert!(desk.may_command_host(2) && !desk.holds(1));
         desk.look(11, true);
-        assert_eq!(desk.ask(2, B, true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(2), true), Err(Denied::Held));
         desk.look(12, false);
-        assert_eq!(desk.ask(2, B, true), Ok(()));
+        assert_eq!(desk.ask(client(2), true), Ok(()));
     }
 
     #[test]
-    fn who_is_revoked_commands_nothing_and_the_revoker_has_time_to_take_it() {
+    fn who_is_revoked_commands_nothing_and_the_robot_s_computer_has_time_to_take_it() {
         let now = Instant::now();
+        let lasts = Duration::from_secs(10);
         let mut desk = Desk::default();
-        assert_eq!(desk.revoke(2, B), None);
-        assert_eq!(desk.ask(1, A, true), Ok(()));
+        assert_eq!(desk.revoke(lasts), None);
+        assert_eq!(desk.ask(client(1), true), Ok(()));
         desk.grant(1, 10);
-        assert_eq!(desk.revoke(2, B).map(|h| h.client), Some(1));
+        assert_eq!(desk.revoke(lasts).map(|h| h.client), Some(1));
         for takes in [true, false] {
-            assert_eq!(desk.ask(1, A, takes), Err(Denied::Revoked));
+            assert_eq!(desk.ask(client(1), takes), Err(Denied::Revoked));
         }
         assert!(desk.may_command_host(2) && !desk.holds(1));
-        // However long the clock stands, the time of the revoker begins with the end of the lease.
-        desk.free(now + 100 * KEPT);
-        assert_eq!(desk.ask(2, B, true), Err(Denied::Held));
+        // However long the clock stands, the time begins with the end of the lease.
+        desk.free(now + 100 * lasts);
+        assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
         assert!(desk.heir().is_none(), "it is not free yet, for nobody");
         desk.look(11, false);
         desk.free(now);
-        assert_eq!(desk.heir().map(|heir| &*heir.name), Some("b"));
-        assert_eq!(desk.ask(1, A, true), Err(Denied::Held));
-        desk.free(now + KEPT);
-        assert_eq!(desk.ask(1, A, true), Ok(()));
-        // Whoever revokes and goes keeps nothing.
-        desk.grant(1, 20);
-        desk.revoke(2, B);
-        desk.leave(2);
-        desk.look(21, false);
-        assert_eq!(desk.ask(3, ("c", "3"), true), Ok(()));
+        assert_eq!(desk.heir(), Some(&Heir::RobotsComputer { except: 1 }));
+        assert_eq!(desk.reserved_for(now + lasts / 4), lasts * 3 / 4);
+        for remote in [1, 2] {
+            assert_eq!(desk.ask(client(remote), true), Err(Denied::Held));
+        }
+        // Whoever revoked may be gone: another client there takes it.
+        desk.leave(3);
+        assert_eq!(desk.ask(client(4), true), Ok(()));
+        desk.grant(4, 20);
+        desk.release(4);
+        assert_eq!(desk.ask(client(1), true), Ok(()), "reserved once");
+        // Nor does who was in control take it back, being there.
+        desk.release(1);
+        assert_eq!(desk.ask(client(4), true), Ok(()));
+        desk.grant(4, 25);
+        desk.revoke(lasts);
+        desk.look(26, false);
+        assert_eq!(desk.ask(client(4), true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(3), true), Ok(()));
+        desk.grant(3, 27);
+        desk.release(3);
+        // Where nobody there takes it, it is free for everybody.
+        assert_eq!(desk.ask(client(1), true), Ok(()));
+        desk.grant(1, 30);
+        desk.revoke(lasts);
+        desk.look(31, false);
+        desk.free(now);
+        assert_eq!(desk.ask(client(2), true), Err(Denied::Held));
+        desk.free(now + lasts);
+        assert_eq!(desk.ask(client(2), true), Ok(()));
     }
 
     /// The master grants it all the same; nobody beats for it, and it ends.
     #[test]
     fn what_is_only_asked_for_is_revoked_as_well() {
         let mut desk = Desk::default();
-        assert_eq!(desk.ask(1, A, true), Ok(()));
-        assert_eq!(desk.revoke(2, B).map(|h| h.granted_us), Some(None));
+        assert_eq!(desk.ask(client(1), true), Ok(()));
+        let revoked = desk.revoke(RESERVED).map(|h| h.granted_us);
+        assert_eq!(revoked, Some(None));
         assert!(!desk.grant(1, 10));
-        assert_eq!(desk.ask(1, A, false), Err(Denied::Revoked));
-        assert_eq!(desk.ask(2, B, true), Err(Denied::Held));
+        assert_eq!(desk.ask(client(1), false), Err(Denied::Revoked));
+        assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
         desk.look(11, false);
-        assert_eq!(desk.ask(1, A, true), Err(Denied::Held), "kept for b");
-        assert_eq!(desk.ask(2, B, true), Ok(()));
+        assert_eq!(desk.ask(client(1), true), Err(Denied::Held), "reserved");
+        assert_eq!(desk.ask(client(3), true), Ok(()));
         // Or the master refuses it.
-        assert_eq!(desk.revoke(3, A).map(|h| h.client), Some(2));
-        desk.withdraw(2);
+        assert_eq!(desk.revoke(RESERVED).map(|h| h.client), Some(3));
+        desk.withdraw(3);
         assert_eq!(desk.holder(), None);
     }
 }

@@ -56,6 +56,8 @@ pub struct HostInfo {
 
 /// Most bus cycles of one `Step`.
 pub const STEP_MAX: u32 = 1_000;
+/// Shortest and longest time for which revoked control is reserved for the robot's own computer, s.
+pub const HOLD_S: (u32, u32) = (2, 600);
 /// Slowest and fastest pace.
 pub const SPEED: (f64, f64) = (0.1, 10.0);
 /// Fastest pace at which somebody may be in control.
@@ -146,7 +148,13 @@ pub const HOST_TABLE: &[HostInfo] = &[
     HostInfo {
         code: HostCode::Revoke,
         name: "Revoke",
-        arguments: &[],
-        effect: "Revokes control from its holder, or from who has asked for it, as if the operator were lost: an armed robot holds. For 2 s after that, only whoever revoked may take control. Only on the robot's own computer.",
+        arguments: &[HostArgument {
+            name: "hold",
+            kind: "whole number",
+            unit: "s",
+            limits: Some((HOLD_S.0 as f64, HOLD_S.1 as f64)),
+            doc: "Time for which only clients on the robot's own computer may then take control.",
+        }],
+        effect: "Revokes control from its holder, or from who has asked for it, as if the operator were lost: an armed robot holds. For a while after that, only clients on the robot's own computer may take control. Only on that computer.",
     },
 ];

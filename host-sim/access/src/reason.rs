@@ -27,6 +27,8 @@ pub enum Reason {
     UnknownChannel,
     /// Nobody can be in control at this speed.
     TooFast,
+    /// The serial adapter is too slow for the bus.
+    SlowAdapter,
     /// A recording is under way, or none is, or its files cannot be written.
     Recording,
     /// The master does not answer.
@@ -41,7 +43,7 @@ pub enum Reason {
 
 impl Reason {
     /// All but the master's.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::NotInControl,
         Self::ControlHeld,
         Self::SeenInFuture,
@@ -53,6 +55,7 @@ impl Reason {
         Self::BadArgument,
         Self::UnknownChannel,
         Self::TooFast,
+        Self::SlowAdapter,
         Self::Recording,
         Self::NoMaster,
         Self::Simulation,
@@ -74,6 +77,7 @@ impl Reason {
             Self::BadArgument => "bad_argument",
             Self::UnknownChannel => "unknown_channel",
             Self::TooFast => "too_fast",
+            Self::SlowAdapter => "slow_adapter",
             Self::Recording => "recording",
             Self::NoMaster => "no_master",
             Self::Simulation => "simulation",

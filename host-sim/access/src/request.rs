@@ -1,6 +1,8 @@
 //! Frames of a client as typed requests. What is read here came over the network: every answer is
 //! a value, nothing panics, and nothing grows beyond the frame.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value as Json};
 use wheeleg_config::faults::FaultSpec;
@@ -8,7 +10,7 @@ use wheeleg_master::command::{Command, CommandCode, TABLE};
 use wheeleg_telemetry::channel_index;
 
 use crate::arguments::{self, meant};
-use crate::host::{HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
+use crate::host::{HOLD_S, HOST_TABLE, HostCode, HostInfo, SPEED, STEP_MAX};
 use crate::reason::Reason;
 
 /// Largest frame of a client, MAC included.
@@ -96,7 +98,10 @@ pub enum Order {
     /// Who is in control, and is followed by the client of this session.
     HandOver(String),
     /// Who is in control, and is to be no longer.
-    Revoke,
+    Revoke {
+        /// Time for which the control is then reserved for the robot's own computer.
+        hold: Duration,
+    },
 }
 
 /// A command of the host.
@@ -326,19 +331,20 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<Order, BadRequest> 
         }
         FaultSpec::at_once(text).map_err(bad_argument)
     };
+    let whole = |name: &str, min: u32, max: u32| {
+        let json = given(name)?;
+        let number = json.as_u64().and_then(|n| u32::try_from(n).ok());
+        let number = number.filter(|n| (min..=max).contains(n));
+        number.ok_or_else(|| {
+            bad_argument(format!(
+                "`{name}` is {json}; allowed: whole numbers from {min} to {max}"
+            ))
+        })
+    };
     Ok(Order::Host(match info.code {
         HostCode::Pause => HostCommand::Pause,
         HostCode::Resume => HostCommand::Resume,
-        HostCode::Step => {
-            let json = given("cycles")?;
-            let cycles = json.as_u64().and_then(|n| u32::try_from(n).ok());
-            let cycles = cycles.filter(|n| (1..=STEP_MAX).contains(n));
-            HostCommand::Step(cycles.ok_or_else(|| {
-                bad_argument(format!(
-                    "`cycles` is {json}; allowed: whole numbers from 1 to {STEP_MAX}"
-                ))
-            })?)
-        }
+        HostCode::Step => HostCommand::Step(whole("cycles", 1, STEP_MAX)?),
         HostCode::Speed => {
             let (min, max) = SPEED;
             let json = given("speed")?;
@@ -357,7 +363,12 @@ fn host(info: &HostInfo, args: &Map<String, Json>) -> Result<Order, BadRequest> 
             let to = json.as_str().ok_or_else(no_text)?.to_owned();
             return Ok(Order::HandOver(to));
         }
-        HostCode::Revoke => return Ok(Order::Revoke),
+        HostCode::Revoke => {
+            let seconds = whole("hold", HOLD_S.0, HOLD_S.1)?;
+            return Ok(Order::Revoke {
+                hold: Duration::from_secs(seconds.into()),
+            });
+        }
     }))
 }
 

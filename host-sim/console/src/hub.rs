@@ -98,7 +98,10 @@ enum Asked {
     Release,
     /// A release for another client.
     HandOver(ClientId),
-    Revoke,
+    /// And for how long it is then reserved for the robot's own computer.
+    Revoke {
+        hold: Duration,
+    },
     Other,
     Inject(FaultSpec),
     EndFault(FaultSpec),

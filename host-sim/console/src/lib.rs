@@ -40,7 +40,7 @@ pub mod unpack;
 pub use api::SUBPROTOCOL;
 pub use catalogue::command_list;
 pub use error::ConsoleError;
-pub use live::{Live, Port};
+pub use live::{Live, Port, SlowAdapter};
 pub use record::{FOLDER, Summary};
 pub use server::{ADDRESS, Options, Prepared, Protection, Server};
 pub use tls::{Files, Fingerprint};

@@ -65,6 +65,7 @@ pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
             Reason::TooFast,
             "control is not possible above twice real time: slow down, or release control",
         ),
+        Answer::SlowAdapter(slow) => refused(n, Reason::SlowAdapter, &slow.to_string()),
         Answer::Simulation(why) => refused(n, Reason::Simulation, &why.to_string()),
         Answer::NotRecorded(why) => refused(n, Reason::Recording, why),
     }

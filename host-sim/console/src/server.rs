@@ -306,10 +306,9 @@ fn about(live: &Live) -> Result<About, ConsoleError> {
         &live.scenario,
         &live.scenario_toml,
     )?;
-    Ok(About {
-        // Nobody can give real boards the same once more.
-        repeatable: live.port.is_none(),
-        ..about
+    Ok(match live.port {
+        Some(_) => about.of_boards(),
+        None => about,
     })
 }
 
@@ -571,7 +570,7 @@ mod tests {
         let taken = driver.carry_out("TakeControl", &json!({}), 1_000);
         assert_eq!(taken.expect("sent"), Outcome::Done);
         driver.keep_control(true);
-        let outcome = other.carry_out("Revoke", &json!({}), 1_000);
+        let outcome = other.carry_out("Revoke", &json!({ "hold": 2 }), 1_000);
         let end = Instant::now() + Duration::from_millis(500);
         let is_lost = loop {
             match driver.read() {

@@ -1,6 +1,8 @@
 // The socket to `wheeleg serve`, by its contract (host-sim/console/PROTOCOL.md): handshake, signed
 // frames in their order, answers, samples. It knows nothing of the page.
 
+import { hmac } from "./mac.js";
+
 const SUBPROTOCOL = "wheeleg.console.v1";
 /** A command is about what its sender saw at most this long before, ms. */
 const VALID_MS = 800;
@@ -23,11 +25,6 @@ function prefixed(...parts) {
     at += 4 + list.length;
   }
   return all;
-}
-
-async function mac(key, data) {
-  const imported = await crypto.subtle.importKey("raw", key, { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
-  return new Uint8Array(await crypto.subtle.sign("HMAC", imported, data));
 }
 
 const READERS = {
@@ -55,7 +52,6 @@ export class Link {
     this.identity = identity;
     this.listener = listener;
     this.n = 0;
-    this.sending = Promise.resolve();
     /** Newest master time that the page has painted, µs. */
     this.seen_us = 0;
     /** @type {Map<number, (answer: Answer) => void>} */
@@ -66,7 +62,7 @@ export class Link {
     const later = /** @type {any} */ (null);
     /** @type {WebSocket} */
     this.socket = later;
-    /** The session's key. @type {CryptoKey} */
+    /** The session's key. @type {Uint8Array} */
     this.key = later;
     /** Nonces of both sides, and all that both MACs are over. @type {Uint8Array} */
     this.server = later;
@@ -87,9 +83,9 @@ export class Link {
 
   /** A document of the HTTP API. @param {string} path */
   async ask(path) {
-    // Nor may a key be sent there.
-    if (!isSecureContext) throw new Error("browsers give a page over plain HTTP no cryptography: open it by HTTPS, or use wheeleg ctl");
-    const response = await fetch(`/api/v1/${path}`, { headers: { Authorization: `Bearer ${this.identity.key}` } });
+    // Over plain HTTP no key may be sent; what is not secret comes without.
+    const headers = isSecureContext ? { Authorization: `Bearer ${this.identity.key}` } : undefined;
+    const response = await fetch(`/api/v1/${path}`, { headers });
     const answer = await response.json();
     if (!response.ok) throw new Error(`${answer.detail}: ${answer.remedy}`);
     return answer;
@@ -105,10 +101,13 @@ export class Link {
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     await new Promise((resolve, reject) => {
-      let proof = Promise.resolve();
       socket.onclose = (close) => reject(new Error(close.reason || "the robot's server does not answer"));
       socket.onmessage = (message) => {
-        proof = proof.then(() => this.greet(JSON.parse(message.data))).then((done) => { if (done) resolve(undefined); }).catch(reject);
+        try {
+          if (this.greet(JSON.parse(message.data))) resolve(undefined);
+        } catch (error) {
+          reject(error);
+        }
       };
     });
     socket.onclose = (close) => this.end(close.reason || "the connection has ended");
@@ -117,7 +116,7 @@ export class Link {
   }
 
   /** One message of the handshake; true when it is over. */
-  async greet(message) {
+  greet(message) {
     const key = bytes(this.identity.key);
     const { role, name } = this.identity;
     if (message.op === "hello") {
@@ -125,15 +124,15 @@ export class Link {
       this.server = bytes(message.nonce);
       this.client = crypto.getRandomValues(new Uint8Array(32));
       this.common = prefixed(this.server, this.client, role, name, location.host, message.layout, message.commands);
-      const proof = await mac(key, Uint8Array.from([...prefixed("c1"), ...this.common]));
+      const proof = hmac(key, Uint8Array.from([...prefixed("c1"), ...this.common]));
       this.socket.send(JSON.stringify({ op: "auth", role, name, nonce: hexadecimal(this.client), ...this.hashes, mac: hexadecimal(proof) }));
       return false;
     }
     if (message.op !== "welcome") throw new Error(`${message.text ?? "refused"}. ${message.remedy ?? ""}`);
-    const expected = await mac(key, Uint8Array.from([...prefixed("s1"), ...this.common, ...prefixed(message.session)]));
+    const expected = hmac(key, Uint8Array.from([...prefixed("s1"), ...this.common, ...prefixed(message.session)]));
     if (hexadecimal(expected) !== message.mac) throw new Error("this is not your robot: its server does not have the key");
     this.session = message.session;
-    this.key = await crypto.subtle.importKey("raw", await mac(key, prefixed("k1", this.server, this.client)), { name: "HMAC", hash: "SHA-256" }, false, ["sign"]);
+    this.key = hmac(key, prefixed("k1", this.server, this.client));
     return true;
   }
 
@@ -144,16 +143,13 @@ export class Link {
     this.listener.closed(why);
   }
 
-  /** Sends a frame after those before it, and gives its number. @param {Object<string, any>} frame */
+  /** Sends a frame, and gives its number. @param {Object<string, any>} frame */
   send(frame) {
     this.n += 1;
-    const n = this.n;
-    const json = text.encode(JSON.stringify({ n, ...frame }));
-    this.sending = this.sending.then(async () => {
-      const signature = new Uint8Array(await crypto.subtle.sign("HMAC", this.key, prefixed("f1", json))).slice(0, 16);
-      if (this.socket.readyState === WebSocket.OPEN) this.socket.send(Uint8Array.from([...signature, ...json]));
-    });
-    return n;
+    const json = text.encode(JSON.stringify({ n: this.n, ...frame }));
+    const signature = hmac(this.key, prefixed("f1", json)).slice(0, 16);
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(Uint8Array.from([...signature, ...json]));
+    return this.n;
   }
 
   /** Sends a frame that is answered. @param {Object<string, any>} frame @returns {Promise<Answer>} */

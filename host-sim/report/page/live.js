@@ -49,10 +49,12 @@ const cell = (name, minor = false) => {
   const value = html("b", {}, "–");
   return { root: html("div", { class: minor ? "cell minor" : "cell" }, html("small", {}, name), value), value };
 };
-/** With a hint below its name, and the number of its command for who asks for it. */
-const button = (name, hint, act, code = "") => html("button", { class: "btn", type: "button", title: code || null, onclick: act }, html("span", {}, name), hint && (hint instanceof Node ? hint : html("small", {}, hint)));
+/** With a hint below its name. */
+const button = (name, hint, act) => html("button", { class: "btn", type: "button", onclick: act }, html("span", {}, name), hint && (hint instanceof Node ? hint : html("small", {}, hint)));
 
 // ---- answers ----
+/** Code and layer of each command, by its name. @type {Map<string, string>} */
+const codes = new Map();
 const answer = html("p", { class: "answer", role: "status" }, "No command sent yet.");
 /** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
 function tell(what, { status, text, reason, holder }, places = [answer]) {
@@ -60,8 +62,9 @@ function tell(what, { status, text, reason, holder }, places = [answer]) {
   // A command that ran for long and was ended was not refused.
   const verdict = reason === "interrupted" ? "ended early" : "refused";
   const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${text || reason}${held}`;
+  const code = codes.get(what);
   for (const place of places) {
-    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
+    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`, code ? html("small", {}, ` ${code}`) : "");
     place.classList.toggle("bad", status !== "done");
   }
 }
@@ -180,7 +183,7 @@ const boards = boardsView();
 let scope = null;
 const events = eventsView();
 // ---- recording ----
-const record = button("Record", "", () => command(recording() ? "RecordStop" : "RecordStart"), "RecordStart 0x0307, RecordStop 0x0308");
+const record = button("Record", "", () => command(recording() ? "RecordStop" : "RecordStart"));
 const recorded = html("p", { class: "effect", role: "status" }, "Not recording.");
 const recording = () => Boolean(now.state?.recording && !now.state.recording.failure);
 let lastRecording = "";
@@ -232,12 +235,22 @@ form.addEventListener("submit", (submit) => {
 });
 
 // ---- what the operator does ----
-const take = button("Take control", "", () => command(mine() ? "ReleaseControl" : "TakeControl"), "TakeControl 0x0125, ReleaseControl 0x0126");
+const take = button("Take control", "", () => command(mine() ? "ReleaseControl" : "TakeControl"));
 const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
 const walk = button("Walk", "as set below", () => (stepping() ? command("StopGait") : command("Walk", byHand.order(1, 0))));
 const hold = button("Hold", html("small", { class: "key" }, "Space"), () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
+/** Commands that a button gives: whoever points at it sees their codes. @type {[HTMLElement, string[]][]} */
+const gives = [
+  [take, ["TakeControl", "ReleaseControl"]],
+  [ready, ["TakeControl", "Arm", "Stand"]],
+  [walk, ["Walk", "StopGait"]],
+  [hold, ["Hold"]],
+  [disarm, ["Disarm"]],
+  [clear, ["ClearFault"]],
+  [record, ["RecordStart", "RecordStop"]],
+];
 const byHand = driver(command);
 const parameters = parametersView(command, () => (link ? link.ask("parameters") : Promise.reject(new Error(lost))));
 /** Who asked for the control last, and how long that is offered here. @type {{session: string, until_ms: number} | null} */
@@ -274,6 +287,8 @@ function build({ robot, commands: list, faults: injectable }) {
   views = { side: sideView(pictures.side, robot.drawing, relief ? reliefHeights(relief) : undefined), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
   say(head.robot.value, robot.name);
   commands = list;
+  for (const { name, code, layer } of list) codes.set(name, `0x${code.toString(16).padStart(4, "0")}, layer ${layer}`);
+  for (const [pressed, names] of gives) pressed.title = names.map((name) => `${name} ${codes.get(name)}`).join("; ");
   which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation, and who is in control"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
   which.value = "JointReference";
   showFields();
@@ -287,6 +302,7 @@ function build({ robot, commands: list, faults: injectable }) {
       html("div", { class: "stopbox" }, stopButton),
     ),
     alarm,
+    ...(isSecureContext ? [] : [html("p", { class: "banner", role: "note" }, sign("warn"), " Not protected: anyone on the network can read and alter what is shown. From here the robot can be looked at and stopped, not driven.")]),
     banner,
     html(
       "main",
@@ -316,11 +332,11 @@ function build({ robot, commands: list, faults: injectable }) {
   );
 }
 
-/** Who is in control, or for whom control is kept. */
-function whose({ control, kept_for: kept }) {
+/** Who is in control, or for whom control is reserved. */
+function whose({ control, reserved_for: reserved }) {
   if (mine()) return "you";
   if (control) return control.ended ? `${control.holder}, ${control.ended}` : control.holder;
-  if (kept) return kept.session === link?.session ? "kept for you" : `kept for ${kept.name}`;
+  if (reserved) return `reserved for ${reserved.session === link?.session ? "you" : reserved.name}`;
   return "free";
 }
 
@@ -411,7 +427,7 @@ const listener = {
 async function begin() {
   const who = identity();
   if (!who) {
-    page.replaceChildren(html("p", { class: "alone" }, "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key. Without a terminal, add #k= and the digits of the file control.key, whose place `wheeleg serve` prints."));
+    page.replaceChildren(html("p", { class: "alone" }, isSecureContext ? "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key. Without a terminal, add #k= and the digits of the file control.key, whose place `wheeleg serve` prints." : "This page needs a key. Add #v= and the digits of the file view.key, whose place `wheeleg serve` prints."));
     return;
   }
   const opened = new Link(who, listener);
@@ -437,6 +453,7 @@ async function begin() {
   }, BEAT_MS);
   setInterval(() => link?.echo(), ECHO_MS);
   await opened.subscribe([...drawn], HZ);
+  if (!isSecureContext) return events.noPast("the server gives them over HTTPS only");
   try {
     events.past((await opened.ask("events")).events);
   } catch (error) {

@@ -21,7 +21,8 @@ pub(super) struct Pose {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct JointState {
     pub(super) position: f64,
-    pub(super) velocity: f64,
+    /// None where nobody measures it.
+    pub(super) velocity: Option<f64>,
     /// Force or torque of the drive; none where nothing drives.
     pub(super) effort: Option<f64>,
 }
@@ -98,7 +99,7 @@ impl Leg {
         let (now, rates) = (yaws(&posture), yaw_rates(&posture));
         self.last = std::array::from_fn(|k| JointState {
             position: now[k] - self.retracted[k],
-            velocity: rates[k] * yaw.velocity,
+            velocity: yaw.velocity.map(|velocity| rates[k] * velocity),
             effort: None,
         });
     }

@@ -38,6 +38,8 @@ pub struct Scene {
     pose: Pose,
     next_ns: u64,
     shown: bool,
+    /// Only what boards report is known of the robot.
+    sensed: bool,
     entity: Entity,
     payload: Vec<u8>,
 }
@@ -60,9 +62,20 @@ impl Scene {
             pose: Pose::default(),
             next_ns: 0,
             shown: false,
+            sensed: false,
             entity: Entity::new(OFTEN),
             payload: Vec::new(),
         })
+    }
+
+    /// The same of real boards: the robot as they sense it. Nobody measures where it is, nor the ground:
+    /// it stands on a level floor, where its wheels have brought it.
+    #[must_use]
+    pub fn of_boards(mut self) -> Self {
+        self.sensed = true;
+        self.terrain = Terrain::default();
+        self.materials = self.terrain.parts.iter().map(ground::material).collect();
+        self
     }
 
     /// The robot as URDF, whose links and joints the channels name.
@@ -82,12 +95,21 @@ impl Scene {
         give(Derived::Scene, t_ns, &self.payload);
     }
 
-    fn move_to(&mut self, t_ns: u64, body: &BodySample, give: Put<'_>) {
+    /// The last sample of an instant has come.
+    fn come(&mut self, t_ns: u64, base: Isometry3<f64>, give: Put<'_>) {
+        if !self.shown {
+            self.shown = true;
+            self.show(t_ns, give);
+        }
+        self.move_to(t_ns, base, give);
+    }
+
+    fn move_to(&mut self, t_ns: u64, base: Isometry3<f64>, give: Put<'_>) {
         if t_ns < self.next_ns {
             return;
         }
         self.next_ns = (t_ns / PERIOD_NS + 1) * PERIOD_NS;
-        self.pose.base = base(body);
+        self.pose.base = base;
         if !self
             .pose
             .base
@@ -151,14 +173,6 @@ fn base(body: &BodySample) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(at), turn)
 }
 
-fn cylinder(sample: &JointSample) -> JointState {
-    JointState {
-        position: sample.position_mm * 1e-3,
-        velocity: sample.velocity_mm_s * 1e-3,
-        effort: Some(sample.force_pressure_n),
-    }
-}
-
 impl Derive for Scene {
     fn attached(&self) -> Vec<Attached> {
         vec![Attached {
@@ -172,7 +186,7 @@ impl Derive for Scene {
         match taken.sample {
             SampleRef::Joint(sample) => {
                 if let Some(joint) = place(taken.channel, "/joint/1", 6) {
-                    self.pose.cylinders[joint] = cylinder(sample);
+                    self.pose.cylinders[joint] = self.cylinder(sample);
                 }
             }
             SampleRef::Wheel(sample) => {
@@ -180,13 +194,10 @@ impl Derive for Scene {
                     self.pose.wheels[wheel] = self.wheel(sample);
                 }
             }
-            // The last of them at an instant.
-            SampleRef::Body(sample) => {
-                if !self.shown {
-                    self.shown = true;
-                    self.show(taken.t_ns, give);
-                }
-                self.move_to(taken.t_ns, sample, give);
+            // The last of them at an instant, of a simulated robot and of real boards.
+            SampleRef::Body(sample) if !self.sensed => self.come(taken.t_ns, base(sample), give),
+            SampleRef::Master(_) if self.sensed => {
+                self.come(taken.t_ns, self.on_its_wheels(), give);
             }
             SampleRef::Event(sample) => {
                 self.payload.clear();
@@ -217,13 +228,39 @@ impl Derive for Scene {
 }
 
 impl Scene {
+    fn cylinder(&self, sample: &JointSample) -> JointState {
+        let [position_mm, velocity_mm_s] = match self.sensed {
+            true => [sample.sensed_mm, sample.sensed_velocity_mm_s],
+            false => [sample.position_mm, sample.velocity_mm_s],
+        };
+        JointState {
+            position: position_mm * 1e-3,
+            velocity: Some(velocity_mm_s * 1e-3),
+            effort: (!self.sensed).then_some(sample.force_pressure_n),
+        }
+    }
+
     fn wheel(&self, sample: &WheelSample) -> JointState {
         let per_mm = 1e-3 / self.wheel_radius_m;
+        if self.sensed {
+            return JointState {
+                position: sample.sensed_mm * per_mm,
+                velocity: None,
+                effort: None,
+            };
+        }
         JointState {
             position: sample.position_mm * per_mm,
-            velocity: sample.velocity_mm_s * per_mm,
+            velocity: Some(sample.velocity_mm_s * per_mm),
             effort: Some(sample.torque_n_m),
         }
+    }
+
+    /// `base_link`, the middle of the axle, where the wheels have brought it.
+    fn on_its_wheels(&self) -> Isometry3<f64> {
+        let [left, right] = self.pose.wheels.map(|wheel| wheel.position);
+        let x_m = 0.5 * (left + right) * self.wheel_radius_m;
+        Translation3::new(x_m, 0.0, self.wheel_radius_m).into()
     }
 }
 

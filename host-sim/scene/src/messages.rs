@@ -53,8 +53,10 @@ pub(super) fn joint_states(out: &mut Vec<u8>, t_ns: u64, frames: &Frames, pose: 
         put_text(out, &frame.joint);
         put(out, ",\"position\":");
         push_fixed(out, state.position, LENGTH);
-        put(out, ",\"velocity\":");
-        push_fixed(out, state.velocity, 6);
+        if let Some(velocity) = state.velocity {
+            put(out, ",\"velocity\":");
+            push_fixed(out, velocity, 6);
+        }
         if let Some(effort) = state.effort {
             put(out, ",\"effort\":");
             push_fixed(out, effort, 3);

@@ -9,7 +9,7 @@ use wheeleg_plant::robot::{Inputs, Outputs, Plant};
 use wheeleg_scene::{Scene, urdf};
 use wheeleg_telemetry::{
     BodySample, Contact, ContactBody, Derive, Derived, EventCode, EventKind, EventSample,
-    JointSample, Taken, WheelSample, channels,
+    JointSample, MasterSample, Taken, WheelSample, channels,
 };
 
 fn robot() -> RobotConfig {
@@ -203,6 +203,82 @@ fn feet_are_where_the_plant_has_them() {
         (100, 100)
     );
     assert_eq!(heard.count("/scene"), 1);
+}
+
+/// Real boards tell strokes and travel, and neither where the robot is nor what it stands on.
+#[test]
+fn real_boards_are_drawn_as_they_sense_themselves() {
+    let robot = robot();
+    let (mut simulated, mut wanted) = (scene("stand"), Heard::default());
+    let (mut sensed, mut heard) = (scene("slope-10").of_boards(), Heard::default());
+    let radius_mm = robot.plant.body.wheel_radius_m * 1e3;
+    let mut sense = |t_ns: u64, stroke_mm: f64, travel_mm: f64| {
+        for i in 1..=6 {
+            let topic = format!("/joint/{i}");
+            let sample = JointSample {
+                position_mm: f64::NAN,
+                velocity_mm_s: f64::NAN,
+                force_pressure_n: f64::NAN,
+                sensed_mm: stroke_mm,
+                sensed_velocity_mm_s: 5.0,
+                ..JointSample::default()
+            };
+            give(&mut sensed, &mut heard, t_ns, &topic, (&sample).into());
+            let sample = JointSample {
+                position_mm: stroke_mm,
+                ..JointSample::default()
+            };
+            give(&mut simulated, &mut wanted, t_ns, &topic, (&sample).into());
+        }
+        for topic in ["/wheel/7", "/wheel/8"] {
+            let sample = WheelSample {
+                position_mm: f64::NAN,
+                velocity_mm_s: f64::NAN,
+                torque_n_m: f64::NAN,
+                sensed_mm: travel_mm,
+                ..WheelSample::default()
+            };
+            give(&mut sensed, &mut heard, t_ns, topic, (&sample).into());
+            let sample = WheelSample {
+                position_mm: travel_mm,
+                ..WheelSample::default()
+            };
+            give(&mut simulated, &mut wanted, t_ns, topic, (&sample).into());
+        }
+        let sample = MasterSample::default();
+        give(&mut sensed, &mut heard, t_ns, "/master", (&sample).into());
+        let sample = BodySample {
+            x_mm: travel_mm,
+            z_mm: radius_mm,
+            ..BodySample::default()
+        };
+        give(&mut simulated, &mut wanted, t_ns, "/body", (&sample).into());
+    };
+    sense(0, 90.0, 0.0);
+    sense(20_000_000, 120.0, 40.0);
+    assert_eq!(heard.count("/tf"), 2);
+    for ((name, at), wanted) in poses(heard.newest("/tf"))
+        .iter()
+        .zip(poses(wanted.newest("/tf")).values())
+    {
+        let gap = at.inv_mul(wanted);
+        let apart = gap.translation.vector.norm().max(gap.rotation.angle());
+        assert!(apart < 1e-6, "{name}: {apart}");
+    }
+    let joints = heard.newest("/joint_states")["joints"].clone();
+    for joint in joints.as_array().expect("a list") {
+        let name = joint["name"].as_str().expect("a name");
+        assert!(joint["position"].is_number() && joint["effort"].is_null());
+        // No board tells how fast a wheel turns.
+        assert_eq!(
+            joint["velocity"].is_null(),
+            name.contains("wheel"),
+            "{name}"
+        );
+    }
+    // The scenario's slope is not theirs.
+    let corner = vector(&heard.newest("/scene")["entities"][0]["triangles"][0]["points"][1]);
+    assert_eq!(corner.z, 0.0);
 }
 
 #[test]

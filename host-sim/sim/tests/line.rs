@@ -232,6 +232,7 @@ fn boards_whose_line_is_cut_in_mid_step_hold_and_wait_disarmed_when_it_is_there_
             cut.step();
         }
         cut.master.line().cut = true;
+        let cut_ns = cut.ms * MS;
         // They shut all valves. A leg in the air may be vented later: that is the phase's own choice.
         let shut = |cut: &mut Robot| cut.master.line().boards.valves_us() == [[0; 4]; 6];
         let mut shut_ms = 0;
@@ -257,6 +258,10 @@ fn boards_whose_line_is_cut_in_mid_step_hold_and_wait_disarmed_when_it_is_there_
             events.filter(|row| wanted(&row.v.cause)).count()
         };
         assert_eq!(count(|cause| matches!(cause, Cause::LineBroken(_))), 1);
+        let mut events = recording.events.iter();
+        let told = events.find(|row| matches!(row.v.cause, Cause::LineBroken(_)));
+        let after_ns = told.map(|row| row.t_ns - cut_ns);
+        assert!(after_ns <= Some(20 * MS), "told after {after_ns:?} ns");
         assert_eq!(count(|cause| matches!(cause, Cause::LineMended)), 1);
     });
 }

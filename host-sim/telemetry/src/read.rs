@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::io::{BufReader, ErrorKind};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -45,18 +45,81 @@ pub struct Read {
     pub whole: bool,
 }
 
-/// Reads `path` and gives its messages in their order, until `take` breaks.
+/// A long log is cut into parts, each a log by itself: `log.mcap`, `log.2.mcap`, `log.3.mcap`. The path
+/// of a part, from 1 on, of the log whose first part is `path`.
+#[must_use]
+pub fn part(path: &Path, number: u32) -> PathBuf {
+    match (number, path.file_stem(), path.extension()) {
+        (0 | 1, ..) | (_, None, _) => path.to_owned(),
+        (_, Some(stem), extension) => {
+            let mut name = stem.to_owned();
+            name.push(format!(".{number}"));
+            if let Some(extension) = extension {
+                name.push(".");
+                name.push(extension);
+            }
+            path.with_file_name(name)
+        }
+    }
+}
+
+/// The parts of the log that begins with `path`, which is the first of them whether it is there or not.
+pub fn parts(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let first = path.to_owned();
+    let more = (2..).map(move |number| part(&first, number));
+    [path.to_owned()]
+        .into_iter()
+        .chain(more.take_while(|part| part.is_file()))
+}
+
+/// Reads `path` with the parts that follow it, and gives the messages in their order, until `take` breaks.
 ///
 /// # Errors
-/// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log,
+/// [`LogError::Read`] if a file cannot be read, [`LogError::NotALog`] if `path` is no MCAP log,
 /// [`LogError::Foreign`] if it has messages, and none of a channel of this program,
 /// [`LogError::Empty`] if it has none.
 pub fn read(
     path: &Path,
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
 ) -> Result<Read, LogError> {
-    let file = opened(path)?;
-    read_from(BufReader::new(file), path, take)
+    let head = channels()
+        .iter()
+        .position(|channel| channel.topic == "/run");
+    let mut all: Option<Read> = None;
+    let mut broke = false;
+    for part in parts(path) {
+        let is_first = all.is_none();
+        let read = read_from(BufReader::new(opened(&part)?), &part, &mut |logged| {
+            // What stands at the head of every part is given once.
+            if !is_first && Some(logged.channel) == head {
+                return ControlFlow::Continue(());
+            }
+            let next = take(logged);
+            broke |= next.is_break();
+            next
+        });
+        let read = match read {
+            // A part that had just begun when its writer was killed.
+            Err(LogError::Empty { .. } | LogError::NotALog { .. }) if !is_first => Read {
+                messages: 0,
+                others: 0,
+                whole: false,
+            },
+            read => read?,
+        };
+        let before = all.get_or_insert(Read {
+            messages: 0,
+            others: 0,
+            whole: true,
+        });
+        before.messages += read.messages;
+        before.others += read.others;
+        before.whole &= read.whole;
+        if broke {
+            break;
+        }
+    }
+    all.ok_or_else(|| LogError::Empty { path: path.into() })
 }
 
 /// The same of any source; `path` is its name for errors.
@@ -102,21 +165,32 @@ pub fn read_from(
 /// Takes a message of a derived channel: time in ns and JSON.
 pub type TakeDerived<'a> = dyn FnMut(Derived, u64, &[u8]) -> ControlFlow<()> + 'a;
 
-/// Reads the derived channels of `path` and gives their messages in their order, until `take`
-/// breaks. True: the log has its end.
+/// Reads the derived channels of `path` with the parts that follow it, and gives their messages in
+/// their order, until `take` breaks. True: the log has its end.
 ///
 /// # Errors
 /// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log.
 pub fn read_derived(path: &Path, take: &mut TakeDerived<'_>) -> Result<bool, LogError> {
-    let file = opened(path)?;
-    each(
-        &mut BufReader::new(file),
-        path,
-        &mut |message| match Derived::of_topic(message.topic) {
-            Some(channel) => take(channel, message.log_time, message.data),
-            None => ControlFlow::Continue(()),
-        },
-    )
+    let (mut whole, mut broke) = (true, false);
+    for part in parts(path) {
+        let mut source = BufReader::new(opened(&part)?);
+        let read = each(&mut source, &part, &mut |message| {
+            let next = match Derived::of_topic(message.topic) {
+                Some(channel) => take(channel, message.log_time, message.data),
+                None => ControlFlow::Continue(()),
+            };
+            broke |= next.is_break();
+            next
+        });
+        whole &= match read {
+            Err(LogError::NotALog { .. }) if part != path => false,
+            read => read?,
+        };
+        if broke {
+            break;
+        }
+    }
+    Ok(whole)
 }
 
 /// A message on its way: topic, time and bytes.

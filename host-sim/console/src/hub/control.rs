@@ -8,7 +8,7 @@ use wheeleg_master::command::{Command, CommandCode};
 use super::{Asked, Client, Inner, Pending, Role, TICKET};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
-use wheeleg_access::desk::{ClientId, Denied, Ended};
+use wheeleg_access::desk::{Asker, ClientId, Denied, Ended};
 use wheeleg_access::reason::Reason;
 use wheeleg_access::request::{HostCommand, Order, Spoken};
 
@@ -57,22 +57,27 @@ impl Inner {
                     let text = "what was asked for the control before is not answered yet";
                     return self.tell(id, &refused(n, Reason::Busy, text));
                 }
-                let who = (&*client.name, &*client.session);
-                match self.desk.ask(id, who, takes) {
+                let asker = Asker {
+                    client: id,
+                    name: &client.name,
+                    session: &client.session,
+                    is_local: client.is_local,
+                };
+                match self.desk.ask(asker, takes) {
                     Ok(()) => {}
                     Err(Denied::Revoked) => {
                         return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
                     }
                     Err(Denied::Held) => {
                         let told = client.asked.is_some_and(|told| now - told < ASKED);
-                        if !told {
+                        // Nobody is told for a holder who has ended; the next one is.
+                        let holder = self.desk.holder().filter(|h| h.ended.is_none());
+                        if let Some(holder) = holder.filter(|_| !told) {
                             client.asked = Some(now);
                             let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
-                            if let Some(holder) = self.desk.holder().filter(|h| h.ended.is_none()) {
-                                self.tell(holder.client, &asked);
-                            }
+                            self.tell(holder.client, &asked);
                         }
-                        return self.tell(id, &self.held(n));
+                        return self.tell(id, &self.held(n, now));
                     }
                     Err(Denied::NotInControl) => {
                         let text = "take control first";
@@ -120,7 +125,7 @@ impl Inner {
                 };
                 (input, Asked::HandOver(heir))
             }
-            Order::Revoke => {
+            Order::Revoke { hold } => {
                 if !client.is_local {
                     let text = "control can be revoked only on the robot's own computer";
                     return self.tell(id, &refused(n, Reason::Role, text));
@@ -131,11 +136,11 @@ impl Inner {
                     return self.tell_done(id, n);
                 };
                 let id = self.next_request;
-                (Input::Revoked { id, holder, by }, Asked::Revoke)
+                (Input::Revoked { id, holder, by }, Asked::Revoke { hold })
             }
             Order::Host(command) => {
                 if !self.desk.may_command_host(id) {
-                    return self.tell(id, &self.held(n));
+                    return self.tell(id, &self.held(n, now));
                 }
                 let what = match &command {
                     HostCommand::Inject(fault) => Asked::Inject(*fault),
@@ -147,7 +152,10 @@ impl Inner {
             }
         };
         let takes = matches!(what, Asked::Take);
-        let revokes = matches!(what, Asked::Revoke);
+        let revokes = match what {
+            Asked::Revoke { hold } => Some(hold),
+            _ => None,
+        };
         if self.robot.inputs.push(input).is_err() {
             if takes && !holds {
                 self.desk.withdraw(id);
@@ -157,8 +165,8 @@ impl Inner {
                 &refused(n, Reason::Busy, "the queue to the robot is full"),
             );
         }
-        if revokes {
-            self.revoke(id);
+        if let Some(hold) = revokes {
+            self.revoke(id, hold);
         }
         let pending = Pending {
             client: id,
@@ -172,14 +180,17 @@ impl Inner {
     }
 
     /// The answer to who wants what another holds.
-    fn held(&self, n: u64) -> Value {
+    fn held(&self, n: u64, now: Instant) -> Value {
         let name = self.desk.name().unwrap_or_default();
         let text = match self.desk.holder().map(|holder| holder.ended) {
             Some(None) => format!("{name:?} has control"),
             Some(Some(_)) => format!(
                 "{name:?} is no longer in control, but its lease is not over: resume the clock if it is paused, then ask again"
             ),
-            None => format!("control is reserved for {name:?} for 2 s"),
+            None => format!(
+                "control is reserved for {name} for {:.0} s: ask again then",
+                self.desk.reserved_for(now).as_secs_f64().ceil()
+            ),
         };
         let mut answer = refused(n, Reason::ControlHeld, &text);
         answer["holder"] = json!(name);
@@ -252,18 +263,18 @@ impl Inner {
 
     /// A client ends the control of whoever has it, or has asked for it: from now on nothing of theirs
     /// reaches the robot, beats neither, so that the master ends the lease.
-    fn revoke(&mut self, by: ClientId) {
+    fn revoke(&mut self, by: ClientId, hold: Duration) {
         let Some(client) = self.clients.get(&by) else {
             return;
         };
-        let Some(holder) = self.desk.revoke(by, (&client.name, &client.session)) else {
+        let Some(holder) = self.desk.revoke(hold) else {
             return;
         };
         self.last_holder.clone_from(&holder.name);
         self.revoked_by = Some(client.name.clone());
         let (holder, revoked) = (holder.client, json!({ "op": "revoked", "by": client.name }));
         self.tell(holder, &revoked);
-        // What it hands over is a release now: control is kept for another already.
+        // What it hands over is a release now: control is reserved already.
         for pending in self.pending.values_mut() {
             if matches!(pending.what, Asked::HandOver(_)) {
                 pending.what = Asked::Release;

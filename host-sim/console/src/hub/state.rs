@@ -32,8 +32,9 @@ impl Inner {
             let ended = holder.ended.map(Ended::name);
             json!({ "holder": holder.name, "session": holder.session, "age_ms": self.age_ms(), "ended": ended })
         });
-        let kept_for = self.desk.heir();
-        let kept_for = kept_for.map(|heir| json!({ "name": heir.name, "session": heir.session }));
+        let reserved_for = self.desk.heir();
+        let reserved_for =
+            reserved_for.map(|heir| json!({ "name": heir.name(), "session": heir.session() }));
         let boards = (1..).zip(&status.boards).map(|(address, board): (u8, _)| {
             let faults = board.faults.iter().map(|fault| {
                 json!({
@@ -66,7 +67,7 @@ impl Inner {
             "simulated": status.simulated,
             "failure": self.failure,
             "control": control,
-            "kept_for": kept_for,
+            "reserved_for": reserved_for,
             "pace": {
                 "speed": pace.speed,
                 "paused": pace.paused,

@@ -2,12 +2,14 @@
 //! and writes no file; what comes and goes passes through rings, what matters most through atomics
 //! beside them.
 
+mod adapter;
 mod machine;
 mod pace;
 mod priority;
 mod robot;
 mod sink;
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use wheeleg_config::builtin::{self, Source};
@@ -23,6 +25,7 @@ use wheeleg_telemetry::OwnedSample;
 
 use wheeleg_access::request::{HostCommand, Spoken};
 
+pub use adapter::SlowAdapter;
 pub(crate) use robot::{Robot, start};
 
 /// Commands that may wait for the robot.
@@ -58,6 +61,8 @@ pub struct Port {
     pub options: HilOptions,
     /// Number of the master's first request; another at every start.
     pub first_sequence: u16,
+    /// Where the system tells about its adapter.
+    ports: PathBuf,
 }
 
 impl Port {
@@ -73,7 +78,24 @@ impl Port {
         Ok(Self {
             options: HilOptions::parse(text)?,
             first_sequence: u16::from_le_bytes(first),
+            ports: adapter::PORTS.into(),
         })
+    }
+
+    /// The same, of which another folder tells; for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn told_of_in(self, ports: &Path) -> Self {
+        Self {
+            ports: ports.to_owned(),
+            ..self
+        }
+    }
+
+    /// Its adapter, if that is too slow for the bus.
+    #[must_use]
+    pub fn slow_adapter(&self) -> Option<SlowAdapter> {
+        SlowAdapter::at(&self.options.port, &self.ports)
     }
 }
 
@@ -196,6 +218,8 @@ pub(crate) enum Answer {
     NoMaster,
     /// The clock goes too fast for somebody in control.
     TooFast,
+    /// The serial adapter is too slow for the bus.
+    SlowAdapter(Box<SlowAdapter>),
     /// The simulation refuses.
     Simulation(Box<SimError>),
     /// Nothing is recorded, or no longer.

@@ -21,7 +21,8 @@ use super::pace::{Lateness, Pace};
 use super::priority;
 use super::sink::RingSink;
 use super::{
-    Answer, BoardStatus, INPUTS, Input, Live, Moving, REPORTS, Report, SAMPLES, Signals, Status,
+    Answer, BoardStatus, INPUTS, Input, Live, Moving, Port, REPORTS, Report, SAMPLES, Signals,
+    Status,
 };
 use crate::foxglove::ContactSink;
 use crate::record::{Feed, FeedSink, Given};
@@ -111,6 +112,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
             inputs: from_hub,
             reports: to_hub,
             signals: beside,
+            port: live.port.clone(),
             cycle_ns: cycle.as_nanos() as u64,
             target_ns: 0,
             steps: 0,
@@ -157,6 +159,8 @@ struct Loop {
     inputs: rtrb::Consumer<Input>,
     reports: rtrb::Producer<Report>,
     signals: Arc<Signals>,
+    /// That of real boards.
+    port: Option<Port>,
     cycle_ns: u64,
     /// Time up to which has been simulated.
     target_ns: u64,
@@ -359,6 +363,12 @@ impl Loop {
         let too_fast = pace.speed.is_none_or(|speed| speed > SPEED_OF_CONTROL);
         if too_fast && request.command.code() == CommandCode::TakeControl {
             return Answer::TooFast;
+        }
+        // Looked at each time: an adapter that is plugged in again has its old setting.
+        if request.command.code() == CommandCode::Arm
+            && let Some(slow) = self.port.as_ref().and_then(Port::slow_adapter)
+        {
+            return Answer::SlowAdapter(Box::new(slow));
         }
         self.given(Given::Command {
             id: request.id,

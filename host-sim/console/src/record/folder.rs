@@ -1,5 +1,5 @@
 //! The folder of a recording: `log.mcap`, `inputs.jsonl`, the robot's and the scenario's file, and
-//! `recording.json`, which says what it is of and how it ended.
+//! `recording.json`, which says what it is of and how it ended. A long log is cut into parts.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Read as _, Write as _};
@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
-use wheeleg_telemetry::{LogFile, OwnedSample, Sink as _, Taken};
+use wheeleg_scene::Scene;
+use wheeleg_telemetry::{LogFile, OwnedSample, Sink as _, Taken, part, parts};
 
 use super::inputs::Line;
 use super::{About, Touching};
@@ -23,6 +24,9 @@ pub(crate) const ROBOT: &str = "robot.toml";
 pub(crate) const SCENARIO: &str = "scenario.toml";
 /// What the recording is of, and how it ended.
 pub(crate) const SUMMARY: &str = "recording.json";
+
+/// Length of a part of the log, ns: some 100 MB.
+pub(super) const PART_NS: u64 = 600_000_000_000;
 
 /// Most recordings in one folder.
 const MOST: u32 = 9_999;
@@ -81,7 +85,15 @@ mod seed_text {
 /// A recording under way.
 pub(super) struct Folder {
     path: PathBuf,
+    /// The newest part of the log.
     log: LogFile,
+    parts: u32,
+    part_ns: u64,
+    /// Time at which the next part begins, ns.
+    next_ns: u64,
+    /// What every part has at its head.
+    head: Vec<(u16, OwnedSample)>,
+    scene: Scene,
     inputs: BufWriter<File>,
     line: Vec<u8>,
     /// Messages that were not to be written.
@@ -93,6 +105,11 @@ pub(super) struct Folder {
 /// A failure of a file, for a person.
 fn said(path: &Path, error: &std::io::Error) -> String {
     format!("{}: {error}", path.display())
+}
+
+fn log_file(path: &Path, scene: &Scene) -> Result<LogFile, String> {
+    let log = LogFile::create(path).and_then(|log| log.with(scene.clone()));
+    log.map_err(|e| e.to_string())
 }
 
 /// A folder of the next free number.
@@ -147,10 +164,13 @@ impl Folder {
         }
         let file = path.join(INPUTS);
         let inputs = File::create_new(&file).map_err(|e| said(&file, &e))?;
-        let log = LogFile::create(&path.join(LOG)).and_then(|log| log.with(about.scene.clone()));
-        let log = log.map_err(|e| e.to_string())?;
         let mut folder = Self {
-            log,
+            log: log_file(&path.join(LOG), &about.scene)?,
+            parts: 1,
+            part_ns: about.part_ns,
+            next_ns: begin_us * 1_000 + about.part_ns,
+            head: head.to_vec(),
+            scene: about.scene.clone(),
             inputs: BufWriter::new(inputs),
             line: Vec::with_capacity(256),
             lost: 0,
@@ -169,9 +189,7 @@ impl Folder {
             },
             path,
         };
-        for (channel, sample) in head {
-            folder.put(*channel, 0, sample, false);
-        }
+        folder.put_head();
         let written = folder.inputs.write_all(before.unwrap_or_default());
         written.map_err(|e| said(&file, &e))?;
         folder.flush()?;
@@ -181,6 +199,10 @@ impl Folder {
 
     /// Adds a sample to the log.
     pub(super) fn sample(&mut self, moving: &Moving, lost: bool) -> Result<(), String> {
+        self.cut(moving.t_ns)?;
+        if let OwnedSample::Provenance(_) = &moving.sample {
+            self.head.push((moving.channel, moving.sample.clone()));
+        }
         self.put(moving.channel, moving.t_ns, &moving.sample, lost);
         self.log
             .failure()
@@ -198,6 +220,27 @@ impl Folder {
         self.log
             .failure()
             .map_or(Ok(()), |why| Err(why.to_string()))
+    }
+
+    /// Begins the next part of the log where it is due: of a long recording each file stays one that can be
+    /// opened and sent, and whatever happens to the last one, the others are whole.
+    fn cut(&mut self, t_ns: u64) -> Result<(), String> {
+        if t_ns < self.next_ns {
+            return Ok(());
+        }
+        self.log.finish().map_err(|e| e.to_string())?;
+        self.parts += 1;
+        self.log = log_file(&part(&self.path.join(LOG), self.parts), &self.scene)?;
+        self.next_ns = t_ns + self.part_ns;
+        self.put_head();
+        Ok(())
+    }
+
+    fn put_head(&mut self) {
+        for (channel, sample) in std::mem::take(&mut self.head) {
+            self.put(channel, 0, &sample, false);
+            self.head.push((channel, sample));
+        }
     }
 
     fn put(&mut self, channel: u16, t_ns: u64, sample: &OwnedSample, lost: bool) {
@@ -289,8 +332,98 @@ pub(crate) fn list(root: &Path, most: usize) -> Vec<(Summary, u64)> {
     names.sort_unstable_by(|a, b| b.cmp(a));
     let read = names.iter().filter_map(|name| {
         let folder = root.join(name);
-        let bytes = fs::metadata(folder.join(LOG)).map_or(0, |m| m.len());
-        Some((summary(&folder).ok()?, bytes))
+        let bytes = parts(&folder.join(LOG)).map(|part| fs::metadata(part).map_or(0, |m| m.len()));
+        Some((summary(&folder).ok()?, bytes.sum()))
     });
     read.take(most).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use wheeleg_config::builtin;
+    use wheeleg_telemetry::{BodySample, ProvenanceSample, Scalar, channel_index, channels, read};
+
+    use super::*;
+
+    fn moving(topic: &str, t_ns: u64, sample: OwnedSample) -> Moving {
+        Moving {
+            channel: channel_index(topic).expect("a channel") as u16,
+            number: 0,
+            t_ns,
+            sample,
+        }
+    }
+
+    /// Times and texts of all messages, and whether the log has its end.
+    fn contents(log: &Path) -> (Vec<u64>, Vec<String>, bool) {
+        let (mut times, mut texts) = (Vec::new(), Vec::new());
+        let end = read(log, &mut |logged| {
+            match channels()[logged.channel].topic {
+                "/run" => logged.fields(&["text"], &mut |_, text| {
+                    if let Scalar::Text(text) = text {
+                        texts.push(text);
+                    }
+                }),
+                _ => times.push(logged.t_ns),
+            }
+            ControlFlow::Continue(())
+        });
+        (times, texts, end.expect("a log").whole)
+    }
+
+    #[test]
+    fn a_long_log_is_cut_into_parts_that_are_read_as_one() {
+        let root = tempfile::tempdir().expect("a folder");
+        let robot = builtin::robot("wheeleg-2003").expect("built in");
+        let scenario = builtin::scenario("stand").expect("built in");
+        let about = About::new(&robot, "", &scenario, "").expect("a robot");
+        let about = About {
+            part_ns: 1_000_000_000,
+            ..about
+        };
+        let head = OwnedSample::Provenance(ProvenanceSample {
+            kind: "robot".to_owned(),
+            text: "wheeleg-2003".to_owned(),
+        });
+        let place = channel_index("/run").expect("a channel") as u16;
+        // It begins in mid-run: its parts count from there.
+        let begin_s = 5;
+        let known = [(place, head.clone())];
+        let mut folder = Folder::create(root.path(), &about, begin_s * 1_000_000, &known, None)
+            .expect("a recording");
+        // Of one that begins with the power, the head comes later.
+        folder
+            .sample(&moving("/run", 0, head), false)
+            .expect("written");
+        let times: Vec<u64> = (0..250).map(|n| (5_000 + 10 * n) * 1_000_000).collect();
+        for t_ns in &times {
+            let body = OwnedSample::Body(BodySample::default());
+            let written = folder.sample(&moving("/body", *t_ns, body), false);
+            written.expect("written");
+        }
+        folder.finish().expect("finished");
+        let log = root.path().join("0001").join(LOG);
+        let files: Vec<PathBuf> = parts(&log).collect();
+        let names: Vec<&str> = files
+            .iter()
+            .filter_map(|file| file.file_name()?.to_str())
+            .collect();
+        assert_eq!(names, ["log.mcap", "log.2.mcap", "log.3.mcap"]);
+        let robot = vec!["wheeleg-2003".to_owned(); 2];
+        assert_eq!(contents(&log), (times.clone(), robot.clone(), true));
+        // Each is a log by itself.
+        assert_eq!(
+            contents(&files[1]),
+            (times[100..200].to_vec(), robot.clone(), true)
+        );
+        let bytes = files
+            .iter()
+            .map(|file| file.metadata().expect("there").len());
+        assert_eq!(list(root.path(), 9)[0].1, bytes.sum::<u64>());
+        // Of one that had just begun nothing is missed, and it is told that the log breaks off.
+        fs::write(&files[2], "").expect("written");
+        assert_eq!(contents(&log), (times[..200].to_vec(), robot, false));
+    }
 }

@@ -50,6 +50,8 @@ pub(crate) struct About {
     pub(crate) scenario_toml: String,
     /// Picture of the robot on its ground, at rest.
     pub(crate) scene: Scene,
+    /// Length of a part of its log, ns.
+    part_ns: u64,
     /// The same can be given to it once more.
     pub(crate) repeatable: bool,
 }
@@ -69,8 +71,18 @@ impl About {
             robot_toml: robot_toml.to_owned(),
             scenario_toml: scenario_toml.to_owned(),
             scene: scene.map_err(|e| ConsoleError::other(e.to_string(), "choose another robot"))?,
+            part_ns: folder::PART_NS,
             repeatable: true,
         })
+    }
+
+    /// The same of real boards: nobody can give them the same once more.
+    pub(crate) fn of_boards(self) -> Self {
+        Self {
+            scene: self.scene.of_boards(),
+            repeatable: false,
+            ..self
+        }
     }
 }
 

@@ -390,6 +390,12 @@ fn asked_for_control(rig: &TestRig) -> (Client, Client, Value) {
     (first, second, json!({ "to": asked["session"] }))
 }
 
+/// At the robot's own computer, where for 2 s others there alone may take control then.
+pub(crate) fn revokes(client: &mut Client) {
+    let outcome = client.carry_out("Revoke", &json!({ "hold": 2 }), 1000);
+    assert_eq!(outcome.expect("sent"), Outcome::Done);
+}
+
 /// The second has taken what the first has handed over: it drives on, and nothing was held meanwhile.
 fn takes_over(rig: &TestRig, second: &mut Client) {
     done(second, "TakeControl");
@@ -445,7 +451,7 @@ fn what_is_handed_over_and_not_taken_is_free() {
     assert_eq!(outcome, Outcome::Done);
     first.keep_control(false);
     look(&mut second, "offered");
-    // Whoever it was kept for goes: it is free at once.
+    // Whoever it was reserved for goes: it is free at once.
     drop(second);
     let begin = Instant::now();
     loop {
@@ -468,8 +474,11 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     let nothing = json!({});
     let mut viewer = rig.view();
     look(&mut viewer, "state");
-    assert_eq!(refusal(&mut viewer, "Revoke", &nothing), "role");
-    done(&mut local, "Revoke");
+    assert_eq!(
+        refusal(&mut viewer, "Revoke", &json!({ "hold": 2 })),
+        "role"
+    );
+    revokes(&mut local);
     assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
     // It asks anew before it is gone: that gains nothing.
@@ -485,15 +494,15 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
         (&event["holder"], &event["revoked_by"]),
         (&json!("driver"), &json!("owner"))
     );
-    // For a while whoever revoked alone may take it; where they do not, everybody.
-    let kept_for = &state["kept_for"];
-    assert_eq!(kept_for["name"], "owner", "{state}");
+    // For a while others at the robot's computer may take it; where they do not, everybody.
+    let reserved_for = &state["reserved_for"];
+    assert_eq!(reserved_for["name"], "the robot's computer", "{state}");
     look(&mut driver, "state");
     assert_eq!(
         refusal(&mut driver, "TakeControl", &nothing),
         "control_held"
     );
-    until_driven(&rig, &mut driver, |state| state["kept_for"].is_null());
+    until_driven(&rig, &mut driver, |state| state["reserved_for"].is_null());
     // Whoever looks at the robot may take it anew, and has to clear what happened.
     done(&mut driver, "TakeControl");
     assert_eq!(refusal(&mut driver, "Arm", &nothing), "latched");
@@ -503,7 +512,7 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     done(&mut driver, "Disarm");
     done(&mut driver, "ReleaseControl");
     until_driven(&rig, &mut driver, |state| state["control"].is_null());
-    done(&mut local, "Revoke");
+    revokes(&mut local);
     done(&mut driver, "TakeControl");
 }
 
@@ -527,6 +536,30 @@ fn who_pauses_and_leaves_keeps_the_clock_from_nobody() {
     done(&mut other, "TakeControl");
 }
 
+/// Whoever asked while the holder was gone already is no sooner refused by the next one than that one
+/// is told.
+#[test]
+fn who_asked_for_the_control_of_nobody_is_told_to_the_next_holder() {
+    let rig = TestRig::new();
+    let mut gone = rig.driver("gone");
+    let [mut asker, mut next] = ["asker", "next"].map(|name| rig.control(name));
+    for client in [&mut asker, &mut next] {
+        look(client, "state");
+    }
+    let nothing = json!({});
+    done(&mut gone, "Pause");
+    drop(gone);
+    rig.until("gone", |state| state["control"]["ended"] == "gone");
+    assert_eq!(refusal(&mut asker, "TakeControl", &nothing), "control_held");
+    done(&mut next, "Resume");
+    until_driven(&rig, &mut next, |state| state["control"].is_null());
+    done(&mut next, "TakeControl");
+    next.keep_control(true);
+    look(&mut asker, "state");
+    assert_eq!(refusal(&mut asker, "TakeControl", &nothing), "control_held");
+    assert_eq!(look(&mut next, "asked")["by"], "asker");
+}
+
 #[test]
 fn control_is_revoked_while_the_clock_stands() {
     let rig = TestRig::new();
@@ -535,7 +568,7 @@ fn control_is_revoked_while_the_clock_stands() {
     let nothing = json!({});
     done(&mut driver, "Pause");
     look(&mut owner, "state");
-    done(&mut owner, "Revoke");
+    revokes(&mut owner);
     assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     let state = rig.state();
     assert_eq!(
@@ -543,13 +576,13 @@ fn control_is_revoked_while_the_clock_stands() {
         (&json!("driver"), &json!("revoked"))
     );
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
-    // However long the clock stands, the control is kept for whoever revoked.
+    // However long the clock stands, the control is reserved.
     std::thread::sleep(Duration::from_millis(2_500));
     done(&mut owner, "Resume");
     let state = until_driven(&rig, &mut owner, |state| state["control"].is_null());
     assert_eq!(
-        (&state["hold"], &state["kept_for"]["name"]),
-        (&json!("operator_lost"), &json!("owner"))
+        (&state["hold"], &state["reserved_for"]["name"]),
+        (&json!("operator_lost"), &json!("the robot's computer"))
     );
     done(&mut owner, "TakeControl");
 }
@@ -569,13 +602,13 @@ fn control_that_is_only_asked_for_is_revoked_as_well() {
     let mut refused = None;
     for _ in 0..10 {
         rig.until("free", |state| {
-            state["control"].is_null() && state["kept_for"].is_null()
+            state["control"].is_null() && state["reserved_for"].is_null()
         });
         look(&mut asker, "state");
         look(&mut owner, "state");
         let n = asker.give("TakeControl", &json!({}), 1_000).expect("sent");
         assert_eq!(look(&mut asker, "answer")["status"], "accepted");
-        done(&mut owner, "Revoke");
+        revokes(&mut owner);
         if let Outcome::Refused { reason, .. } = asker.outcome(n) {
             refused = Some(reason);
             break;

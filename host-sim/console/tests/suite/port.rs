@@ -1,5 +1,7 @@
 //! The robot's boards at a serial port, here a pseudo-terminal with simulated ones behind it.
 
+use std::fs;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -45,9 +47,10 @@ fn boards() -> Far {
     }
 }
 
-fn live(path: &str) -> Live {
+/// Its boards are at this port, and its adapter as these files tell.
+fn live(path: &str, ports: &Path) -> Live {
     Live {
-        port: Some(Port::parse(path).expect("a port")),
+        port: Some(Port::parse(path).expect("a port").told_of_in(ports)),
         ..Live::load("stand", Some("wheeleg-2003")).expect("built in")
     }
 }
@@ -79,11 +82,17 @@ fn strokes_mm(client: &mut Client, wanted: impl Fn(f32, f32) -> bool) -> [f32; 2
 #[test]
 fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
     let far = boards();
-    let rig = TestRig::of(live(&far.path));
+    let ports = tempfile::tempdir().expect("a folder");
+    let device = Path::new(&far.path).file_name().expect("a name");
+    let device = ports.path().join(device).join("device");
+    fs::create_dir_all(&device).expect("a folder");
+    let collects = |ms: &str| fs::write(device.join("latency_timer"), ms).expect("a setting");
+    collects("16\n");
+    let rig = TestRig::of(live(&far.path, ports.path()));
     let state = rig.until("ready", |state| state["ready"] == true);
     assert_eq!(state["simulated"], false);
     // Only one program leads them.
-    let second = TestRig::try_of(live(&far.path)).expect_err("refused");
+    let second = TestRig::try_of(live(&far.path, ports.path())).expect_err("refused");
     assert!(second.to_string().contains(&far.path), "{second}");
     let mut driver = rig.control("driver");
     look(&mut driver, "state");
@@ -96,6 +105,8 @@ fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
     }
     done(&mut driver, "TakeControl");
     driver.keep_control(true);
+    assert_eq!(refusal(&mut driver, "Arm", &json!({})), "slow_adapter");
+    collects("1\n");
     // A board that a busy computer kept from answering is lost for a moment.
     let begin = Instant::now();
     loop {
@@ -126,7 +137,7 @@ fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
 
 #[test]
 fn a_port_that_is_not_there_is_named() {
-    let error = TestRig::try_of(live("/dev/not-a-port")).expect_err("refused");
+    let error = TestRig::try_of(live("/dev/not-a-port", Path::new("/"))).expect_err("refused");
     let text = error.to_string();
     assert!(text.contains("/dev/not-a-port"), "{text}");
     for wrong in ["", "@9600", "/dev/ttyUSB0@fast", "/dev/ttyUSB0@0"] {

@@ -14,6 +14,7 @@ use wheeleg_console::replay::{Replayed, recorded, replay};
 use wheeleg_telemetry::{Derived, attachments, first_difference, read_derived};
 
 use crate::common::{TestRig, done, refusal};
+use crate::control::revokes;
 
 fn folder(rig: &TestRig, id: &str) -> PathBuf {
     rig.home.path().join("recordings").join(id)
@@ -123,7 +124,7 @@ fn a_revoked_control_is_recorded_and_repeats() {
     let rig = TestRig::recorded(1.0);
     let driver = rig.driver("driver");
     let mut owner = rig.control("owner");
-    done(&mut owner, "Revoke");
+    revokes(&mut owner);
     let state = rig.until("over", |state| state["control"].is_null());
     assert_eq!(state["hold"], "operator_lost");
     let query = "samples?channel=/session";

@@ -1,5 +1,7 @@
 //! Lines over time, or over anything else.
 
+use std::ops::Range;
+
 use super::axes::{Axes, Grid};
 use super::simplify::simplified;
 use super::svg::{Stroke, Svg};
@@ -34,6 +36,8 @@ pub fn line(label: &str, colour: Colour, width: u32, points: Vec<(f64, f64)>) ->
 pub struct Lines {
     /// The curves, drawn in this order.
     pub series: Vec<Series>,
+    /// Which of them the picture's legend names; a page has room for all.
+    pub(super) named: Range<usize>,
     /// Horizontal lines with a meaning.
     pub(super) limits: Vec<f64>,
     pub(super) x_label: String,

@@ -49,6 +49,7 @@ impl Content {
     /// Lines over anything.
     pub fn curves(x_label: &str, (y_label, y_range): Axis<'_>, series: Vec<Series>) -> Self {
         Self::Lines(Lines {
+            named: 0..series.len(),
             series,
             limits: Vec::new(),
             x_label: x_label.to_owned(),
@@ -208,13 +209,10 @@ impl Panel {
         self
     }
 
-    /// Leaves the legend to another panel, but for the lines `named`.
+    /// Leaves the legend of the picture to another panel, but for the lines `named`.
     pub fn name_only(&mut self, named: std::ops::Range<usize>) {
         if let Content::Lines(lines) = &mut self.content {
-            let unnamed = lines.series.iter_mut().enumerate();
-            for (_, line) in unnamed.filter(|(i, _)| !named.contains(i)) {
-                line.label.clear();
-            }
+            lines.named = named;
         }
     }
 
@@ -238,17 +236,18 @@ impl Panel {
     /// Title at the left, legend after it.
     fn head(&self, svg: &mut Svg, top: u32) {
         let at = (f64::from(LEFT), f64::from(top) + 14.0);
-        let series: &[Series] = match &self.content {
-            Content::Lines(lines) => &lines.series,
-            _ => &[],
+        let (series, in_legend): (&[Series], _) = match &self.content {
+            Content::Lines(lines) => (&lines.series, lines.named.clone()),
+            _ => (&[], 0..0),
         };
         let title = match &self.content {
             Content::Lines(lines) => format!("{} {}", self.title, lines.y_label),
             Content::Raster(_) | Content::Bars(_) => self.title.clone(),
             Content::Heat(heat) => format!("{}: {}", self.title, heat.legend),
         };
-        let named = series.iter().filter(|l| !l.label.is_empty());
-        let named = named.map(|l| (l.label.as_str(), Stroke::new(l.colour, l.width)));
+        let named = series.iter().enumerate();
+        let named = named.filter(|(i, l)| in_legend.contains(i) && !l.label.is_empty());
+        let named = named.map(|(_, l)| (l.label.as_str(), Stroke::new(l.colour, l.width)));
         svg.legend(at, &title, named);
     }
 }

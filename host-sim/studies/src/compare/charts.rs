@@ -115,21 +115,17 @@ fn step_panels(comparison: &Comparison, axis: &str) -> Option<Vec<Panel>> {
     if step.is_empty() {
         return None;
     }
-    let mut error = comparison.overlay(axis, Move::Step100, |r, x| x - r);
-    for series in &mut error {
-        series.label.clear();
-    }
-    Some(vec![
-        panel("Stroke", "[mm]", 1.5, step, None, &[]),
-        panel(
-            "The same about its target",
-            "[mm]; ±1 mm counts as settled",
-            1.5,
-            error,
-            Some((-4.0, 4.0)),
-            &[-1.0, 1.0],
-        ),
-    ])
+    let error = comparison.overlay(axis, Move::Step100, |r, x| x - r);
+    let mut error = panel(
+        "The same about its target",
+        "[mm]; ±1 mm counts as settled",
+        1.5,
+        error,
+        Some((-4.0, 4.0)),
+        &[-1.0, 1.0],
+    );
+    error.name_only(0..0);
+    Some(vec![panel("Stroke", "[mm]", 1.5, step, None, &[]), error])
 }
 
 /// What the README shows: the step of the first axis, and bars.

@@ -258,15 +258,20 @@ fn preview(study: &Study) -> Figure {
         (Start::StopHeld, 0.0, "stop, held", colour::DELAYED),
         (Start::MidRetract, 0.0, "mid-stroke", colour::SECOND),
     ];
-    let series = |y: fn(&Previewed) -> Option<f64>, named: bool| {
-        kinds
-            .iter()
-            .map(|(start, load, name, c)| {
-                line(if named { name } else { "" }, *c, 2, rows(*start, *load, y))
-            })
-            .collect()
+    let series = |y: fn(&Previewed) -> Option<f64>| {
+        let kinds = kinds.iter();
+        let lines = kinds.map(|(start, load, name, c)| line(name, *c, 2, rows(*start, *load, y)));
+        lines.collect()
     };
     let x = ("preview [s]", (0.0, 0.4));
+    let mut early = curves(
+        "motion before the command",
+        x,
+        ("[mm]", (0.0, 1.5)),
+        series(|r| Some(r.early_mm)),
+        &[EARLY_LIMIT_MM],
+    );
+    early.name_only(0..0);
     Figure {
         id: "preview".to_owned(),
         title: "What an announced move gains".to_owned(),
@@ -279,16 +284,10 @@ fn preview(study: &Study) -> Figure {
                 "start delay",
                 x,
                 ("[s]", (0.0, 0.35)),
-                series(|r| r.delay_s, true),
+                series(|r| r.delay_s),
                 &[PREVIEW_LIMIT_S],
             ),
-            curves(
-                "motion before the command",
-                x,
-                ("[mm]", (0.0, 1.5)),
-                series(|r| Some(r.early_mm), false),
-                &[EARLY_LIMIT_MM],
-            ),
+            early,
         ],
     }
 }

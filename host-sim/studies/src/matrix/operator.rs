@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use wheeleg_access::Key;
-use wheeleg_access::desk::{ClientId, Desk};
+use wheeleg_access::desk::{Asker, ClientId, Desk};
 use wheeleg_access::door::{Door, Entered};
 use wheeleg_access::request::{Body, Order};
 use wheeleg_master::command::CommandCode;
@@ -120,7 +120,13 @@ impl Counter {
             } if !limited && seen_us <= now_us => {
                 let takes = command.code() == CommandCode::TakeControl;
                 let name = format!("client {}", client.id);
-                if self.desk.ask(client.id, (&name, &name), takes).is_err() {
+                let asker = Asker {
+                    client: client.id,
+                    name: &name,
+                    session: &name,
+                    is_local: false,
+                };
+                if self.desk.ask(asker, takes).is_err() {
                     return false;
                 }
                 self.next_request += 1;

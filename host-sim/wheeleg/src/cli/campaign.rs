@@ -18,7 +18,7 @@ use wheeleg_studies::run::log_bytes;
 use wheeleg_studies::study::Signal;
 
 use super::exit::{self, CANNOT_WRITE, FAILED, INCOMPLETE, TARGETS_MISSED, TRY_AGAIN};
-use super::{print, stop_on_signals, tell, tell_error, tell_unwritten, whole};
+use super::{print, show, stop_on_signals, tell, tell_error, tell_unwritten, whole};
 
 /// Arguments of `wheeleg campaign`.
 #[derive(Debug, Args)]
@@ -257,8 +257,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
         took,
         threads: options.threads,
     });
-    let text = print::ran(&ran, &store, shard, pilot);
-    print(&text)?;
+    show(&print::ran(&ran, &store, shard, pilot))?;
     if let Some(signal) = ran.stopped {
         tell(&format!(
             "{} with {} of {} cases done; run the same command again to continue",
@@ -330,12 +329,11 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
     stop.begin();
     loop {
         let state = status(&store, shard)?;
-        let text = if args.json {
-            print::state_json(&state)
+        if args.json {
+            print(&print::state_json(&state))?;
         } else {
-            print::state(&state, &store)
-        };
-        print(&text)?;
+            show(&print::state(&state, &store))?;
+        }
         let complete = state.missing.is_empty();
         if complete || !args.watch {
             return Ok(if complete {
@@ -360,11 +358,11 @@ fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
         tell("stopped; no table was written, and the parts are unchanged");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
-    Ok(print(&if args.json {
-        print::merged_json(&merged, &args.out)
+    Ok(if args.json {
+        print(&print::merged_json(&merged, &args.out))
     } else {
-        print::merged(&merged, &args.out)
-    })?)
+        show(&print::merged(&merged, &args.out))
+    }?)
 }
 
 fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
@@ -378,11 +376,11 @@ fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
     let written = report.write(&out);
     let (findings, pairs) = (&report.findings, report.pairs.as_ref());
     let page = written.is_ok().then_some(&*out);
-    print(&if args.json {
-        print::findings_json(findings, pairs)
+    if args.json {
+        print(&print::findings_json(findings, pairs))?;
     } else {
-        print::findings(findings, pairs, page)
-    })?;
+        show(&print::findings(findings, pairs, page))?;
+    }
     written?;
     Ok(ExitCode::from(stop.signal().map_or(0, stopped_code)))
 }
@@ -397,7 +395,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
         tell("stopped before the end of the case; nothing was written");
         return Ok(ExitCode::from(stopped()));
     };
-    print(&print::replayed(&replayed))?;
+    show(&print::replayed(&replayed))?;
     let same = replayed.same_row() != Some(false) && replayed.same_log() != Some(false);
     if let Some(run) = replayed.run {
         if !tell_unwritten(run.unwritten) {

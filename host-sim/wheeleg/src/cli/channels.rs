@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::{print, show};
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::{channels, derived};
 
@@ -19,11 +19,19 @@ pub(super) struct ChannelsArgs {
 
 /// Prints the telemetry channels.
 pub(super) fn command(args: &ChannelsArgs) -> Result<ExitCode, StudyError> {
-    print(&text(args.json))
+    tell(args.json)
+}
+
+/// Prints the listing.
+pub(super) fn tell(json: bool) -> Result<ExitCode, StudyError> {
+    match json {
+        true => print(&text(true)),
+        false => show(&text(false)),
+    }
 }
 
 /// The listing.
-pub(super) fn text(json: bool) -> String {
+fn text(json: bool) -> String {
     if json {
         let list: Vec<serde_json::Value> = channels()
             .iter()

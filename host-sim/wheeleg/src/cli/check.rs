@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::print;
+use super::{print, show};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::check::vectors::{self, Comparison};
 
@@ -48,7 +48,7 @@ pub(super) fn command(args: &CheckArgs) -> Result<ExitCode, StudyError> {
             .map_err(|e| StudyError::refused(e.to_string(), "please report this"))?;
         print(&format!("{json:#}\n"))?;
     } else {
-        print(&table(&comparison))?;
+        show(&table(&comparison))?;
     }
     Ok(if comparison.passed {
         ExitCode::SUCCESS

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use wheeleg_console::command_list;
 use wheeleg_master::command::{TABLE, write_markdown};
 
-use super::print;
+use super::{print, show};
 use wheeleg_studies::StudyError;
 
 /// Arguments of `wheeleg commands`.
@@ -34,7 +34,7 @@ pub(super) fn command(args: &CommandsArgs) -> Result<ExitCode, StudyError> {
         let _ = write_markdown(&mut page);
         return print(&page);
     }
-    print(&text())
+    show(&text())
 }
 
 fn text() -> String {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::show;
 use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_config::faults::{FaultSpec, KINDS};
@@ -60,5 +60,5 @@ pub(super) fn command(args: &CommissionArgs) -> Result<ExitCode, StudyError> {
     for (name, id) in NODE_NAMES.iter().zip(ids) {
         let _ = writeln!(out, "{name} = \"{}\"", hex(id));
     }
-    print(&out)
+    show(&out)
 }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_access::Key;
-use wheeleg_access::host::{SPEED, STEP_MAX};
+use wheeleg_access::host::{HOLD_S, SPEED, STEP_MAX};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::VIEW_FILE;
 use wheeleg_console::unpack::unpack;
@@ -24,7 +24,7 @@ use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
 
 use super::exit::{self, LOST};
-use super::{print, say, stop_on_signals, tell, tell_error, whole};
+use super::{fitted, print, say, show, stop_on_signals, tell, tell_error, whole};
 use param::ParamCommand;
 use reach::{Reach, ended, not_answered};
 
@@ -63,8 +63,18 @@ enum CtlCommand {
     },
     /// Stop the robot.
     Stop,
-    /// End the control of whoever has it, on the robot's own computer: an armed robot then holds.
-    Revoke,
+    /// End the control of whoever has it, on the robot's own computer: an armed robot then holds. Take
+    /// control there next; others have to wait.
+    Revoke {
+        #[arg(
+            long,
+            value_name = "SECONDS",
+            default_value_t = 10,
+            value_parser = whole(HOLD_S.0, HOLD_S.1),
+            help = format!("How long only clients on this computer may then take control, {} to {} s", HOLD_S.0, HOLD_S.1)
+        )]
+        hold: u32,
+    },
     /// Read, write or save parameters of a board.
     #[command(subcommand)]
     Param(ParamCommand),
@@ -146,7 +156,7 @@ pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
             })
         }
         CtlCommand::Take { command } => take(reach, command),
-        CtlCommand::Revoke => revoke(reach),
+        CtlCommand::Revoke { hold } => revoke(reach, *hold),
         CtlCommand::Param(command) => param::command(reach, command),
         CtlCommand::Inject { fault } => host("Inject", json!({ "fault": fault })),
         CtlCommand::EndFault { fault } => host("EndFault", json!({ "fault": fault })),
@@ -211,7 +221,7 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
             let _ = writeln!(text, "         {cause} {remedy}");
         }
     }
-    Ok(print(&text)?)
+    Ok(show(&text)?)
 }
 
 fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
@@ -240,7 +250,7 @@ fn holder(state: &Value) -> Option<String> {
         let ended = ended.map(|why| format!(" ({why}, lease not over)"));
         return Some(format!("{}{}", plain(name), ended.unwrap_or_default()));
     }
-    let name = state["kept_for"]["name"].as_str()?;
+    let name = state["reserved_for"]["name"].as_str()?;
     Some(format!("reserved for {}", plain(name)))
 }
 
@@ -248,15 +258,14 @@ fn holder(state: &Value) -> Option<String> {
 const ENDS: Duration = Duration::from_secs(3);
 
 /// Revokes control, and waits until the lease of its holder is over, which takes long where the clock is slow or paused.
-fn revoke(reach: &Reach) -> miette::Result<ExitCode> {
+fn revoke(reach: &Reach, hold_s: u32) -> miette::Result<ExitCode> {
     let mut client = reach.control()?;
     let before = match state_when(&mut client, |_| true) {
         Ok(state) => state,
         Err(unknown) => return reach.print_outcome(&unknown),
     };
     // Also where nobody is in control yet: somebody may have asked for it.
-    let end = client.carry_out("Revoke", &json!({}), 1_000);
-    let end = end?;
+    let end = client.carry_out("Revoke", &json!({ "hold": hold_s }), 1_000)?;
     if end != Outcome::Done {
         return reach.print_outcome(&end);
     }
@@ -287,6 +296,9 @@ fn revoke(reach: &Reach) -> miette::Result<ExitCode> {
             false => "the clock is slow: the lease is not over yet, and then an armed robot holds",
         });
     }
+    tell(&format!(
+        "for {hold_s} s after that only clients on this computer can take control"
+    ));
     reach.print_outcome(&Outcome::Done)
 }
 
@@ -361,7 +373,8 @@ fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> miette::Result
             }
             _ => continue,
         };
-        match say(&format!("{line}\n")) {
+        let line = format!("{line}\n");
+        match say(&if reach.json { line } else { fitted(&line) }) {
             Ok(()) => {}
             // The reader has gone away (`| head`).
             Err(e) if e.kind() == ErrorKind::BrokenPipe => return Ok(ExitCode::SUCCESS),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{end, place, print, settings, whole};
+use super::{end, place, print, settings, show, whole};
 use wheeleg_config::faults::{KINDS, KindInfo, NOT_IMPLEMENTED};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::matrix::{self, Connection, Outcome, Verdict};
@@ -59,8 +59,9 @@ struct RunArgs {
 /// Lists faults and rows, or runs rows.
 pub(super) fn command(args: &FaultsArgs) -> Result<ExitCode, StudyError> {
     match &args.command {
-        FaultsCommand::List { json } => print(&listing(*json)),
-        FaultsCommand::Rows => print(&rows()),
+        FaultsCommand::List { json: true } => print(&listing(true)),
+        FaultsCommand::List { json: false } => show(&listing(false)),
+        FaultsCommand::Rows => show(&rows()),
         FaultsCommand::Run(args) => run(args),
     }
 }

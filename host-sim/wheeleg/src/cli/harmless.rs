@@ -1,4 +1,4 @@
-//! What the program says, on a terminal: texts of files and of servers stand in it.
+//! What the program says, on a terminal: it fits its width, and texts of files and of servers stand in it.
 
 use wheeleg_studies::view::acts;
 
@@ -19,6 +19,65 @@ pub(super) fn harmless(text: &str) -> String {
     out
 }
 
+/// Part of a terminal's width within which the last column of a table begins, at most.
+const FIRST_PART: f64 = 0.7;
+
+/// A text for a terminal of so many columns: a line that is longer goes on below, under its last column where
+/// it has columns, so that a table stays one.
+pub(super) fn fit(text: &str, width: usize) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let (line, end) = match line.strip_suffix('\n') {
+            Some(line) => (line, "\n"),
+            None => (line, ""),
+        };
+        let hang = " ".repeat(last_column(line, (FIRST_PART * width as f64) as usize));
+        let options = textwrap::Options::new(width)
+            .break_words(false)
+            // Not within a path, nor at a hyphen.
+            .word_separator(textwrap::WordSeparator::AsciiSpace)
+            .word_splitter(textwrap::WordSplitter::NoHyphenation)
+            .subsequent_indent(&hang);
+        for (number, piece) in textwrap::wrap(line, options).iter().enumerate() {
+            out.push_str(if number > 0 { "\n" } else { "" });
+            out.push_str(piece);
+        }
+        out.push_str(end);
+    }
+    out
+}
+
+/// Where the last column of a line begins that is not beyond `most`: columns are two or more spaces apart.
+fn last_column(line: &str, most: usize) -> usize {
+    let mut found = 0;
+    let mut spaces = 2;
+    for (at, c) in strip(line).chars().enumerate().take(most) {
+        if c == ' ' {
+            spaces += 1;
+            continue;
+        }
+        if spaces >= 2 {
+            found = at;
+        }
+        spaces = 0;
+    }
+    found
+}
+
+/// The same without its colours, which take no room.
+fn strip(line: &str) -> String {
+    let mut out = String::with_capacity(line.len());
+    let mut rest = line;
+    while let Some(c) = rest.chars().next() {
+        let length = colour(rest);
+        if length.is_none() {
+            out.push(c);
+        }
+        rest = &rest[length.unwrap_or(c.len_utf8())..];
+    }
+    out
+}
+
 /// Bytes of the colour with which the text begins: `ESC [`, numbers, `m`. What conceals is none.
 fn colour(text: &str) -> Option<usize> {
     const CONCEAL: &str = "8";
@@ -33,6 +92,31 @@ fn colour(text: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_fits_its_terminal_and_a_line_goes_on_under_its_last_column() {
+        let table = "Scenarios (wheeleg run NAME):\n  three-step    the paper's three steps on a level floor\n  rock-field    rocks\n";
+        assert_eq!(fit(table, 200), table);
+        let wanted = [
+            "Scenarios (wheeleg run NAME):",
+            "  three-step    the paper's",
+            "                three steps on",
+            "                a level floor",
+            "  rock-field    rocks",
+        ];
+        let fitted = fit(table, 31);
+        assert!(fitted.ends_with('\n'), "{fitted:?}");
+        assert_eq!(fitted.lines().collect::<Vec<_>>(), wanted);
+        // Colours take no room, and what has no place to break stays whole.
+        let coloured = "\u{1b}[32mmet\u{1b}[0m  A1  a long text";
+        assert_eq!(
+            fit(coloured, 15),
+            "\u{1b}[32mmet\u{1b}[0m  A1  a long\n         text"
+        );
+        assert_eq!(fit("a/very/long/path", 5), "a/very/long/path");
+        assert_eq!(fit("", 80), "");
+        assert_eq!(fit("\n\n", 80), "\n\n");
+    }
 
     #[test]
     fn colours_stay_and_nothing_else_acts() {

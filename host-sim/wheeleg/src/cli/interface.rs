@@ -7,7 +7,7 @@ use clap::Args;
 use wheeleg_config::word;
 use wheeleg_protocol::{SCHEMA_HASH, VERSION};
 
-use super::print;
+use super::{print, show};
 use wheeleg_interface::{Side, archive, changes, first_difference, not_archived};
 use wheeleg_studies::StudyError;
 
@@ -24,7 +24,7 @@ pub(super) struct InterfaceArgs {
 /// Prints the interfaces, or the difference to one.
 pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, StudyError> {
     let Some(given) = &args.hash else {
-        return print(&list());
+        return show(&list());
     };
     let there = parse(given)?;
     let changes = changes(SCHEMA_HASH, there).map_err(|hash| refused(not_archived(hash)))?;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::{print, show};
 use wheeleg_config::builtin;
 use wheeleg_studies::StudyError;
 
@@ -24,7 +24,7 @@ pub(super) struct ListArgs {
 pub(super) fn command(args: &ListArgs) -> Result<ExitCode, StudyError> {
     let json = args.json;
     if args.channels {
-        return print(&super::channels::text(json));
+        return super::channels::tell(json);
     }
     let mut scenarios = Vec::new();
     for (name, ..) in builtin::SCENARIOS {
@@ -60,5 +60,5 @@ pub(super) fn command(args: &ListArgs) -> Result<ExitCode, StudyError> {
     for (name, text) in &robots {
         let _ = writeln!(out, "  {name:width$}  {text}");
     }
-    print(&out)
+    show(&out)
 }

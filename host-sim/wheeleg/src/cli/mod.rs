@@ -37,13 +37,14 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 
+use terminal_size::{Width, terminal_size_of};
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::{Finished, Settings, Stop, outlive_file_limit};
 
 use exit::{FAILED, TARGETS_MISSED};
-use harmless::harmless;
+use harmless::{fit, harmless};
 
 /// Simulator and control stack of the hybrid robot Wheeleg.
 ///
@@ -177,6 +178,19 @@ fn print(text: &str) -> Result<ExitCode, StudyError> {
     }
 }
 
+/// Prints a text for a person.
+fn show(text: &str) -> Result<ExitCode, StudyError> {
+    print(&fitted(text))
+}
+
+/// A text for a person: on a terminal its lines fit the width.
+fn fitted(text: &str) -> String {
+    match terminal_size_of(std::io::stdout()) {
+        Some((Width(width), _)) => fit(text, width.into()),
+        None => text.to_owned(),
+    }
+}
+
 /// Writes to stdout: a file or a pipe gets what was meant, a terminal nothing that acts on it.
 fn say(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
@@ -238,7 +252,7 @@ fn end<T>(
     let printed = if json {
         print(&finished.summary)
     } else {
-        print(&text(&finished))
+        show(&text(&finished))
     };
     let whole = tell_unwritten(finished.unwritten);
     if let Some(stopped) = &finished.stopped {

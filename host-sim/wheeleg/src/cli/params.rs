@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::print;
+use super::{print, show};
 use wheeleg_config::{ParameterInfo, builtin};
 use wheeleg_studies::StudyError;
 
@@ -63,5 +63,5 @@ pub(super) fn command(args: &ParamsArgs) -> Result<ExitCode, StudyError> {
         let _ = writeln!(out, "  {key:22} {value:24} {range:26} {}", p.doc);
         let _ = writeln!(out, "  {:22} {}", "", p.source);
     }
-    print(&out)
+    show(&out)
 }

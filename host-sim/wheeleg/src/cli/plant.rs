@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::print;
+use super::{print, show};
 use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::export;
@@ -82,7 +82,7 @@ fn check(args: &CheckArgs) -> Result<ExitCode, StudyError> {
         let value = serde_json::json!({ "axis": config.name, "check": c });
         print(&format!("{value:#}\n"))?;
     } else {
-        print(&check_text(&config.name, &c))?;
+        show(&check_text(&config.name, &c))?;
     }
     Ok(if c.passed {
         ExitCode::SUCCESS

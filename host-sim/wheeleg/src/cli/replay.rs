@@ -13,7 +13,7 @@ use wheeleg_studies::study::Progress;
 use wheeleg_studies::view::plain;
 
 use super::exit::{self, FAILED, TARGETS_MISSED};
-use super::{print, stop_on_signals, tell, tell_unwritten};
+use super::{print, show, stop_on_signals, tell, tell_unwritten};
 
 /// Arguments of `wheeleg replay`.
 #[derive(Debug, Args)]
@@ -80,7 +80,7 @@ pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
     let printed = if args.json {
         print(&format!("{:#}\n", as_json(&replayed)))
     } else {
-        print(&as_text(&replayed))
+        show(&as_text(&replayed))
     };
     let whole = tell_unwritten(unwritten.into_iter().collect());
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use terminal_size::{Width, terminal_size_of};
 
 use super::{Drawing, end, place, stop_on_signals, tell};
 use wheeleg_config::LawChoice;
@@ -264,19 +263,6 @@ fn run_text(finished: &Finished<Run>) -> String {
 /// Injected faults that are listed; of more there is the number.
 const FAULTS_SHOWN: usize = 20;
 
-/// Least width of a column that is worth wrapping.
-const NARROW: usize = 24;
-
-/// A text that begins in column `left`, in as many lines as a terminal of `room` columns
-/// needs; in one line elsewhere.
-fn within(text: &str, left: usize, room: Option<usize>) -> String {
-    let width = room.and_then(|room| room.checked_sub(left));
-    match width.filter(|width| *width >= NARROW) {
-        Some(width) => textwrap::wrap(text, width).join(&format!("\n{:left$}", "")),
-        None => text.to_owned(),
-    }
-}
-
 fn target_table(targets: &[Target]) -> String {
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let cells: Vec<[String; 5]> = targets
@@ -300,9 +286,6 @@ fn target_table(targets: &[Target]) -> String {
         widths.max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..5).map(width).collect();
-    // Columns before the description, and what parts them.
-    let left = widths.iter().sum::<usize>() + 9;
-    let room = terminal_size_of(std::io::stdout()).map(|(Width(w), _)| usize::from(w));
     let mut out = String::new();
     let mut row = |c: &[String; 5], judgement: Option<Judgement>, description: &str| {
         let verdict = format!("{:w$}", c[0], w = widths[0]);
@@ -318,7 +301,7 @@ fn target_table(targets: &[Target]) -> String {
             c[2],
             c[3],
             c[4],
-            within(description, left, room),
+            description,
             b = widths[1],
             c = widths[2],
             d = widths[3],
@@ -330,25 +313,4 @@ fn target_table(targets: &[Target]) -> String {
         row(c, Some(t.judgement()), &t.description);
     }
     out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::within;
-
-    #[test]
-    fn a_long_text_fits_the_terminal_and_stays_whole_elsewhere() {
-        let text = "largest a6, 20 Hz low-pass (axis read as m/s²), once more";
-        assert_eq!(within(text, 50, None), text);
-        assert_eq!(within(text, 50, Some(60)), text);
-        let wrapped = within(text, 4, Some(34));
-        let lines: Vec<&str> = wrapped.lines().collect();
-        assert_eq!(
-            lines,
-            [
-                "largest a6, 20 Hz low-pass",
-                "    (axis read as m/s²), once more"
-            ]
-        );
-    }
 }

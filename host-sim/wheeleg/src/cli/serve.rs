@@ -128,6 +128,7 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
         port: args.port.as_deref().map(Port::parse).transpose()?,
         ..live
     };
+    let slow_adapter = live.port.as_ref().and_then(Port::slow_adapter);
     let options = Options {
         live,
         recordings: args.recordings.clone(),
@@ -175,6 +176,12 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     );
     if let Some(port) = &args.port {
         let _ = writeln!(text, "boards   {port}");
+    }
+    if let Some(slow) = slow_adapter {
+        let _ = writeln!(
+            text,
+            "adapter  {slow}; until then the robot cannot be armed"
+        );
     }
     if !server.is_look_only() {
         let socket = url.replacen("http", "ws", 1);

@@ -4,6 +4,7 @@
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
 
+use super::super::fit;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
 
@@ -112,7 +113,7 @@ impl Terminal {
     pub(super) fn draw(&self, lines: &[Line]) -> std::io::Result<()> {
         let (columns, rows) = self.size();
         let mut out = HOME.to_owned();
-        for (row, Line { text, stands_out }) in lines.iter().take(rows).enumerate() {
+        for (row, Line { text, stands_out }) in within(lines, columns).take(rows).enumerate() {
             if row > 0 {
                 out.push_str("\r\n");
             }
@@ -168,6 +169,18 @@ fn write(text: &str) -> std::io::Result<()> {
     out.flush()
 }
 
+/// Lines for a terminal of so many columns: a remedy goes on below.
+fn within(lines: &[Line], columns: usize) -> impl Iterator<Item = Line> {
+    lines.iter().flat_map(move |Line { text, stands_out }| {
+        let fitted = fit(text, columns);
+        let pieces = fitted.split('\n').map(|piece| Line {
+            text: piece.to_owned(),
+            stands_out: *stands_out,
+        });
+        pieces.collect::<Vec<Line>>()
+    })
+}
+
 /// Keys of what a terminal sends. An Esc with more behind it is an arrow key or the like, but for
 /// another Esc: whoever presses it more than once means it.
 fn keys(bytes: &[u8]) -> Vec<Key> {
@@ -197,6 +210,27 @@ fn keys(bytes: &[u8]) -> Vec<Key> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_longer_than_a_line_goes_on_below() {
+        let line = |text: &str, stands_out| Line {
+            text: text.to_owned(),
+            stands_out,
+        };
+        let lines = [
+            line("", false),
+            line(" board 3: The sensor. Check its wiring.", true),
+        ];
+        let within: Vec<Line> = within(&lines, 24).collect();
+        assert_eq!(
+            within,
+            [
+                line("", false),
+                line(" board 3: The sensor.", true),
+                line(" Check its wiring.", true),
+            ]
+        );
+    }
 
     #[test]
     fn escape_alone_is_a_key_and_arrows_are_none() {

@@ -240,13 +240,13 @@ impl Seen {
                     .map(|(field, decimals)| self.number(topic, field, decimals));
             put(
                 false,
-                format!("{name:20}{asked:>9}{sensed:>9} mm{speed:>7} mm/s"),
+                format!("{name:18}{asked:>9}{sensed:>9} mm{speed:>7} mm/s"),
             );
         }
         for (topic, name) in FEET {
             let load = self.number(topic, "normal_force_n", 0);
             let switches = self.number(topic, "switches", 0);
-            put(false, format!("{name:20}{load:>9} N   switches {switches}"));
+            put(false, format!("{name:18}{load:>9} N   switches {switches}"));
         }
         put(false, String::new());
         for fault in self.faults() {
@@ -294,7 +294,7 @@ impl Seen {
 
     fn joints_head(&self) -> String {
         format!(
-            "{:20}{:>9}{:>9}{:>9}{:>8}{:>8}  {:10}mode",
+            "{:18}{:>9}{:>9}{:>9}{:>7}{:>7}  {:10}mode",
             "stroke, mm", "asked", "sensed", "error", "A bar", "B bar", "valves"
         )
     }
@@ -325,7 +325,7 @@ impl Seen {
             _ => "missing".to_owned(),
         };
         format!(
-            "{n} {name:18}{:>9}{:>9}{error:>9}{:>8}{:>8}  {valves:10}{mode}",
+            "{n} {name:16}{:>9}{:>9}{error:>9}{:>7}{:>7}  {valves:10}{mode}",
             self.number(&topic, "commanded_mm", 1),
             self.number(&topic, "sensed_mm", 1),
             self.number(&topic, "pressure_a_bar", 2),
@@ -437,7 +437,7 @@ mod tests {
         assert!(simulated.contains(" .A- . ."), "{simulated}");
         let real = joint(false);
         assert!(real.contains("88.0"), "{real}");
-        assert!(real.ends_with("       -  -         hold"), "{real}");
+        assert!(real.ends_with("      -  -         hold"), "{real}");
     }
 
     #[test]
