@@ -137,7 +137,13 @@ fn short([bore, rod, stroke, conductance, ms, dead]: [f64; 6]) -> AxisParams {
     let area_mm2 = 0.25 * std::f64::consts::PI * bore * bore;
     let mass_kg = (0.0065 * area_mm2).max(0.1);
     let coulomb_n = 0.02 * area_mm2 + 2.0;
-    let mut changes = vec![
+    let changes = [
+        ("fill_valve.conductance", conductance, "dm3/(s bar)"),
+        ("vent_valve.conductance", conductance, "dm3/(s bar)"),
+        ("fill_valve.t_on", ms, "ms"),
+        ("fill_valve.t_off", ms, "ms"),
+        ("vent_valve.t_on", ms, "ms"),
+        ("vent_valve.t_off", ms, "ms"),
         ("cylinder.bore", bore, "mm"),
         ("cylinder.rod", rod, "mm"),
         ("cylinder.stroke", stroke, "mm"),
@@ -153,12 +159,6 @@ fn short([bore, rod, stroke, conductance, ms, dead]: [f64; 6]) -> AxisParams {
         ("sensor.potentiometer.electrical_stroke", 1.1 * stroke, "mm"),
         ("sensor.potentiometer.offset", 0.05 * stroke, "mm"),
     ];
-    for valve in ["fill_valve", "vent_valve"] {
-        let path = |key: &str| -> &'static str { format!("{valve}.{key}").leak() };
-        changes.push((path("conductance"), conductance, "dm3/(s bar)"));
-        changes.push((path("t_on"), ms, "ms"));
-        changes.push((path("t_off"), ms, "ms"));
-    }
     let text = changed(BENCH, &changes);
     match AxisConfig::parse("short.toml", &text) {
         Ok(config) => config.axis,
