@@ -87,9 +87,16 @@ fn no_colour_is_no_colour() {
     for forced in ["CLICOLOR_FORCE", "FORCE_COLOR"] {
         for arguments in [&["run", "nix"][..], &["run", "--nix"], &["run", "--help"]] {
             let mut command = wheeleg();
-            let told = command.env(forced, "1").args(arguments).output().expect("start");
+            let told = command
+                .env(forced, "1")
+                .args(arguments)
+                .output()
+                .expect("start");
             let said = String::from_utf8_lossy(&[told.stdout, told.stderr].concat()).into_owned();
-            assert!(!said.is_empty() && !said.contains('\u{1b}'), "{forced}: {said:?}");
+            assert!(
+                !said.is_empty() && !said.contains('\u{1b}'),
+                "{forced}: {said:?}"
+            );
         }
     }
 }

@@ -174,7 +174,10 @@ fn short_strokes_raise_no_false_alarm() {
         for cushion_m in [axis.cylinder.end_stop.cushion_length_m, 0.6e-3 * row[2]] {
             axis.cylinder.end_stop.cushion_length_m = cushion_m;
             let check = check(&axis).expect("it can be simulated");
-            assert!(check.passed, "{row:?}, cushion of {cushion_m} m: {check:#?}");
+            assert!(
+                check.passed,
+                "{row:?}, cushion of {cushion_m} m: {check:#?}"
+            );
         }
     }
 }

@@ -105,7 +105,10 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
         let side = if *raw > info.default { "up to" } else { "from" };
         let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
         let others = params_at(address.raw()).iter().filter(|other| {
-            other.id != info.id && [other.min, other.max].into_iter().any(|raw| with(other, raw))
+            other.id != info.id
+                && [other.min, other.max]
+                    .into_iter()
+                    .any(|raw| with(other, raw))
         });
         let section = if node.is_joint() { "joint" } else { "wheel" };
         let others: Vec<String> = others
@@ -113,7 +116,11 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
                 let own = stored.iter().find(|(id, _)| *id == other.id);
                 let raw = own.map_or(other.default, |(_, raw)| *raw);
                 let value = pretty(in_unit(other, raw));
-                format!("`node.{section}.{}` = {value}{}", other.name, suffix(other.unit))
+                format!(
+                    "`node.{section}.{}` = {value}{}",
+                    other.name,
+                    suffix(other.unit)
+                )
             })
             .collect();
         let contradicts = match others.as_slice() {

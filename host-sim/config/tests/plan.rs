@@ -155,10 +155,19 @@ fn names_of_nothing_are_told_where_the_plan_has_them() {
     let path = path.to_string_lossy();
     let told = |line: usize, what: &str| format!("{path}:{line}: {what}");
     let no_scenario = "no built-in scenario has this name";
-    assert_eq!(*base, told(4, &format!("`base.scenario` = \"stant\": {no_scenario}")));
-    assert_eq!(*scenario, told(7, &format!("`factor.a.grid` = \"nix\": {no_scenario}")));
+    assert_eq!(
+        *base,
+        told(4, &format!("`base.scenario` = \"stant\": {no_scenario}"))
+    );
+    assert_eq!(
+        *scenario,
+        told(7, &format!("`factor.a.grid` = \"nix\": {no_scenario}"))
+    );
     let begin = told(11, "`factor.b.grid` = \"none.toml\": ");
-    assert!(robot.starts_with(&begin) && robot.contains("cannot read"), "{robot}");
+    assert!(
+        robot.starts_with(&begin) && robot.contains("cannot read"),
+        "{robot}"
+    );
     let help = error.problems()[0].help_text().expect("a help");
     assert!(help.contains("did you mean `stand`?"), "{help}");
 }
@@ -203,7 +212,10 @@ fn fractions_are_refused_where_only_whole_numbers_are_allowed() {
     for (field, values) in [
         ("gait.touchdown_reflex", "grid = [0.5]"),
         ("gait.touchdown_reflex", "grid = [0.0, 1e-9]"),
-        ("gait.stream_wheels", "choice = { values = [0.5, 1.0], weights = [1.0, 1.0] }"),
+        (
+            "gait.stream_wheels",
+            "choice = { values = [0.5, 1.0], weights = [1.0, 1.0] }",
+        ),
         ("gait.stream_wheels", "scale = true\ngrid = [0.5]"),
         ("gait.steps", "grid = [1.5]"),
     ] {
@@ -215,7 +227,9 @@ fn fractions_are_refused_where_only_whole_numbers_are_allowed() {
         assert!(only.contains("whole number"), "{factor}: {only}");
     }
     for values in ["[0]", "[1.0]", "[true, false]"] {
-        usable(&format!("[factor.a]\nparameter = \"robot.gait.touchdown_reflex\"\ngrid = {values}\n"));
+        usable(&format!(
+            "[factor.a]\nparameter = \"robot.gait.touchdown_reflex\"\ngrid = {values}\n"
+        ));
     }
 }
 

@@ -369,9 +369,20 @@ fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
 /// integrator refuses a body without inertia.
 #[test]
 fn no_moving_body_is_without_inertia() {
-    for (link, least) in [("crank", 2.81e-5), ("vertical_rod", 1.441e-4), ("yaw_barrel", 4.54e-5)] {
+    for (link, least) in [
+        ("crank", 2.81e-5),
+        ("vertical_rod", 1.441e-4),
+        ("yaw_barrel", 4.54e-5),
+    ] {
         let path = format!("link.{link}.inertia");
-        let all = |value: f64| with(ROBOT, &path, &format!("[{value:?}, {value:?}, {value:?}]"), "kg m2");
+        let all = |value: f64| {
+            with(
+                ROBOT,
+                &path,
+                &format!("[{value:?}, {value:?}, {value:?}]"),
+                "kg m2",
+            )
+        };
         for value in [0.0, 1e-15, 0.5 * least] {
             let error = RobotConfig::parse("my.toml", &all(value)).expect_err(link);
             let [problem] = error.problems() else {
@@ -397,7 +408,12 @@ fn no_moving_body_is_without_inertia() {
 /// straight, and for noise.
 #[test]
 fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
-    let text = with(ROBOT, "sensor.potentiometer.electrical_stroke", "150.0", "mm");
+    let text = with(
+        ROBOT,
+        "sensor.potentiometer.electrical_stroke",
+        "150.0",
+        "mm",
+    );
     let error = RobotConfig::parse("my.toml", &text).expect_err("too short");
     let [first, ..] = error.problems() else {
         panic!("{}", report(&error))
@@ -410,7 +426,10 @@ fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
     let least = 190.0 / (64_880.0 / 65_536.0 - 0.05e-2 - 6.0 / 4096.0);
     assert!(!lengths.is_empty(), "{}", report(&error));
     for length in lengths {
-        assert!((least..least + 0.2).contains(&length), "{length} mm, not {least}");
+        assert!(
+            (least..least + 0.2).contains(&length),
+            "{length} mm, not {least}"
+        );
     }
 }
 
@@ -493,7 +512,12 @@ fn a_crank_that_makes_no_leg_is_told_one_that_does() {
         let [problem] = error.problems() else {
             panic!("{said}")
         };
-        assert_eq!(first_paths(problem), ["body.crank"], "{said}: {:?}", problem.help_text());
+        assert_eq!(
+            first_paths(problem),
+            ["body.crank"],
+            "{said}: {:?}",
+            problem.help_text()
+        );
         let Advised { path, value, unit } = &problem.advice()[0][0];
         let mended = with(&text, path, &format!("{value:?}"), unit);
         RobotConfig::parse("my.toml", &mended).expect("accepted");

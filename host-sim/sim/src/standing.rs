@@ -136,14 +136,18 @@ mod tests {
         let scenario = Scenario::parse("my.toml", TEXT).expect("sound");
         let mut plant = robot.plant.clone();
         plant.terrain = scenario.ground.terrain.clone();
-        let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls") else {
+        let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
+        else {
             panic!("an error of the scenario");
         };
         let [problem] = refusal.problems() else {
             panic!("{:?}", refusal.problems());
         };
         let said = problem.summary();
-        assert!(said.starts_with("my.toml:16: `terrain[2]` (kind = \"block\""), "{said}");
+        assert!(
+            said.starts_with("my.toml:16: `terrain[2]` (kind = \"block\""),
+            "{said}"
+        );
         assert!(said.contains("height = \"1 m\""), "{said}");
         let help = problem.help_text().expect("what is allowed");
         assert!(help.contains("wheels are at x = 0 and y = ±0.2"), "{help}");

@@ -103,7 +103,10 @@ fn copy(
             behind: 0,
         },
     };
-    let length = source.metadata().map_err(|e| LogError::read(from, e))?.len();
+    let length = source
+        .metadata()
+        .map_err(|e| LogError::read(from, e))?
+        .len();
     let mut source = BufReader::new(source);
     let mut reader = LinearReader::new_with_options(checked());
     while let Some(event) = reader.next_event() {

@@ -212,7 +212,10 @@ fn what_follows_the_end_of_a_log_is_told() {
     let whole = log_to(&path("log.mcap"), 10.0).messages;
     let bytes = std::fs::read(path("log.mcap")).expect("written");
     for (name, behind) in [("none", 0), ("byte", 1), ("log", bytes.len())] {
-        let (from, to) = (path(&format!("{name}.mcap")), path(&format!("{name}-new.mcap")));
+        let (from, to) = (
+            path(&format!("{name}.mcap")),
+            path(&format!("{name}-new.mcap")),
+        );
         std::fs::write(&from, [&bytes[..], &bytes[..behind]].concat()).expect("written");
         let recovered = recover(&from, &to, &|| false).expect("a log");
         let recovered = recovered.expect("to the end");

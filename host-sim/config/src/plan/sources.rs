@@ -141,9 +141,8 @@ fn named(document: &Document<String>, key: &str) -> Vec<Named> {
         .collect();
     let factors = document.get("factor").and_then(Item::as_table_like);
     let factors = factors.into_iter().flat_map(|table| table.iter());
-    let own = |(_, factor): &(&str, &Item)| {
-        factor.get("parameter").and_then(Item::as_str) == Some(key)
-    };
+    let own =
+        |(_, factor): &(&str, &Item)| factor.get("parameter").and_then(Item::as_str) == Some(key);
     for (factor, item) in factors.filter(own) {
         let grid = item.get("grid").and_then(Item::as_array);
         let names = grid.into_iter().flatten();

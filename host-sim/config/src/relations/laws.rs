@@ -439,14 +439,24 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (low, high) = (least / CODES + off, most / CODES - off);
     let mut offers = Vec::new();
     if !is_held[0] {
-        offers.push(vec![Offer::new(f, it.fields[4], Bound::UpTo, (codes[0] - beside).floor())]);
+        offers.push(vec![Offer::new(
+            f,
+            it.fields[4],
+            Bound::UpTo,
+            (codes[0] - beside).floor(),
+        )]);
         let most_m = ((sensor.offset_m / low) * 1e4).floor() * 1e-4;
         offers.push(vec![Offer::new(f, it.fields[0], Bound::UpTo, most_m)]);
         let least_m = (low * sensor.electrical_m * 1e4).ceil() * 1e-4;
         offers.push(vec![Offer::new(f, it.fields[1], Bound::From, least_m)]);
     }
     if !is_held[1] {
-        offers.push(vec![Offer::new(f, it.fields[5], Bound::From, (codes[1] + beside).ceil())]);
+        offers.push(vec![Offer::new(
+            f,
+            it.fields[5],
+            Bound::From,
+            (codes[1] + beside).ceil(),
+        )]);
         let reach_m = sensor.offset_m + sensor.gain * sensor.stroke_m;
         let least_m = (reach_m / high * 1e4).ceil() * 1e-4;
         offers.push(vec![Offer::new(f, it.fields[0], Bound::From, least_m)]);

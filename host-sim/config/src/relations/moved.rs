@@ -238,7 +238,11 @@ pub(super) fn depth(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
             brief(depth_m * 1e3),
             brief(most_m * 1e3)
         ),
-        offers: vec![f.offer(it.fields[0], Bound::From, (stiffness_n_m * 1e-3).ceil() * 1e3)],
+        offers: vec![f.offer(
+            it.fields[0],
+            Bound::From,
+            (stiffness_n_m * 1e-3).ceil() * 1e3,
+        )],
         words: String::new(),
     })
 }

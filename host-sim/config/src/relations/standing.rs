@@ -26,7 +26,9 @@ impl Triangle {
         Self {
             crank_m: body.crank_m,
             reach_m: x.hypot(y),
-            most_along: (1.0 - body.min_cos_theta3 * body.min_cos_theta3).max(0.0).sqrt(),
+            most_along: (1.0 - body.min_cos_theta3 * body.min_cos_theta3)
+                .max(0.0)
+                .sqrt(),
         }
     }
 
@@ -52,14 +54,14 @@ impl Triangle {
         let is_closed = (least_m..=most_m).contains(&yaw_m);
         (!is_closed).then(|| {
             format!(
-            "with a crank of {} mm and {} mm of `body.p4` a yaw cylinder of {} mm closes no \
+                "with a crank of {} mm and {} mm of `body.p4` a yaw cylinder of {} mm closes no \
              triangle: from {} to {} mm do",
-            mm(self.crank_m),
-            mm(self.reach_m),
-            mm(yaw_m),
-            mm(least_m),
-            mm(most_m)
-        )
+                mm(self.crank_m),
+                mm(self.reach_m),
+                mm(yaw_m),
+                mm(least_m),
+                mm(most_m)
+            )
         })
     }
 }
