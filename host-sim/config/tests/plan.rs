@@ -187,7 +187,7 @@ fn a_component_beyond_a_list_is_told_the_components() {
             "did you mean \"robot.cylinder.timing_spread[0]\"?",
         ),
         (
-            "friction.coulomb[0]",
+            "friction.coulomb[1]",
             "has no list there, but one number",
             "did you mean \"robot.friction.coulomb\"?",
         ),
@@ -216,7 +216,7 @@ fn fractions_are_refused_where_only_whole_numbers_are_allowed() {
             "gait.stream_wheels",
             "choice = { values = [0.5, 1.0], weights = [1.0, 1.0] }",
         ),
-        ("gait.stream_wheels", "scale = true\ngrid = [0.5]"),
+        ("gait.steps", "scale = true\ngrid = [0.5]"),
         ("gait.steps", "grid = [1.5]"),
     ] {
         let factor = format!("[factor.a]\nparameter = \"robot.{field}\"\n{values}\n");
