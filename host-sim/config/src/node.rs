@@ -104,6 +104,11 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
         let shown = |raw: i32| format!("{}{}", pretty(in_unit(info, raw)), suffix(info.unit));
         let side = if *raw > info.default { "up to" } else { "from" };
         let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
+        // What is printed has fewer digits than a fine format: a thousandth inwards.
+        let limit = match scale(info.format) == 1.0 {
+            true => limit,
+            false => limit + (info.default - limit) / 1000,
+        };
         let others = params_at(address.raw()).iter().filter(|other| {
             other.id != info.id
                 && [other.min, other.max]
