@@ -81,6 +81,26 @@ fn log_of(out: &Path) -> PathBuf {
     logs.remove(0)
 }
 
+/// `NO_COLOR` wins over variables that force colours.
+#[test]
+fn no_colour_is_no_colour() {
+    for forced in ["CLICOLOR_FORCE", "FORCE_COLOR"] {
+        for arguments in [&["run", "nix"][..], &["run", "--nix"], &["run", "--help"]] {
+            let mut command = wheeleg();
+            let told = command
+                .env(forced, "1")
+                .args(arguments)
+                .output()
+                .expect("start");
+            let said = String::from_utf8_lossy(&[told.stdout, told.stderr].concat()).into_owned();
+            assert!(
+                !said.is_empty() && !said.contains('\u{1b}'),
+                "{forced}: {said:?}"
+            );
+        }
+    }
+}
+
 /// What the program says, word for word; `TRYCMD=overwrite` writes it anew.
 #[test]
 fn texts_are_those_of_the_files() {

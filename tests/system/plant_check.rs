@@ -115,6 +115,97 @@ fn random_sane_axes_raise_no_false_alarm() {
     assert!(open <= AXES as usize / 20, "{open}");
 }
 
+/// Catalogue cylinders of short strokes, by bore, rod and stroke \[mm\], conductance of their valves
+/// \[dm3/(s bar)\] and the time that these take \[ms\], and dead volume \[cm3\].
+const SHORT: [[f64; 6]; 10] = [
+    // ISO 6432: both cushions reach the middle of the stroke, or nearly so.
+    [8.0, 4.0, 10.0, 0.03, 5.0, 2.5],
+    [10.0, 4.0, 10.0, 0.05, 5.0, 2.5],
+    [10.0, 4.0, 25.0, 0.05, 5.0, 2.5],
+    [12.0, 6.0, 25.0, 0.05, 5.0, 2.5],
+    [16.0, 6.0, 10.0, 0.1, 5.0, 2.5],
+    // ISO 21287: so large a force, and such slow valves, that no mass keeps the piston off its stops.
+    [40.0, 16.0, 10.0, 0.8, 15.0, 6.0],
+    [50.0, 20.0, 25.0, 1.5, 25.0, 8.0],
+    [63.0, 20.0, 10.0, 2.0, 5.0, 14.0],
+    [63.0, 20.0, 25.0, 2.0, 50.0, 12.0],
+    [80.0, 25.0, 25.0, 3.0, 25.0, 30.0],
+];
+
+/// One of them, moving what a hundredth of its force can.
+fn short([bore, rod, stroke, conductance, ms, dead]: [f64; 6]) -> AxisParams {
+    let area_mm2 = 0.25 * std::f64::consts::PI * bore * bore;
+    let mass_kg = (0.0065 * area_mm2).max(0.1);
+    let coulomb_n = 0.02 * area_mm2 + 2.0;
+    let changes = [
+        ("fill_valve.conductance", conductance, "dm3/(s bar)"),
+        ("vent_valve.conductance", conductance, "dm3/(s bar)"),
+        ("fill_valve.t_on", ms, "ms"),
+        ("fill_valve.t_off", ms, "ms"),
+        ("vent_valve.t_on", ms, "ms"),
+        ("vent_valve.t_off", ms, "ms"),
+        ("cylinder.bore", bore, "mm"),
+        ("cylinder.rod", rod, "mm"),
+        ("cylinder.stroke", stroke, "mm"),
+        ("end_stop.cushion_length", (0.3 * stroke).min(6.0), "mm"),
+        ("cylinder.dead_volume_a", dead, "cm3"),
+        ("cylinder.dead_volume_b", dead, "cm3"),
+        ("line.volume", 6.0, "cm3"),
+        ("friction.coulomb", coulomb_n, "N"),
+        ("friction.static", 1.5 * coulomb_n, "N"),
+        ("friction.viscous", 2.0 * bore, "N s/m"),
+        ("moving.mass", mass_kg, "kg"),
+        ("start.stroke", 0.2 * stroke, "mm"),
+        ("sensor.potentiometer.electrical_stroke", 1.1 * stroke, "mm"),
+        ("sensor.potentiometer.offset", 0.05 * stroke, "mm"),
+    ];
+    let text = changed(BENCH, &changes);
+    match AxisConfig::parse("short.toml", &text) {
+        Ok(config) => config.axis,
+        Err(error) => panic!("{bore} x {stroke}: {:?}", error.problems()),
+    }
+}
+
+/// Neither their cushions nor their stops, which the text book has not got, are a fault of the plant.
+#[test]
+fn short_strokes_raise_no_false_alarm() {
+    for row in SHORT {
+        let mut axis = short(row);
+        for cushion_m in [axis.cylinder.end_stop.cushion_length_m, 0.6e-3 * row[2]] {
+            axis.cylinder.end_stop.cushion_length_m = cushion_m;
+            let check = check(&axis).expect("it can be simulated");
+            assert!(
+                check.passed,
+                "{row:?}, cushion of {cushion_m} m: {check:#?}"
+            );
+        }
+    }
+}
+
+/// What is planted into an axis of a short stroke is found as well.
+#[test]
+fn an_exponent_that_is_wrong_is_found_on_a_short_stroke() {
+    let axis = short(SHORT[6]);
+    let build = |params: &AxisParams| {
+        let mut changed = params.clone();
+        if let wheeleg_plant::chamber::GasModel::Polytropic { exponent } =
+            &mut changed.cylinder.gas_model
+        {
+            *exponent += 0.02;
+        }
+        Axis::new(&changed)
+    };
+    let made = Made {
+        build: &build,
+        after_tick: &|_| {},
+    };
+    let check = check_made(&axis, &made).expect("it can be simulated");
+    let pressure = check.findings.iter();
+    let pressure = pressure.filter(|f| f.quantity == Quantity::Pressure);
+    let verdicts: Vec<Verdict> = pressure.map(|f| f.verdict).collect();
+    assert_eq!(verdicts, [Verdict::Wrong], "{check:#?}");
+}
+
 /// What is wrong in a plant that was built or kept up like this.
 fn wrong(
     build: &dyn Fn(&AxisParams) -> Result<Axis, PlantError>,
@@ -186,9 +277,44 @@ fn planted_errors_are_found() {
         "no heat there: {heat:?}"
     );
 
+    // Friction that depends on the step: an error of first order.
+    let order = built(&|p| p.cylinder.friction.viscous_n_s_m += 1e-5 * p.step_ns as f64);
+    assert!(order.contains(&Quantity::OrderStroke), "{order:?}");
+
     // Half a millisecond late.
     let late = built(&|p| p.cylinder.fill_valve.t_on_s += 5e-4);
     assert!(late.contains(&Quantity::Pressure), "{late:?}");
+}
+
+/// Under a load whose errors do not fall with the square of the step, the step that is proposed does.
+#[test]
+fn the_step_that_is_proposed_suffices() {
+    let mut proposed = 0;
+    for load in [-100.0, -50.0, 0.0, 50.0, 100.0] {
+        let text = changed(BENCH, &[("moving.load", load, "N")]);
+        let mut axis = AxisConfig::parse("load.toml", &text).expect("sound").axis;
+        for step_ns in [700_000, 1_000_000] {
+            axis.step_ns = step_ns;
+            // Longer than a file may say: some leave their range.
+            let Ok(coarse) = check(&axis) else { continue };
+            let tries = coarse.findings.iter().filter_map(|f| match f.verdict {
+                Verdict::StepTooLong { try_s } => Some(try_s),
+                _ => None,
+            });
+            let Some(try_s) = tries.reduce(f64::min) else {
+                continue;
+            };
+            proposed += 1;
+            axis.step_ns = (try_s * 1e9).round() as u64;
+            let finer = check(&axis).expect("it can be simulated");
+            let is_left = |f: &&wheeleg_studies::axis_sim::plant_check::Finding| {
+                matches!(f.verdict, Verdict::StepTooLong { .. })
+            };
+            let left = finer.findings.iter().find(is_left);
+            assert_eq!(left, None, "{load} N, {step_ns} ns: {try_s} s");
+        }
+    }
+    assert!(proposed > 1, "{proposed}");
 }
 
 /// With a step that is too long the answer is a shorter step, not a broken plant.

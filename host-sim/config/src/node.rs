@@ -96,18 +96,56 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
             Some((span, path))
         });
         let Some((span, path)) = found else { continue };
-        let value = in_unit(info, *raw);
+        let with = |info: &ParamInfo, raw: i32| {
+            let mut stored = stored.clone();
+            set(&mut stored, info.id, raw);
+            accepts(address, &stored)
+        };
+        let shown = |raw: i32| format!("{}{}", pretty(in_unit(info, raw)), suffix(info.unit));
+        let side = if *raw > info.default { "up to" } else { "from" };
+        let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
+        // What is printed has fewer digits than a fine format: a thousandth inwards.
+        let limit = match scale(info.format) == 1.0 {
+            true => limit,
+            false => limit + (info.default - limit) / 1000,
+        };
+        let others = params_at(address.raw()).iter().filter(|other| {
+            other.id != info.id
+                && [other.min, other.max]
+                    .into_iter()
+                    .any(|raw| with(other, raw))
+        });
+        let section = if node.is_joint() { "joint" } else { "wheel" };
+        let others: Vec<String> = others
+            .map(|other| {
+                let own = stored.iter().find(|(id, _)| *id == other.id);
+                let raw = own.map_or(other.default, |(_, raw)| *raw);
+                let value = pretty(in_unit(other, raw));
+                format!(
+                    "`node.{section}.{}` = {value}{}",
+                    other.name,
+                    suffix(other.unit)
+                )
+            })
+            .collect();
+        let contradicts = match others.as_slice() {
+            [] => "other parameters".to_owned(),
+            _ => others.join(", "),
+        };
         r.problem(
             Some(span),
             format!(
-                "`{path}.{}` = {}{} contradicts other parameters: the board of {address} \
-                 refuses them together",
+                "`{path}.{}` = {} contradicts {contradicts}: the board of {address} refuses them together",
                 info.name,
-                pretty(value),
-                suffix(info.unit)
+                shown(*raw)
             ),
             "not with the others",
-            Some(format!("{path}.{}: {}", info.name, info.text)),
+            Some(format!(
+                "`{path}.{}` is allowed {side} {} with the others as they are: {}",
+                info.name,
+                shown(limit),
+                info.text
+            )),
         );
         named = true;
     }
@@ -122,6 +160,18 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
             )),
         );
     }
+}
+
+/// Of the values between one that is refused and one that is accepted the last that is accepted.
+fn last_accepted(mut refused: i32, mut accepted: i32, is_accepted: impl Fn(i32) -> bool) -> i32 {
+    while refused.abs_diff(accepted) > 1 {
+        let middle = refused.midpoint(accepted);
+        match is_accepted(middle) {
+            true => accepted = middle,
+            false => refused = middle,
+        }
+    }
+    accepted
 }
 
 /// The board that an event names, if there is one of this number.

@@ -183,6 +183,26 @@ impl Scenario {
         std::iter::once(own.to_owned()).chain(beside).collect()
     }
 
+    /// A refusal of the section `[[terrain]]` of this number, from 0, with what would do.
+    #[must_use]
+    pub fn refuse_ground(&self, section: usize, why: &str, allowed: &str) -> ConfigError {
+        let Source { file, text } = &*self.source.0;
+        let what = format!("the scenario file {file} is not usable");
+        let mut r = match Reader::parse(&what, file, text, false) {
+            Ok(reader) => reader,
+            Err(error) => return error,
+        };
+        let entry = r.entry("terrain", section);
+        let message = format!("`{}` ({}): {why}", entry.path, entry.text());
+        r.problem(
+            Some(entry.span),
+            message,
+            "in its way",
+            Some(allowed.to_owned()),
+        );
+        r.refusal(&what)
+    }
+
     /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
     /// beside it.
     ///

@@ -138,6 +138,101 @@ fn what_a_case_does_not_take_from_its_scenario_is_no_factor() {
     }
 }
 
+/// What a plan names and what there is not is told with its place in the plan, all at once.
+#[test]
+fn names_of_nothing_are_told_where_the_plan_has_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.toml");
+    let text = "name = \"x\"\nroot = 1\n[base]\nscenario = \"stant\"\n[factor.a]\nparameter = \"scenario\"\n\
+         grid = [\"stand\", \"nix\"]\n[factor.b]\nparameter = \"robot\"\n\
+         grid = [\"wheeleg\",\n\"none.toml\"]\n";
+    fs::write(&path, text).expect("written");
+    let error = Sources::load(&path.to_string_lossy()).expect_err("names of nothing");
+    let said: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
+    let [base, scenario, robot] = said.as_slice() else {
+        panic!("{said:#?}");
+    };
+    let path = path.to_string_lossy();
+    let told = |line: usize, what: &str| format!("{path}:{line}: {what}");
+    let no_scenario = "no built-in scenario has this name";
+    assert_eq!(
+        *base,
+        told(4, &format!("`base.scenario` = \"stant\": {no_scenario}"))
+    );
+    assert_eq!(
+        *scenario,
+        told(7, &format!("`factor.a.grid` = \"nix\": {no_scenario}"))
+    );
+    let begin = told(11, "`factor.b.grid` = \"none.toml\": ");
+    assert!(
+        robot.starts_with(&begin) && robot.contains("cannot read"),
+        "{robot}"
+    );
+    let help = error.problems()[0].help_text().expect("a help");
+    assert!(help.contains("did you mean `stand`?"), "{help}");
+}
+
+/// A component that a list has not got is told those that there are; what is proposed may be set.
+#[test]
+fn a_component_beyond_a_list_is_told_the_components() {
+    for (field, told, help) in [
+        (
+            "cylinder.timing_spread[4]",
+            "a list of 4 numbers there: allowed are [0] to [3]",
+            "did you mean \"robot.cylinder.timing_spread[0]\"?",
+        ),
+        (
+            "cylinder.timing_spred",
+            "has no such parameter",
+            "did you mean \"robot.cylinder.timing_spread[0]\"?",
+        ),
+        (
+            "friction.coulomb[1]",
+            "has no list there, but one number",
+            "did you mean \"robot.friction.coulomb\"?",
+        ),
+    ] {
+        let factor = format!("[factor.a]\nparameter = \"robot.{field}\"\ngrid = [1.0]\n");
+        let error = Plan::of(sources(&format!("{HEAD}{factor}"))).expect_err(field);
+        let [problem] = error.problems() else {
+            panic!("{field}: {:?}", error.problems())
+        };
+        let said = problem.summary();
+        assert!(said.contains(told), "{said}");
+        assert_eq!(problem.help_text(), Some(help), "{said}");
+    }
+    usable("[factor.a]\nparameter = \"robot.cylinder.timing_spread[3]\"\ngrid = [1.0]\n");
+    let said = refused("[factor.a]\nparameter = \"scenario.windspeed\"\ngrid = [1.0]\n");
+    assert!(said[0].contains("has no such parameter"), "{said:?}");
+}
+
+/// A flag and a count are whole: 0.5 would have become `true`, unseen.
+#[test]
+fn fractions_are_refused_where_only_whole_numbers_are_allowed() {
+    for (field, values) in [
+        ("gait.touchdown_reflex", "grid = [0.5]"),
+        ("gait.touchdown_reflex", "grid = [0.0, 1e-9]"),
+        (
+            "gait.stream_wheels",
+            "choice = { values = [0.5, 1.0], weights = [1.0, 1.0] }",
+        ),
+        ("gait.steps", "scale = true\ngrid = [0.5]"),
+        ("gait.steps", "grid = [1.5]"),
+    ] {
+        let factor = format!("[factor.a]\nparameter = \"robot.{field}\"\n{values}\n");
+        let said = refused(&factor);
+        let [only] = said.as_slice() else {
+            panic!("{factor}: {said:#?}");
+        };
+        assert!(only.contains("whole number"), "{factor}: {only}");
+    }
+    for values in ["[0]", "[1.0]", "[true, false]"] {
+        usable(&format!(
+            "[factor.a]\nparameter = \"robot.gait.touchdown_reflex\"\ngrid = {values}\n"
+        ));
+    }
+}
+
 #[test]
 fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     let bars = "[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n\

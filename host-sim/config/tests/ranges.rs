@@ -62,7 +62,7 @@ fn file_board_listing_and_refusals_have_the_same_range() {
                     // A relation of the file's own: its board may take it.
                     Err(said) if said.contains("do not fit together") => {}
                     Err(said) => {
-                        assert!(said.contains("contradicts other"), "{said}");
+                        assert_all(&said, &["contradicts ", "is allowed "]);
                         assert!(!accepts(address, &[(info.id, limit)]), "{name} = {limit}");
                     }
                 }
@@ -83,6 +83,42 @@ fn file_board_listing_and_refusals_have_the_same_range() {
         }
     }
     assert!(edges > 100, "{edges}");
+}
+
+/// What a board refuses together is told with the others that have a part in it, and with the limit up to
+/// which the board takes it.
+#[test]
+fn what_contradicts_others_is_told_how_far_it_may_go() {
+    let info = |name: &str| {
+        let mut rows = JOINT_PARAMS.iter();
+        rows.find(|row| row.name == name).expect("a parameter")
+    };
+    for (name, value, other, word) in [
+        (
+            "valve_t_on",
+            50_000.0,
+            "`node.joint.pwm_period` = 20000 us",
+            "is allowed up to ",
+        ),
+        ("duty_limit", 0.0, "other parameters", "is allowed from "),
+    ] {
+        let info = info(name);
+        let Err(said) = read("node.joint", info, value) else {
+            panic!("{name} = {value} is accepted");
+        };
+        let Some((before, after)) = said.split_once(word) else {
+            panic!("{name}: {said}");
+        };
+        assert!(before.contains(&format!("contradicts {other}")), "{said}");
+        let number = after.split(' ').next().expect("a number");
+        let limit: f64 = number.parse().expect("a number");
+        read("node.joint", info, limit).expect("accepted at its limit");
+        let beyond = limit + 0.02 * (value - limit);
+        assert!(
+            read("node.joint", info, beyond).is_err(),
+            "{name} = {beyond}"
+        );
+    }
 }
 
 /// A file with the value of one parameter changed.

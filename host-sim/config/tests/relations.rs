@@ -78,6 +78,18 @@ const SOFT_STOP: &[Set] = &[
     ("cylinder.dead_volume_a", "20.0", "cm3"),
     ("cylinder.dead_volume_b", "20.0", "cm3"),
 ];
+/// A chassis far ahead, large enough for a large mass.
+const HEAVY: &[Set] = &[
+    ("body.chassis_com", "[0.3, 0.02]", "m"),
+    ("spatial.chassis_roll_inertia", "10.0", "kg m2"),
+    ("body.chassis_pitch_inertia", "10.0", "kg m2"),
+    ("spatial.chassis_yaw_inertia", "10.0", "kg m2"),
+];
+/// Room for a piston that runs deep into a soft stop.
+const ROOMY: &[Set] = &[
+    ("cylinder.dead_volume_a", "20.0", "cm3"),
+    ("cylinder.dead_volume_b", "20.0", "cm3"),
+];
 const SOFT_ROBOT: &[Set] = &[
     SOFT_STOP[0],
     SOFT_STOP[1],
@@ -137,6 +149,7 @@ const EXAMPLES: &[Example] = &[
     example("step and air A", AXIS, TIGHT_A, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 4.0], &["numerics.step", "cylinder.dead_volume_a"]),
     example("step and air B", AXIS, TIGHT_B, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 4.0], &["numerics.step", "cylinder.dead_volume_b"]),
     example("step and supply", AXIS, SMALL_RESERVOIR, ("regulator.conductance", "{}", "dm3/(s bar)"), [900.0, 1.0], &["supply.reservoir"]),
+    example("depth of the stop", AXIS, ROOMY, ("end_stop.stiffness", "{}", "N/mm"), [14.0, 15.0], &["end_stop.stiffness"]),
     example("air in the stop A", AXIS, SHORT_STEP, ("cylinder.dead_volume_a", "{}", "cm3"), [0.06, 1.0], &["cylinder.dead_volume_a", "end_stop.stiffness"]),
     example("air in the stop B", AXIS, SHORT_STEP, ("cylinder.dead_volume_b", "{}", "cm3"), [0.06, 1.0], &["cylinder.dead_volume_b", "end_stop.stiffness"]),
     example("settling in time", ROBOT, &[], ("homing.timeout", "{}", "s"), [0.3, 0.300_1], &["homing.timeout", "homing.settle"]),
@@ -161,6 +174,14 @@ const EXAMPLES: &[Example] = &[
     example("inertias of the yaw carriage", ROBOT, &[], ("link.yaw_carriage.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
     example("inertias of the horizontal carriage", ROBOT, &[], ("link.horizontal_carriage.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
     example("inertias of the vertical rod", ROBOT, &[], ("link.vertical_rod.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [2.001e-3, 2e-3], &[]),
+    example("size of the chassis", ROBOT, &[("body.chassis_pitch_inertia", "0.6", "kg m2"), ("spatial.chassis_yaw_inertia", "0.6", "kg m2")], ("spatial.chassis_roll_inertia", "{}", "kg m2"), [1e-3, 0.2], &[]),
+    example("size of a wheel", ROBOT, &[], ("body.wheel_inertia", "{}", "kg m2"), [1e-5, 0.01], &[]),
+    example("size of the yaw barrel", ROBOT, &[], ("link.yaw_barrel.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [1e-7, 1e-3], &[]),
+    example("size of the yaw rod", ROBOT, &[], ("link.yaw_rod.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [1e-7, 1e-3], &[]),
+    example("size of the crank", ROBOT, &[], ("link.crank.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [1e-7, 1e-3], &[]),
+    example("size of the yaw carriage", ROBOT, &[], ("link.yaw_carriage.inertia", "[1e-3, {}, 1e-3]", "kg m2"), [1e-7, 1e-3], &[]),
+    example("size of the horizontal carriage", ROBOT, &[], ("link.horizontal_carriage.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [1e-7, 1e-3], &[]),
+    example("size of the vertical rod", ROBOT, &[], ("link.vertical_rod.inertia", "[1e-3, 1e-3, {}]", "kg m2"), [1e-7, 1e-3], &[]),
     example("friction of a sole", ROBOT, &[], ("contact.mu_kinetic", "{}", "1"), [0.801, 0.8], &["contact.mu_kinetic", "contact.mu_static"]),
     example("friction of a wheel", ROBOT, &[], ("wheel_contact.mu_kinetic", "{}", "1"), [0.801, 0.8], &["wheel_contact.mu_kinetic", "wheel_contact.mu_static"]),
     example("friction of the chassis", ROBOT, &[], ("chassis_contact.mu_kinetic", "{}", "1"), [0.401, 0.4], &["chassis_contact.mu_kinetic", "chassis_contact.mu_static"]),
@@ -170,7 +191,7 @@ const EXAMPLES: &[Example] = &[
     example("chassis between the wheels", ROBOT, &[], ("chassis_contact.to", "[0.167, {}, 0.12]", "m"), [0.255_1, 0.255], &["spatial.track", "spatial.wheel_width"]),
     example("drawn chassis between the wheels", ROBOT, &[], ("spatial.chassis_size", "[0.6, {}, 0.2]", "m"), [0.510_1, 0.51], &["spatial.track", "spatial.wheel_width"]),
     example("ground below", ROBOT, &[], ("body.gravity", "[0.0, 0.0, {}]", "m/s2"), [9.81, -9.81], &[]),
-    example("codes of the sensor", ROBOT, &[], ("node.joint.sensor_code_max", "{}", "code"), [62_259.0, 62_260.0], &[]),
+    example("codes of the sensor", ROBOT, &[], ("node.joint.sensor_code_max", "{}", "code"), [62_380.0, 62_400.0], &["node.joint.sensor_code_max", "sensor.potentiometer.electrical_stroke"]),
     example("calibration", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [206.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5], &["sensor.adc.bits", "node.joint.settle_band"]),
@@ -180,9 +201,9 @@ const EXAMPLES: &[Example] = &[
     example("board's volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0], &[]),
     example("board's conductance", AXIS, &[], ("fill_valve.conductance", "{}", "dm3/(s bar)"), [0.004_9, 0.005_1], &[]),
     example("board's band of rest", AXIS, &[("sensor.adc.bits", "8", "bit"), ("sensor.potentiometer.offset", "7.0", "mm")], ("sensor.potentiometer.electrical_stroke", "{}", "mm"), [512.01, 512.0], &[]),
-    example("closed leg", ROBOT, &[], ("body.crank", "{}", "m"), [1.9, 0.29], &[]),
+    example("closed leg", ROBOT, &[], ("body.crank", "{}", "m"), [1.9, 0.29], &["body.crank"]),
     example("standing", ROBOT, &[], ("body.chassis_com", "[{}, 0.02]", "m"), [-0.5, -0.133], &[]),
-    example("carried by its air", ROBOT, &[("body.chassis_com", "[0.3, 0.02]", "m")], ("body.chassis_mass", "{}", "kg"), [300.0, 15.4], &[]),
+    example("carried by its air", ROBOT, HEAVY, ("body.chassis_mass", "{}", "kg"), [300.0, 15.4], &[]),
 ];
 
 impl Example {
@@ -351,6 +372,80 @@ fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
     }
 }
 
+/// A body that moves has a size, and what a refusal says that it may have is accepted: another
+/// integrator refuses a body without inertia.
+#[test]
+fn no_moving_body_is_without_inertia() {
+    for (link, least) in [
+        ("crank", 2.81e-5),
+        ("vertical_rod", 1.441e-4),
+        ("yaw_barrel", 4.54e-5),
+    ] {
+        let path = format!("link.{link}.inertia");
+        let all = |value: f64| {
+            with(
+                ROBOT,
+                &path,
+                &format!("[{value:?}, {value:?}, {value:?}]"),
+                "kg m2",
+            )
+        };
+        for value in [0.0, 1e-15, 0.5 * least] {
+            let error = RobotConfig::parse("my.toml", &all(value)).expect_err(link);
+            let [problem] = error.problems() else {
+                panic!("{}", report(&error))
+            };
+            let help = problem.help_text().expect("what is allowed");
+            let words = help.split(' ').filter_map(|word| word.parse().ok());
+            let told: Vec<f64> = words.collect();
+            let [told] = told.as_slice() else {
+                panic!("{help}")
+            };
+            assert!((told / least - 1.0).abs() < 0.01, "{link}: {help}");
+            RobotConfig::parse("my.toml", &all(*told)).expect("the value that was told");
+        }
+    }
+    let flat = with(ROBOT, "body.wheel_inertia", "0.0", "kg m2");
+    let error = RobotConfig::parse("my.toml", &flat).expect_err("a wheel");
+    let relations: Vec<_> = error.problems().iter().map(Problem::relation).collect();
+    assert_eq!(relations, [Some("size of a wheel")], "{}", report(&error));
+}
+
+/// A sensor that a board reads at the edge of its codes is refused, though noise alone takes it beyond, and
+/// what is proposed leaves room for the noise and for what is not straight.
+#[test]
+fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
+    let text = with(
+        ROBOT,
+        "sensor.potentiometer.electrical_stroke",
+        "192.0",
+        "mm",
+    );
+    let text = with(&text, "node.joint.sensor_full_scale", "192.0", "mm");
+    let text = with(&text, "node.joint.sensor_zero", "3413", "code");
+    let error = RobotConfig::parse("my.toml", &text).expect_err("too short");
+    let [problem] = error.problems() else {
+        panic!("{}", report(&error))
+    };
+    assert_eq!(problem.relation(), Some("codes of the sensor"));
+    assert!(!problem.advice().is_empty(), "{}", report(&error));
+    // 190 mm are at most 64880 of 65536 codes, with 129 codes beside them.
+    let least = 190.0 / (64_880.0 / 65_536.0 - 0.05e-2 - 6.0 / 4096.0);
+    for set in problem.advice() {
+        let mut mended = text.clone();
+        for Advised { path, value, unit } in set {
+            if path == "sensor.potentiometer.electrical_stroke" {
+                assert!(
+                    (least..least + 0.2).contains(value),
+                    "{value} mm, not {least}"
+                );
+            }
+            mended = with(&mended, path, &format!("{value:?}"), unit);
+        }
+        RobotConfig::parse("my.toml", &mended).expect("accepted");
+    }
+}
+
 /// A step of 10 mm has no 15 mm to lower slowly: it is judged by what it has.
 #[test]
 fn a_short_step_is_judged_by_its_own_way_down() {
@@ -416,6 +511,30 @@ fn ensure_printed(help: &str, path: &str, value: f64) {
         number.is_some_and(|limit| (limit - value).abs() <= 1.001e-3 * limit.abs())
     };
     assert!(texts.any(printed), "{path} = {value}: {help}");
+}
+
+/// A crank that is too short or too long is told one that is accepted, in a few digits.
+#[test]
+fn a_crank_that_makes_no_leg_is_told_one_that_does() {
+    for crank in [0.05, 0.6] {
+        let text = with(ROBOT, "body.crank", &format!("{crank:?}"), "m");
+        let error = RobotConfig::parse("my.toml", &text).expect_err("no leg");
+        let said = report(&error);
+        let digits = |word: &str| word.chars().filter(char::is_ascii_digit).count() > 8;
+        assert!(!said.split(' ').any(digits), "{said}");
+        let [problem] = error.problems() else {
+            panic!("{said}")
+        };
+        assert_eq!(
+            first_paths(problem),
+            ["body.crank"],
+            "{said}: {:?}",
+            problem.help_text()
+        );
+        let Advised { path, value, unit } = &problem.advice()[0][0];
+        let mended = with(&text, path, &format!("{value:?}"), unit);
+        RobotConfig::parse("my.toml", &mended).expect("accepted");
+    }
 }
 
 /// What a refusal proposes is accepted, of every relation: with the values in the file the relation

@@ -69,7 +69,17 @@ pub struct CylinderParams {
     pub initial_pressure_b_pa: f64,
 }
 
+/// How far a piston may be past its stop at least, whatever its stroke \[m\]: as far as a soft stop
+/// yields to a large bore.
+const STOP_MARGIN_M: f64 = 5e-3;
+
 impl CylinderParams {
+    /// How far a piston may be past its stop before the stop counts as broken \[m\].
+    #[must_use]
+    pub fn stop_margin_m(&self) -> f64 {
+        (0.1 * self.stroke_m).max(STOP_MARGIN_M)
+    }
+
     /// Checks every field against its valid range.
     ///
     /// # Errors

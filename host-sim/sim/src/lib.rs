@@ -312,7 +312,7 @@ pub fn commission(
     let boards = Boards::connect(nodes, robot)?;
     let plant = setup::plant(scenario, robot);
     let master = setup::master(scenario, robot);
-    let mut world = World::new(robot, &plant, master, seed, boards)?;
+    let mut world = World::new((scenario, robot), &plant, master, seed, boards)?;
     for fault in scenario.faults.iter().filter(|f| f.kind.is_built_in()) {
         world.inject(fault, true)?;
     }

@@ -23,13 +23,15 @@ fn remedy(robot: &RobotConfig) -> String {
     let plant = &robot.plant;
     format!(
         "correct the robot {}: with {:.1} kg in all (`body.chassis_mass`, `link.*.mass`), \
-         `supply.set_pressure` = {:.2} bar, `cylinder.bore` = {:.1} mm, `friction.static` = {:.1} N, \
+         `supply.set_pressure` = {:.2} bar, `cylinder.bore` = {:.1} mm, `cylinder.rod` = {:.1} mm, \
+         `friction.static` = {:.1} N, \
          `sensor.adc.bits` = {} and its `[node.*]` sections the joints do not come to rest within \
          `homing.tolerance` = {:.1} mm in `homing.timeout` = {:.1} s",
         robot.file,
         plant.body.total_mass_kg(),
         plant.supply.set_pressure_pa * 1e-5,
         plant.cylinders[0].bore_m * 1e3,
+        plant.cylinders[0].rod_m * 1e3,
         plant.cylinders[0].friction.static_n,
         plant.adc.bits,
         robot.homing.tolerance_m * 1e3,
@@ -71,6 +73,8 @@ pub(super) struct Operator {
     flood_refused: bool,
     /// What to do where it does not get ready.
     remedy: String,
+    /// The same where a board refuses to be armed.
+    arming_remedy: String,
 }
 
 /// Side of a leg as the master names it.
@@ -95,6 +99,11 @@ impl Operator {
             next_event: 0,
             flood_refused: false,
             remedy: remedy(robot),
+            arming_remedy: format!(
+                "correct the robot {}: a board that reports a fault cannot be armed; its sensor \
+                 (`[sensor.*]`, `cylinder.stroke`) and its parameters (`[node.*]`) must agree",
+                robot.file
+            ),
         }
     }
 
@@ -118,6 +127,9 @@ impl Operator {
                     self.stage = Stage::Settling {
                         until_ns: now_ns + self.rest_ns,
                     };
+                }
+                Event::Refused { .. } if self.stage == Stage::Arming => {
+                    return Err(self.not_ready(now_ns, &self.arming_remedy));
                 }
                 Event::HomingFailed { .. } | Event::Hold(_) | Event::Refused { .. } => {
                     return Err(self.not_ready(now_ns, &self.remedy));

@@ -91,7 +91,7 @@ impl Session {
         let plant = setup::plant(scenario, robot);
         let master = setup::master(scenario, robot);
         let nodes = boards.nodes.clone();
-        let mut world = World::new(robot, &plant, master, seed, boards)?;
+        let mut world = World::new((scenario, robot), &plant, master, seed, boards)?;
         for fault in built_in(scenario) {
             world.inject(&fault, true)?;
         }

@@ -1,7 +1,13 @@
 //! A start place on which the robot cannot stand: what it could stand on.
 
+use std::ops::Range;
+
+use wheeleg_config::Scenario;
+use wheeleg_config::terrain::Ground;
+use wheeleg_plant::dynamics::floating::FloatingRobot;
+use wheeleg_plant::dynamics::floating::state::FloatingState;
 use wheeleg_plant::robot::{Plant, PlantParams};
-use wheeleg_plant::terrain::{Material, Part, Plane, Shape};
+use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
 
 use crate::SimError;
 
@@ -18,20 +24,75 @@ fn stands(params: &PlantParams, slope_deg: u32) -> bool {
     Plant::new(&params).is_ok_and(|plant| plant.initial_state(0).is_ok())
 }
 
-/// The refusal, with the steepest plane on which this robot stands in this pose.
-pub(crate) fn refused(file: &str, params: &PlantParams, error: &dyn std::fmt::Display) -> SimError {
-    let stood = (0..=STEEPEST_DEG).take_while(|deg| stands(params, *deg));
-    let help = match stood.last() {
-        Some(deg) => format!(
-            "correct the scenario's [[terrain]] (`slope` of a plane; heights and `origin` of a map): \
-             nose uphill this robot stands on up to {deg}°, and wheels and feet must find no rock, \
-             edge or hole below them"
-        ),
-        None => format!(
-            "correct the robot {file}: in its start pose it cannot stand even on level ground"
-        ),
+/// Sections of the ground that are tried, nearest to the begin of the file first.
+const MOST_TRIED: usize = 200;
+
+/// The section of the scenario's ground without which the robot stands.
+fn culprit(ground: &Ground, params: &PlantParams) -> Option<usize> {
+    let is_culprit = |parts: &Range<usize>| {
+        let mut without = params.clone();
+        without.terrain.parts.drain(parts.clone());
+        if without.terrain.parts.is_empty() {
+            without.terrain = Terrain::default();
+        }
+        Plant::new(&without).is_ok_and(|plant| plant.initial_state(0).is_ok())
     };
-    SimError::simulation(error.to_string(), help)
+    let mut sections = ground.sections().take(MOST_TRIED);
+    let found = sections.find(|(_, parts)| is_culprit(parts));
+    found.map(|(section, _)| section)
+}
+
+/// Where wheels and soles are in the start pose, in words.
+fn places(params: &PlantParams) -> Option<String> {
+    let lengths_m = std::array::from_fn(|leg| {
+        std::array::from_fn(|i| {
+            let joint = 3 * leg + i;
+            params.stroke_zero_m[joint] + params.initial_stroke_m[joint]
+        })
+    });
+    let dynamics = FloatingRobot::new(&params.floating()).ok()?;
+    let state = FloatingState::at_rest(lengths_m);
+    let gravity = params.body.gravity_m_s2.into();
+    let [left, right, wheel, ..] = dynamics.prepare(&state, &gravity).ok()?.points_m();
+    let m = |metres: f64| format!("{metres:.2}");
+    Some(format!(
+        "its wheels are at x = 0 and y = ±{} m, {} m in radius, its soles at x = {} and y = {} m, and at \
+         x = {} and y = {} m",
+        m(wheel.y),
+        m(params.body.wheel_radius_m),
+        m(left.x),
+        m(left.y),
+        m(right.x),
+        m(right.y)
+    ))
+}
+
+/// The refusal, with the section that is in the way, if it is one; or the steepest plane on which this
+/// robot stands in this pose.
+pub(crate) fn refused(
+    scenario: &Scenario,
+    robot: &str,
+    params: &PlantParams,
+    error: &dyn std::fmt::Display,
+) -> SimError {
+    let stood = (0..=STEEPEST_DEG).take_while(|deg| stands(params, *deg));
+    let Some(deg) = stood.last() else {
+        let help = format!(
+            "correct the robot {robot}: in its start pose it cannot stand even on level ground"
+        );
+        return SimError::simulation(error.to_string(), help);
+    };
+    let allowed = format!(
+        "allowed is ground without rock, edge or hole below wheels and soles, nose uphill up to {deg}°"
+    );
+    let Some(section) = culprit(&scenario.ground, params) else {
+        let help = format!("correct the scenario's [[terrain]]: {allowed}");
+        return SimError::simulation(error.to_string(), help);
+    };
+    let places = places(params).map_or(String::new(), |places| format!("; {places}"));
+    let why = format!("{error}; without this part of the ground it does");
+    let refusal = scenario.refuse_ground(section, &why, &format!("{allowed}{places}"));
+    SimError::Config(Box::new(refusal))
 }
 
 #[cfg(test)]
@@ -44,7 +105,9 @@ mod tests {
     fn the_steepest_plane_is_that_of_this_robot() {
         let mut robot = builtin::robot("wheeleg").expect("built in").plant;
         let steepest = |params: &PlantParams| {
-            let SimError::Simulation { help, .. } = refused("my.toml", params, &"it falls") else {
+            let scenario = builtin::scenario("stand").expect("built in");
+            let refusal = refused(&scenario, "my.toml", params, &"it falls");
+            let SimError::Simulation { help, .. } = refusal else {
                 panic!("a simulation error");
             };
             let (before, _) = help.split_once('°').expect("a slope");
@@ -57,5 +120,36 @@ mod tests {
         robot.body.chassis_com_m[1] += 0.1;
         let high = steepest(&robot);
         assert!(high < low, "{high} {low}");
+    }
+
+    /// Of several parts of the ground the one is named that is in the way, with its line.
+    #[test]
+    fn the_part_of_the_ground_that_is_in_the_way_is_named() {
+        const TEXT: &str = "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+            seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n\
+            [[terrain]]\nkind = \"block\"\nx = { value = [3.0, 4.0], unit = \"m\" }\n\
+            y = { value = [0.1, 0.4], unit = \"m\" }\nheight = \"300 mm\"\n\
+            [[terrain]]\nkind = \"plane\"\n\
+            [[terrain]]\nkind = \"block\"\nx = { value = [-0.1, 0.1], unit = \"m\" }\n\
+            y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = \"1 m\"\n";
+        let robot = builtin::robot("wheeleg").expect("built in");
+        let scenario = Scenario::parse("my.toml", TEXT).expect("sound");
+        let mut plant = robot.plant.clone();
+        plant.terrain = scenario.ground.terrain.clone();
+        let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
+        else {
+            panic!("an error of the scenario");
+        };
+        let [problem] = refusal.problems() else {
+            panic!("{:?}", refusal.problems());
+        };
+        let said = problem.summary();
+        assert!(
+            said.starts_with("my.toml:16: `terrain[2]` (kind = \"block\""),
+            "{said}"
+        );
+        assert!(said.contains("height = \"1 m\""), "{said}");
+        let help = problem.help_text().expect("what is allowed");
+        assert!(help.contains("wheels are at x = 0 and y = ±0.2"), "{help}");
     }
 }

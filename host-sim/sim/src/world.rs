@@ -36,7 +36,7 @@ use crate::faults::Injector;
 use crate::{standing, unphysical};
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::JOINT_TICK_NS;
-use wheeleg_config::{NodeParams, RobotConfig};
+use wheeleg_config::{NodeParams, RobotConfig, Scenario};
 use wheeleg_remote_host::RemoteBoards;
 use wheeleg_telemetry::Cause;
 
@@ -144,9 +144,10 @@ impl World {
     /// Builds the robot in its initial pose, everything unpowered.
     ///
     /// # Errors
-    /// [`SimError::Simulation`] if a part refuses its parameters.
+    /// [`SimError::Simulation`] if a part refuses its parameters, [`SimError::Config`] if a part of the
+    /// scenario's ground is where the robot should stand.
     pub(super) fn new(
-        robot: &RobotConfig,
+        (scenario, robot): (&Scenario, &RobotConfig),
         plant: &PlantParams,
         master: MasterConfig,
         seed: u64,
@@ -167,7 +168,7 @@ impl World {
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
             PlantError::NotStanding | PlantError::OnChassis { .. } => {
-                standing::refused(&robot.file, plant.params(), &e)
+                standing::refused(scenario, &robot.file, plant.params(), &e)
             }
             other => refused("plant", &other),
         })?;

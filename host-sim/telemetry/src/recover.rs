@@ -24,6 +24,8 @@ pub struct Recovered {
     pub last_ns: u64,
     /// Whether the old file was whole already.
     pub was_whole: bool,
+    /// Bytes of the old file behind the end of its log, such as another log; nothing of them is taken.
+    pub behind: u64,
 }
 
 /// Largest chunk that is believed, bytes: where a file breaks off, its lengths are anything.
@@ -98,8 +100,13 @@ fn copy(
             messages: 0,
             last_ns: 0,
             was_whole: true,
+            behind: 0,
         },
     };
+    let length = source
+        .metadata()
+        .map_err(|e| LogError::read(from, e))?
+        .len();
     let mut source = BufReader::new(source);
     let mut reader = LinearReader::new_with_options(checked());
     while let Some(event) = reader.next_event() {
@@ -120,6 +127,11 @@ fn copy(
                 break;
             }
         }
+    }
+    if copy.recovered.was_whole {
+        let end = source.stream_position();
+        let end = end.map_err(|e| LogError::read(from, e))?;
+        copy.recovered.behind = length.saturating_sub(end);
     }
     let Copy {
         mut log, recovered, ..

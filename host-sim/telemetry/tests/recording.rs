@@ -204,6 +204,26 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
     }
 }
 
+/// What follows a log, as where two were joined, is told.
+#[test]
+fn what_follows_the_end_of_a_log_is_told() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let whole = log_to(&path("log.mcap"), 10.0).messages;
+    let bytes = std::fs::read(path("log.mcap")).expect("written");
+    for (name, behind) in [("none", 0), ("byte", 1), ("log", bytes.len())] {
+        let (from, to) = (
+            path(&format!("{name}.mcap")),
+            path(&format!("{name}-new.mcap")),
+        );
+        std::fs::write(&from, [&bytes[..], &bytes[..behind]].concat()).expect("written");
+        let recovered = recover(&from, &to, &|| false).expect("a log");
+        let recovered = recovered.expect("to the end");
+        let told = (recovered.messages, recovered.was_whole, recovered.behind);
+        assert_eq!(told, (whole, true, behind as u64), "{name}");
+    }
+}
+
 /// A damaged file in a log, such as the robot's picture, costs nothing but itself.
 #[test]
 fn a_log_with_a_damaged_attachment_keeps_every_message() {

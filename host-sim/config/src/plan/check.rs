@@ -15,6 +15,11 @@ use crate::quantity::{pretty, suffix};
 use crate::reader::Reader;
 use crate::suggest::closest;
 
+/// What a path into a scenario begins with.
+const SCENARIO: &str = "scenario.";
+/// What one into a robot begins with.
+const ROBOT: &str = "robot.";
+
 /// Reports every factor that does not fit the files, and every end of a factor at which the files
 /// contradict themselves.
 pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
@@ -26,10 +31,10 @@ pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
             continue;
         };
         for path in scenario {
-            field_in_all(r, factor, ("scenario.", path), resolver.scenarios.values());
+            field_in_all(r, factor, (SCENARIO, path), resolver.scenarios.values());
         }
         for path in robot {
-            field_in_all(r, factor, ("robot.", path), resolver.robots.values());
+            field_in_all(r, factor, (ROBOT, path), resolver.robots.values());
         }
     }
     if r.is_clean() {
@@ -146,20 +151,32 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
     if factor.is_text() {
         if !base.has_text(path) {
             let message = format!("{named}: {} has no name there", base.file);
-            let help = nearest(base, prefix, path);
-            r.problem(at_path, message, "no such name", help);
+            let help = nearest(base, prefix, path, factor);
+            r.problem(at_path, message, "no such name", Some(help));
         }
         return;
     }
     let Some((info, component)) = base.listed(path) else {
-        let message = format!("{named}: {} has no such parameter", base.file);
-        r.problem(at_path, message, "not known", nearest(base, prefix, path));
+        let message = match base.around(path) {
+            Some(ParameterInfo { value, .. }) if value.len() > 1 => format!(
+                "{named}: {} has a list of {} numbers there: allowed are [0] to [{}]",
+                base.file,
+                value.len(),
+                value.len() - 1
+            ),
+            Some(_) => format!("{named}: {} has no list there, but one number", base.file),
+            None => format!("{named}: {} has no such parameter", base.file),
+        };
+        let help = nearest(base, prefix, path, factor);
+        r.problem(at_path, message, "not known", Some(help));
         return;
     };
     if info.value.len() > 1 && component.is_none() && !factor.scale {
         let message = format!(
-            "{named} is a list of {} numbers: scale it, or set one of them, `{path}[0]`",
-            info.value.len()
+            "{named} is a list of {count} numbers: scale it, or set one of them, `{path}[0]` to \
+             `{path}[{}]`",
+            info.value.len() - 1,
+            count = info.value.len()
         );
         r.problem(at_path, message, "a list", None);
         return;
@@ -171,10 +188,18 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
     range(r, factor, (info, component), &full, span);
 }
 
-fn nearest(base: &Base, prefix: &str, path: &str) -> Option<String> {
+/// A path that is like one that a file has not got, and that this factor could set.
+fn nearest(base: &Base, prefix: &str, path: &str, factor: &Factor) -> String {
     let paths = base.listing.iter().map(|p| p.path.as_str());
-    let near = closest(path, paths).map(|word| format!("did you mean \"{prefix}{word}\"?"));
-    near.or_else(|| Some("`wheeleg params` lists a robot's parameters".into()))
+    let near = closest(path, paths).and_then(|word| base.listed(word));
+    match near {
+        Some((info, _)) if info.value.len() > 1 && !factor.scale => {
+            format!("did you mean \"{prefix}{}[0]\"?", info.path)
+        }
+        Some((info, _)) => format!("did you mean \"{prefix}{}\"?", info.path),
+        None if prefix == ROBOT => "`wheeleg params` lists a robot's parameters".to_owned(),
+        None => format!("allowed are the quantities that {} gives", base.file),
+    }
 }
 
 fn unit_fits(
@@ -237,9 +262,10 @@ fn range(
         of.map(|(_, file)| file * v).collect()
     };
     let values = extremes(factor);
-    let mut wrong = None;
+    let (mut wrong, mut fraction) = (None, None);
     for v in values {
         let made = if factor.scale { scaled(v) } else { vec![v] };
+        fraction = fraction.or_else(|| made.iter().find(|made| made.fract() != 0.0).copied());
         if let Some(made) = made.into_iter().find(|made| !allowed(*made)) {
             wrong = Some((v, made));
             break;
@@ -280,6 +306,17 @@ fn range(
             factor.name
         );
         r.problem(span, message, "not whole", None);
+        return;
+    }
+    // The file's own reader sees what became of it: of 0.5 for a flag, `true`.
+    if let Some(fraction) = fraction.filter(|_| info.whole) {
+        let message = format!(
+            "`factor.{}`: {} is no whole number: {name} must be one from {range}",
+            factor.name,
+            pretty(fraction)
+        );
+        let help = format!("{name}: {}", info.doc);
+        r.problem(span, message, "not whole", Some(help));
     }
 }
 

@@ -50,6 +50,12 @@ impl Base {
         Some((info, Some(component)))
     }
 
+    /// The quantity of which a path names a component, whether it has that one or not.
+    pub(super) fn around(&self, path: &str) -> Option<&ParameterInfo> {
+        let (whole, _) = overlay::split_index(path)?;
+        self.listing.iter().find(|p| p.path == whole)
+    }
+
     /// Whether the path is that of a name rather than a number.
     pub(super) fn has_text(&self, path: &str) -> bool {
         is_law(path) || overlay::text(&self.document, path).is_some()

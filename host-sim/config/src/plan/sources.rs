@@ -1,15 +1,17 @@
 //! The texts that a plan stands on, so that a folder of results needs no other file.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use toml_edit::Document;
+use toml_edit::{Document, Item};
 
 use crate::Scenario;
 use crate::builtin::{self, Source};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, word};
+use crate::reader::Reader;
 use crate::terrain::{Data, named_files};
 
 /// A file: its name for messages, and what is in it.
@@ -59,27 +61,44 @@ impl Sources {
         let Ok(document) = Document::parse(sources.plan.text.clone()) else {
             return Ok(sources);
         };
-        let named = |key: &str| -> Vec<String> {
-            let base = document
-                .get("base")
-                .and_then(|base| base.get(key)?.as_str());
-            let factors = document.get("factor").and_then(|f| f.as_table_like());
-            let factors = factors.into_iter().flat_map(|table| table.iter());
-            let grids =
-                factors.filter(|(_, f)| f.get("parameter").and_then(|p| p.as_str()) == Some(key));
-            let grids = grids.filter_map(|(_, factor)| factor.get("grid")?.as_array());
-            let grids = grids.flat_map(|grid| grid.iter().filter_map(|v| v.as_str()));
-            base.into_iter().chain(grids).map(str::to_owned).collect()
-        };
-        for name in named("scenario") {
-            sources.add_scenario(folder, &name)?;
+        let mut wrong = Vec::new();
+        for named in named(&document, "scenario") {
+            if let Err(error) = sources.add_scenario(folder, &named.name) {
+                wrong.push((named, error));
+            }
         }
-        for name in named("robot") {
-            let place = placed(folder, &name);
-            let Source { file, text } = builtin::robot_source(&place)?;
-            sources.robots.insert(name, Text { file, text });
+        for named in named(&document, "robot") {
+            match builtin::robot_source(&placed(folder, &named.name)) {
+                Ok(Source { file, text }) => {
+                    let robots = &mut sources.robots;
+                    robots.insert(named.name, Text { file, text });
+                }
+                Err(error) => wrong.push((named, error)),
+            }
         }
-        Ok(sources)
+        sources.without(wrong)
+    }
+
+    /// Itself, if nothing that the plan names is `wrong`; otherwise where the plan names it.
+    fn without(self, wrong: Vec<(Named, ConfigError)>) -> Result<Self, ConfigError> {
+        if wrong.is_empty() {
+            return Ok(self);
+        }
+        let Text { file, text } = &self.plan;
+        let what = format!("the plan {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, false)?;
+        for (named, error) in wrong {
+            let name = word(&named.name);
+            for problem in error.problems() {
+                let help = problem.help_text().map(str::to_owned);
+                let told = problem.summary();
+                // Of a name the file is the name itself.
+                let told = told.strip_prefix(&format!("{name}: ")).unwrap_or(&told);
+                let message = format!("`{}` = \"{name}\": {told}", named.path);
+                r.problem(named.span.clone(), message, "not usable", help);
+            }
+        }
+        Err(r.refusal(&what))
     }
 
     fn add_scenario(&mut self, folder: &Path, name: &str) -> Result<(), ConfigError> {
@@ -100,6 +119,44 @@ impl Sources {
         self.scenarios.insert(name.to_owned(), Text { file, text });
         Ok(())
     }
+}
+
+/// A scenario or a robot, and where a plan names it.
+struct Named {
+    name: String,
+    path: String,
+    span: Option<Range<usize>>,
+}
+
+/// What a plan names as its `key`: in `[base]`, and in factors.
+fn named(document: &Document<String>, key: &str) -> Vec<Named> {
+    let base = document.get("base").and_then(|base| base.get(key));
+    let mut named: Vec<Named> = base
+        .and_then(|item| {
+            Some(Named {
+                name: item.as_str()?.to_owned(),
+                path: format!("base.{key}"),
+                span: item.span(),
+            })
+        })
+        .into_iter()
+        .collect();
+    let factors = document.get("factor").and_then(Item::as_table_like);
+    let factors = factors.into_iter().flat_map(|table| table.iter());
+    let own =
+        |(_, factor): &(&str, &Item)| factor.get("parameter").and_then(Item::as_str) == Some(key);
+    for (factor, item) in factors.filter(own) {
+        let grid = item.get("grid").and_then(Item::as_array);
+        let names = grid.into_iter().flatten();
+        named.extend(names.filter_map(|value| {
+            Some(Named {
+                name: value.as_str()?.to_owned(),
+                path: format!("factor.{factor}.grid"),
+                span: value.span(),
+            })
+        }));
+    }
+    named
 }
 
 /// The data files of a scenario.

@@ -175,9 +175,9 @@ impl<'a> Search<'a> {
             for set in sets {
                 match self.answer(broken, set) {
                     Answer::Accepted => accepted.push(set.clone()),
-                    Answer::Broken(next) => match self.narrowed(broken, set, &next) {
-                        Some(narrower) => accepted.push(narrower),
-                        None => begun.push((set.clone(), next)),
+                    Answer::Broken(next) => match self.narrowed(broken, set, next) {
+                        Ok(narrower) => accepted.push(narrower),
+                        Err(narrowest) => begun.push(narrowest),
                     },
                     Answer::Refused => {}
                 }
@@ -189,25 +189,31 @@ impl<'a> Search<'a> {
         self.together(broken, begun).into_iter().collect()
     }
 
-    /// A narrower limit for the only field of a set, where `next`, the relation that it breaks, asks for one.
-    fn narrowed(&self, broken: &Found, set: &[Offer], next: &Found) -> Option<Vec<Offer>> {
-        let [only] = set else { return None };
-        let own_of = |found: &Found| {
-            let mut sets = found.broken.offers.iter();
+    /// A narrower limit for the only field of a set, where `next`, the relation that it breaks, asks for
+    /// one; otherwise the narrowest that was tried, with the relation that it still breaks.
+    fn narrowed(
+        &self,
+        broken: &Found,
+        set: &[Offer],
+        mut next: Found,
+    ) -> Result<Vec<Offer>, (Vec<Offer>, Found)> {
+        let mut narrowest = set.to_vec();
+        let [only] = set else {
+            return Err((narrowest, next));
+        };
+        for _ in 1..TOGETHER {
+            let mut sets = next.broken.offers.iter();
             let own = sets.find(
                 |set| matches!(set.as_slice(), [offer] if offer.advised.path == only.advised.path),
             );
-            own.cloned()
-        };
-        let mut narrower = own_of(next)?;
-        for _ in 1..TOGETHER {
+            let Some(narrower) = own.cloned() else { break };
             match self.answer(broken, &narrower) {
-                Answer::Accepted => return Some(narrower),
-                Answer::Broken(next) => narrower = own_of(&next)?,
+                Answer::Accepted => return Ok(narrower),
+                Answer::Broken(other) => (narrowest, next) = (narrower, other),
                 Answer::Refused => break,
             }
         }
-        None
+        Err((narrowest, next))
     }
 
     fn answer(&self, broken: &Found, set: &[Offer]) -> Answer {

@@ -201,6 +201,67 @@ pub(super) fn link_inertias(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     inertias(f.list(it.fields[0])?)
 }
 
+/// Denser than any metal that robots are made of, kg/m³: tungsten and gold have 19,300.
+const DENSEST_KG_M3: f64 = 2e4;
+
+/// A body of a mass has a size, and so inertias. The smallest for its mass is a ball: of no body is
+/// the largest inertia below that of a ball. One that is long may be thin: its smallest inertia is
+/// at least that of a rod as long as the largest one says.
+fn size(inertia_kg_m2: [f64; 3], mass_kg: f64) -> Option<Broken> {
+    use std::f64::consts::PI;
+    let largest = inertia_kg_m2.into_iter().fold(0.0, f64::max);
+    let smallest = inertia_kg_m2.into_iter().fold(f64::INFINITY, f64::min);
+    let radius_m = (3.0 * mass_kg / (4.0 * PI * DENSEST_KG_M3)).cbrt();
+    let ball = 0.4 * mass_kg * radius_m * radius_m;
+    // Of a rod: m l²/12 across, m r²/2 along, and its mass is ρ π r² l.
+    let length_m = (12.0 * largest / mass_kg).sqrt();
+    let along = mass_kg * mass_kg / (2.0 * PI * DENSEST_KG_M3 * length_m);
+    // As it is printed, on its own side.
+    let upwards = |value: f64| 1.001 * value;
+    let tonnes = brief(DENSEST_KG_M3 * 1e-3);
+    if largest < ball {
+        return broken(
+            format!(
+                "the largest, {} kg m2, is below that of a ball of {} kg and {tonnes} t/m3",
+                brief(largest),
+                brief(mass_kg)
+            ),
+            format!(
+                "allowed are from {} kg m2 for each of the three, or less mass",
+                brief(upwards(ball))
+            ),
+        );
+    }
+    (smallest < along).then_some(())?;
+    broken(
+        format!(
+            "the smallest, {} kg m2, is below that of a rod of {} kg, {tonnes} t/m3 and {} m, which is \
+             as long as the largest says",
+            brief(smallest),
+            brief(mass_kg),
+            brief(length_m)
+        ),
+        format!(
+            "allowed is the smallest from {} kg m2 beside this largest one, or less mass",
+            brief(upwards(along))
+        ),
+    )
+}
+
+pub(super) fn chassis_size(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [a, b, c, mass] = [0, 1, 2, 3].map(|i| f.si(it.fields[i]));
+    size([a?, b?, c?], mass?)
+}
+
+pub(super) fn wheel_size(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [axle, across, mass] = [0, 1, 2].map(|i| f.si(it.fields[i]));
+    size([axle?, across?, across?], mass?)
+}
+
+pub(super) fn link_size(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    size(f.list(it.fields[0])?, f.si(it.fields[1])?)
+}
+
 /// A box has a size.
 pub(super) fn corners(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (from, to) = (f.list::<3>(it.fields[0])?, f.list::<3>(it.fields[1])?);
@@ -357,21 +418,65 @@ impl Calibrated {
     }
 }
 
+/// How far a reading may be from where the wiper stands, as a share of its track: by what of the
+/// sensor is not straight, and by the noise of the converter.
+fn reading_error(f: &Facts<'_>, [nonlinearity, noise, bits]: [&str; 3]) -> Option<f64> {
+    Some(f.si(nonlinearity)? + NOISE_PEAKS * f.si(noise)? / f.si(bits)?.exp2())
+}
+
 /// What a joint board reads at both stops are codes that it allows.
 pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let (least, most) = (f.si(it.fields[4])?, f.si(it.fields[5])?);
+    let off = reading_error(f, [6, 7, 8].map(|i| it.fields[i]))?;
     let codes = sensor.shares().map(|share| share * CODES);
-    if codes[0] >= least && codes[1] <= most {
+    let beside = off * CODES;
+    let is_held = [codes[0] - beside >= least, codes[1] + beside <= most];
+    if is_held == [true, true] {
         return None;
     }
-    let [from, to] = [least, most].map(|code| brief(sensor.stroke_of(code / CODES) * 1e3));
-    let allowed = format!(
-        "allowed are codes from {} to {}, which are strokes from {from} to {to} mm",
-        pretty(least),
-        pretty(most)
-    );
-    broken(sensor.format(codes, "of 65536 codes"), allowed)
+    // Of the track what the board allows, less what it may read beside.
+    let (low, high) = (least / CODES + off, most / CODES - off);
+    let mut offers = Vec::new();
+    if !is_held[0] {
+        offers.push(vec![Offer::new(
+            f,
+            it.fields[4],
+            Bound::UpTo,
+            (codes[0] - beside).floor(),
+        )]);
+        let most_m = ((sensor.offset_m / low) * 1e4).floor() * 1e-4;
+        offers.push(vec![Offer::new(f, it.fields[0], Bound::UpTo, most_m)]);
+        let least_m = (low * sensor.electrical_m * 1e4).ceil() * 1e-4;
+        offers.push(vec![Offer::new(f, it.fields[1], Bound::From, least_m)]);
+    }
+    if !is_held[1] {
+        offers.push(vec![Offer::new(
+            f,
+            it.fields[5],
+            Bound::From,
+            (codes[1] + beside).ceil(),
+        )]);
+        let reach_m = sensor.offset_m + sensor.gain * sensor.stroke_m;
+        let least_m = (reach_m / high * 1e4).ceil() * 1e-4;
+        offers.push(vec![Offer::new(f, it.fields[0], Bound::From, least_m)]);
+        let stroke_m = (sensor.stroke_of(high) * 1e4).floor() * 1e-4;
+        if stroke_m > 0.0 {
+            offers.push(vec![Offer::new(f, it.fields[3], Bound::UpTo, stroke_m)]);
+        }
+    }
+    let [from, to] = [low, high].map(|share| brief(sensor.stroke_of(share) * 1e3));
+    Some(Broken {
+        figures: sensor.format(codes, "of 65536 codes"),
+        offers,
+        words: format!(
+            "allowed are codes from {} to {}, which with up to {} codes beside them are strokes from \
+             {from} to {to} mm",
+            pretty(least),
+            pretty(most),
+            brief(beside)
+        ),
+    })
 }
 
 /// What a joint board measures at both stops is a travel that it allows.
@@ -379,8 +484,7 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);
     let (least, most) = (f.si(it.fields[6])?, f.si(it.fields[7])?);
-    let [nonlinearity, noise, bits] = [8, 9, 10].map(|i| f.si(it.fields[i]));
-    let off_mm = f.si(it.fields[4])? * (nonlinearity? + NOISE_PEAKS * noise? / bits?.exp2());
+    let off_mm = f.si(it.fields[4])? * reading_error(f, [8, 9, 10].map(|i| it.fields[i]))?;
     if measured[0] - off_mm >= least && measured[1] + off_mm <= most {
         return None;
     }

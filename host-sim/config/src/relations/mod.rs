@@ -64,7 +64,7 @@ enum Rule {
     /// Something else of the fields, or of the cylinder that they make.
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
     /// Something of the whole robot, where nothing else is wrong.
-    Whole(fn(&PlantParams) -> Option<Broken>),
+    Whole(fn(&Facts<'_>, &PlantParams) -> Option<Broken>),
     /// The same of the robot at rest in its start pose.
     AtRest(fn(&AtRest) -> Option<Broken>),
 }
@@ -263,7 +263,7 @@ fn broken_whole(facts: &Facts<'_>, robot: &PlantParams) -> Option<Found> {
     let at_rest = LazyCell::new(|| AtRest::new(facts, robot));
     RELATIONS.iter().find_map(|relation| {
         let broken = match relation.rule {
-            Rule::Whole(law) => law(robot),
+            Rule::Whole(law) => law(facts, robot),
             Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
             _ => None,
         }?;

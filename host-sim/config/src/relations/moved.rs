@@ -218,6 +218,35 @@ fn gas(f: &Facts<'_>, it: &Relation, chamber: Chamber) -> Option<Broken> {
     })
 }
 
+/// A piston that arrives goes this many times as deep into its stop as one that its full force rests
+/// there, with what its stop damps.
+const ARRIVAL: f64 = 1.4;
+
+/// The stop holds the piston within the range of its model.
+pub(super) fn depth(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let moved = f.moved?;
+    let c = moved.cylinder;
+    let depth_m = ARRIVAL * moved.force_n() / c.end_stop.stiffness_n_m;
+    let most_m = c.stop_margin_m();
+    if depth_m <= most_m {
+        return None;
+    }
+    let stiffness_n_m = ARRIVAL * moved.force_n() / most_m;
+    Some(Broken {
+        figures: format!(
+            "its full force presses it {} mm into its stop, of which {} mm are allowed",
+            brief(depth_m * 1e3),
+            brief(most_m * 1e3)
+        ),
+        offers: vec![f.offer(
+            it.fields[0],
+            Bound::From,
+            (stiffness_n_m * 1e-3).ceil() * 1e3,
+        )],
+        words: String::new(),
+    })
+}
+
 /// The piston runs into its stop; chamber A, which is there, must not vanish.
 pub(super) fn volume_a(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     volume(f, it, Chamber::A)

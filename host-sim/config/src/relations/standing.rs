@@ -5,24 +5,98 @@ use wheeleg_plant::dynamics::floating::state::FloatingState;
 use wheeleg_plant::robot::PlantState;
 use wheeleg_plant::{Plant, PlantError, PlantParams};
 
-use super::{Broken, Facts};
+use super::{Bound, Broken, Facts};
 use crate::quantity::brief;
 
+/// Field of the crank.
+const CRANK: &str = "body.crank";
+
+/// The triangle of crank, yaw cylinder and the line from O1 to O4.
+struct Triangle {
+    crank_m: f64,
+    reach_m: f64,
+    /// Sine of the largest angle at which the cylinder pulls along the crank.
+    most_along: f64,
+}
+
+impl Triangle {
+    fn of(robot: &PlantParams) -> Self {
+        let body = &robot.body;
+        let [x, y] = body.p4_m;
+        Self {
+            crank_m: body.crank_m,
+            reach_m: x.hypot(y),
+            most_along: (1.0 - body.min_cos_theta3 * body.min_cos_theta3)
+                .max(0.0)
+                .sqrt(),
+        }
+    }
+
+    /// Between which lengths the third side closes with one that is `side_m` long: of the two the
+    /// angle between is limited.
+    fn other_side_m(&self, side_m: f64) -> [f64; 2] {
+        let along_m = self.most_along * side_m;
+        let square = self.reach_m * self.reach_m - side_m * side_m + along_m * along_m;
+        let root_m = square.max(0.0).sqrt();
+        [(root_m - along_m).max(along_m - root_m), along_m + root_m]
+    }
+
+    /// What is wrong with a length of the yaw cylinder, where it is the triangle.
+    fn told(&self, yaw_m: f64) -> Option<String> {
+        let mm = |metres: f64| brief(metres * 1e3);
+        if self.crank_m >= self.reach_m {
+            return Some(format!(
+                "`body.crank` must be shorter than `body.p4`, which is {} mm long",
+                mm(self.reach_m)
+            ));
+        }
+        let [least_m, most_m] = self.other_side_m(self.crank_m);
+        let is_closed = (least_m..=most_m).contains(&yaw_m);
+        (!is_closed).then(|| {
+            format!(
+                "with a crank of {} mm and {} mm of `body.p4` a yaw cylinder of {} mm closes no \
+             triangle: from {} to {} mm do",
+                mm(self.crank_m),
+                mm(self.reach_m),
+                mm(yaw_m),
+                mm(least_m),
+                mm(most_m)
+            )
+        })
+    }
+}
+
 /// A leg closes its loop, where it starts and over the whole stroke of its yaw cylinder.
-pub(super) fn closes(robot: &PlantParams) -> Option<Broken> {
+pub(super) fn closes(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
     let start_m = robot.initial_stroke_m[0];
     let open = |yaw_m: f64| {
         let mut turned = robot.clone();
         (turned.initial_stroke_m[0], turned.initial_stroke_m[3]) = (yaw_m, yaw_m);
         match Plant::new(&turned) {
-            Err(PlantError::Mechanics(why)) => Some(why),
+            Err(PlantError::Mechanics(why)) => Some((yaw_m, why)),
             _ => None,
         }
     };
-    let mut strokes_m = [start_m, 0.0, robot.cylinders[0].stroke_m].into_iter();
+    let strokes_m = [start_m, 0.0, robot.cylinders[0].stroke_m];
+    let (open_m, why) = strokes_m.into_iter().find_map(open)?;
+    let triangle = Triangle::of(robot);
+    let yaw_m = |stroke_m: f64| robot.stroke_zero_m[0] + stroke_m;
+    // A crank that closes with all of them, to a tenth of a millimetre.
+    let (mut least_m, mut most_m) = (0.0_f64, triangle.reach_m);
+    for stroke_m in strokes_m {
+        let [from_m, to_m] = triangle.other_side_m(yaw_m(stroke_m));
+        (least_m, most_m) = (least_m.max(from_m), most_m.min(to_m));
+    }
+    let least_m = (least_m * 1e4).floor() * 1e-4 + 1e-4;
+    let most_m = (most_m * 1e4).ceil() * 1e-4 - 1e-4;
+    let (bound, crank_m) = match triangle.crank_m < least_m {
+        true => (Bound::From, least_m),
+        false => (Bound::UpTo, most_m),
+    };
+    let offer = || f.offer(CRANK, bound, crank_m);
     Some(Broken {
-        figures: strokes_m.find_map(open)?,
-        offers: Vec::new(),
+        figures: triangle.told(yaw_m(open_m)).unwrap_or(why),
+        offers: (least_m <= most_m).then(offer).into_iter().collect(),
         words:
             "allowed is a yaw cylinder that with `body.stroke_zero`, and 0 to `cylinder.stroke` \
                   more, closes a triangle with `body.crank` and `body.p4`"

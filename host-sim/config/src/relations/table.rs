@@ -60,6 +60,7 @@ const IN_STOP: &str = "the gait would drive a piston into its stop";
 const IN_ORDER: &str = "the gait is out of order";
 const SLIDES: &str = "what slides would hold more than what sticks";
 const NO_BODY: &str = "no body has these inertias";
+const TOO_SMALL: &str = "no body of this mass is so small";
 const FRICTION: &str = "the step is too long for so much friction on so little mass";
 const STOP: &str = "the step is too long for this end stop and this mass";
 const FLOW: &str = "the step is too long for so much flow into so little volume";
@@ -102,6 +103,7 @@ pub const RELATIONS: &[Relation] = &[
     law("step and air A", &["cylinder.dead_volume_a", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas_a),
     law("step and air B", &["cylinder.dead_volume_b", "line.volume", "fill_valve.conductance", "vent_valve.conductance", "line.conductance", "numerics.step"], FLOW, moved::gas_b),
     law("step and supply", &["supply.reservoir", "supply.droop", "supply.source_pressure", "regulator.conductance", "numerics.step"], "the step is too long for a reservoir that fills so fast", moved::supply),
+    law("depth of the stop", &["end_stop.stiffness", "cylinder.stroke", "cylinder.bore", "supply.set_pressure", "moving.load"], "the stop does not hold the piston", moved::depth),
     law("air in the stop A", &["cylinder.dead_volume_a", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_a),
     law("air in the stop B", &["cylinder.dead_volume_b", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_b),
     // What a robot does before and in its gait.
@@ -128,6 +130,14 @@ pub const RELATIONS: &[Relation] = &[
     law("inertias of the yaw carriage", &["link.yaw_carriage.inertia"], NO_BODY, laws::link_inertias),
     law("inertias of the horizontal carriage", &["link.horizontal_carriage.inertia"], NO_BODY, laws::link_inertias),
     law("inertias of the vertical rod", &["link.vertical_rod.inertia"], NO_BODY, laws::link_inertias),
+    law("size of the chassis", &["spatial.chassis_roll_inertia", "body.chassis_pitch_inertia", "spatial.chassis_yaw_inertia", "body.chassis_mass"], TOO_SMALL, laws::chassis_size),
+    law("size of a wheel", &["body.wheel_inertia", "spatial.wheel_transverse_inertia", "body.wheel_mass"], TOO_SMALL, laws::wheel_size),
+    law("size of the yaw barrel", &["link.yaw_barrel.inertia", "link.yaw_barrel.mass"], TOO_SMALL, laws::link_size),
+    law("size of the yaw rod", &["link.yaw_rod.inertia", "link.yaw_rod.mass"], TOO_SMALL, laws::link_size),
+    law("size of the crank", &["link.crank.inertia", "link.crank.mass"], TOO_SMALL, laws::link_size),
+    law("size of the yaw carriage", &["link.yaw_carriage.inertia", "link.yaw_carriage.mass"], TOO_SMALL, laws::link_size),
+    law("size of the horizontal carriage", &["link.horizontal_carriage.inertia", "link.horizontal_carriage.mass"], TOO_SMALL, laws::link_size),
+    law("size of the vertical rod", &["link.vertical_rod.inertia", "link.vertical_rod.mass"], TOO_SMALL, laws::link_size),
     at_most("friction of a sole", &["contact.mu_kinetic", "contact.mu_static"], SLIDES),
     at_most("friction of a wheel", &["wheel_contact.mu_kinetic", "wheel_contact.mu_static"], SLIDES),
     at_most("friction of the chassis", &["chassis_contact.mu_kinetic", "chassis_contact.mu_static"], SLIDES),
@@ -138,7 +148,7 @@ pub const RELATIONS: &[Relation] = &[
     law("drawn chassis between the wheels", &["spatial.track", "spatial.wheel_width", "spatial.chassis_size"], "the wheels would be in the chassis as it is drawn", laws::drawn),
     law("ground below", &["body.gravity"], "the robot does not stand: its weight must point to the ground, at less than 45° from its normal", laws::gravity),
     // What its boards measure.
-    law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max"], "a joint board would take a piston in its stop for a broken wire", laws::codes),
+    law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a broken wire", laws::codes),
     law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a fault of the sensor", laws::calibration),
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),

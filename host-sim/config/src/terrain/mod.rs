@@ -11,6 +11,8 @@ mod material;
 mod rocks;
 mod solids;
 
+use std::ops::Range;
+
 use wheeleg_plant::terrain::{
     Heap, Index, MOST_OVER_A_PLACE, Material, Part, Plane, Shape, Terrain, heap,
 };
@@ -28,6 +30,8 @@ pub struct Ground {
     pub terrain: Terrain,
     /// Each part as the file has it, for logs and reports.
     pub parts: Vec<String>,
+    /// Where the parts that a section makes begin in the terrain, and the section; in that order.
+    begins: Vec<(usize, usize)>,
 }
 
 impl Ground {
@@ -37,6 +41,14 @@ impl Ground {
     pub fn fingerprint(&self) -> Option<String> {
         let digest = || blake3::Hash::from(self.terrain.digest());
         (!self.parts.is_empty()).then(|| digest().to_hex().to_string())
+    }
+
+    /// Sections of the file, in the order of their parts in the terrain, each with those parts.
+    pub fn sections(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let ends = self.begins.iter().skip(1).map(|(first, _)| *first);
+        let ends = ends.chain([self.terrain.parts.len()]);
+        let begins = self.begins.iter().zip(ends);
+        begins.map(|((first, section), end)| (*section, *first..end))
     }
 }
 
@@ -113,7 +125,11 @@ pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     if let Some(heap) = heap(&terrain.parts, &Index::new(&terrain.parts)) {
         heaped(r, &heap, &begins);
     }
-    Ground { terrain, parts }
+    Ground {
+        terrain,
+        parts,
+        begins,
+    }
 }
 
 /// Reports parts that lie on each other: with the first that is too much. `begins`: number of the

@@ -381,8 +381,7 @@ impl CylinderModel {
         stroke_m: f64,
         most_pa: f64,
     ) -> Result<(), PlantError> {
-        // A tenth of the stroke past a stop means the stop did not hold.
-        let margin = 0.1 * self.params.stroke_m;
+        let margin = self.params.stop_margin_m();
         check_state(
             "stroke_m",
             index,

@@ -37,7 +37,7 @@ use crate::StudyError;
 use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, Settings};
 use trial::{BusPath, Outcome, Trial};
-use wheeleg_config::RobotConfig;
+use wheeleg_config::{RobotConfig, brief};
 use wheeleg_report::results::CSV;
 use wheeleg_report::stats;
 
@@ -127,6 +127,30 @@ pub fn bus_of(robot: &RobotConfig) -> BusPath {
         cycle_s: robot.bus.cycle_s,
         frame_s: f64::from(SlotTiming::DEFAULT.frame_us(MessageType::Sync)) * 1e-6,
     }
+}
+
+/// Refuses a load against which one of the cylinders of the study would never start.
+fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyError> {
+    let axis = axis_of(robot, options.mass_kg, options.load_n);
+    let most_n = scaling::most_load_n(&axis);
+    if options.load_n <= most_n {
+        return Ok(());
+    }
+    Err(StudyError::refused(
+        format!(
+            "`--load` = {} N is more than the cylinders of this study start against: allowed are up \
+             to {:.1} N",
+            brief(options.load_n),
+            (most_n * 10.0).floor() * 0.1
+        ),
+        format!(
+            "other bores are tried beside the robot's own; `supply.set_pressure` = {:.2} bar and \
+             `friction.static` = {:.1} N of {} decide what is left on the weakest",
+            axis.supply.set_pressure_pa * 1e-5,
+            axis.cylinder.friction.static_n,
+            robot.file
+        ),
+    ))
 }
 
 /// Runs trials; their outcomes are in order.
@@ -270,6 +294,7 @@ impl study::Summary for Summary<'_> {
 /// # Errors
 /// [`StudyError::Refused`] if the robot's cylinder cannot be simulated or does not move.
 pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, StudyError> {
+    ensure_starts(robot, options)?;
     let collected = Collected::measure(robot, options, &Progress::silent())?;
     // Nothing asks the silent one to stop.
     let study = collected.study(robot, options);
@@ -285,6 +310,7 @@ pub fn write(
     options: &Options,
     settings: &Settings,
 ) -> Result<Finished<Option<Study>>, StudyError> {
+    ensure_starts(robot, options)?;
     let job = Job::begin("delay", settings, &[Path::new(&robot.file)])?;
     let collected = Collected::measure(robot, options, &job.progress)?;
     let parts = collected.parts();

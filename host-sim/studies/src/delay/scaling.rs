@@ -8,6 +8,8 @@ use super::ablation::conductance;
 use super::trial::{Law, Outcome, Start, Trial};
 use super::{mean_delay, run_all};
 use crate::StudyError;
+use crate::axis_sim::suite::force_left_n;
+use crate::compare::MARGIN;
 use crate::study::{Ended, Progress};
 
 /// Most seeds of a point.
@@ -87,6 +89,17 @@ pub(super) fn never() -> StudyError {
         "a start from home never came while testing a prediction",
         "the load may exceed what the cylinder can move; see --load",
     )
+}
+
+/// The largest load that every bore of the study starts against, with a margin \[N\].
+pub(super) fn most_load_n(axis: &AxisParams) -> f64 {
+    let own = (axis.cylinder.bore_m, axis.cylinder.rod_m);
+    let left_n = BORES_M.into_iter().chain([own]).map(|(bore_m, rod_m)| {
+        let mut bored = axis.clone();
+        (bored.cylinder.bore_m, bored.cylinder.rod_m) = (bore_m, rod_m);
+        force_left_n(&bored)
+    });
+    left_n.fold(f64::INFINITY, f64::min) / MARGIN
 }
 
 /// Mean delays of several trials, each under all seeds.

@@ -44,10 +44,13 @@ pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
         let code = stop.signal().map_or(FAILED, Signal::exit_code);
         return Ok(ExitCode::from(code));
     };
-    let note = if recovered.was_whole {
-        "; the log was whole already"
-    } else {
-        ""
+    let note = match (recovered.was_whole, recovered.behind) {
+        (true, 0) => "; the log was whole already".to_owned(),
+        (true, bytes) => format!(
+            "; the log was whole already, and the {bytes} bytes behind its end, such as another log, \
+             are left out: cut them off and recover them by themselves"
+        ),
+        (false, _) => String::new(),
     };
     print(&format!(
         "{} messages recovered, up to {:.3} s, and read back from {}{note}\n",

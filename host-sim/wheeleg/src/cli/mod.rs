@@ -125,6 +125,7 @@ enum Command {
 /// Parses the command line, does what it says, and returns the exit code.
 #[must_use]
 pub(crate) fn main() -> ExitCode {
+    colourless_if_asked();
     let cli = usage::parse::<Cli>(std::env::args_os());
     let cli = cli.unwrap_or_else(|wrong| usage::refuse(&wrong));
     if let Err(error) = outlive_file_limit() {
@@ -168,6 +169,16 @@ fn run_command(cli: Cli) -> miette::Result<ExitCode> {
         Some(Command::Log(args)) => log::command(&args)?,
         Some(Command::Interface(args)) => interface::command(&args)?,
     })
+}
+
+/// `NO_COLOR` wins over variables that force colours.
+fn colourless_if_asked() {
+    if std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty()) {
+        // It fails where there is a hook already, and nobody else sets one.
+        let _ = miette::set_hook(Box::new(|_| {
+            Box::new(miette::MietteHandlerOpts::new().color(false).build())
+        }));
+    }
 }
 
 /// Writes to stdout. A reader that has gone away (`| head`) is no error.

@@ -103,6 +103,9 @@ fn check_text(axis: &str, check: &PlantCheck) -> String {
                 "  cannot be judged at this step: try numerics.step = {} us",
                 brief(try_s * 1e6)
             ),
+            Verdict::NotAsymptotic if finding.quantity == Quantity::StepError => {
+                "  cannot be judged at any step".to_owned()
+            }
             Verdict::NotAsymptotic => "  no order at these steps: not judged".to_owned(),
         };
         text += &format!("{name:<34}{value:>12}  {limit}{verdict}\n");
