@@ -49,7 +49,7 @@ pub mod unpack;
 
 pub use api::SUBPROTOCOL;
 pub use catalogue::{
-    HOLD_S, HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list,
+    HOLD_S, HOST_TABLE, HostArgument, HostCode, HostInfo, SPEED, STEP_MAX, command_list, usual,
 };
 pub use error::ConsoleError;
 pub use live::{Live, Port, SlowAdapter};

@@ -11,7 +11,7 @@ use wheeleg_studies::StudyError;
 
 use super::super::serve::refused;
 use super::super::{print, whole};
-use super::reach::{Reach, not_answered};
+use super::reach::Reach;
 
 /// Number of boards, whose addresses begin at 1.
 const BOARDS: u8 = Node::ALL.len() as u8;
@@ -83,7 +83,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> Result<ExitCode,
     let key = reach.key(CONTROL_FILE)?;
     let (code, all) = http(&reach.url(), "GET", "parameters", &key).map_err(refused)?;
     if code != 200 {
-        return Ok(not_answered(&all));
+        return reach.not_answered(&all, CONTROL_FILE);
     }
     let (value, unit) = reported(&all, board, parameter).ok_or_else(|| {
         StudyError::refused(

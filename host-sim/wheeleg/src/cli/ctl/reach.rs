@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
-use wheeleg_console::client::{Client, Outcome, Url};
+use wheeleg_console::client::{Client, KEYS, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::request::FRAME_MAX;
 use wheeleg_console::{ADDRESS, Fingerprint, Key};
@@ -19,6 +19,8 @@ use super::super::exit::{LOST, REFUSED};
 use super::super::serve::refused;
 use super::super::{print, tell};
 
+/// Status of HTTP for a key that is none of the server's.
+const WRONG_KEY: u16 = 401;
 /// What is said where the control could not be given back.
 const NOT_RELEASED: &str = "the control is not released: the robot will hold";
 /// Longest time that a walk needs to put both feet down.
@@ -32,16 +34,16 @@ const VALID_MS: u32 = 1_000;
 #[derive(Debug, Args)]
 pub(super) struct Reach {
     /// Address of the server.
-    #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
+    #[arg(long, global = true, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
     url: Url,
     /// SHA-256 of the certificate of a server with TLS, as it prints it.
-    #[arg(long, value_name = "HEX", value_parser = Fingerprint::parse)]
+    #[arg(long, global = true, value_name = "HEX", value_parser = Fingerprint::parse)]
     fingerprint: Option<Fingerprint>,
     /// File of the key [default: the one that `wheeleg serve` has made].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, global = true, value_name = "FILE")]
     key: Option<PathBuf>,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub(super) json: bool,
 }
 
@@ -57,11 +59,28 @@ impl Reach {
 
     /// The key that is given, or that of `file`.
     pub(super) fn key(&self, file: &str) -> Result<Key, StudyError> {
-        let path = match &self.key {
+        keys::read(&self.key_path(file)?).map_err(refused)
+    }
+
+    fn key_path(&self, file: &str) -> Result<PathBuf, StudyError> {
+        Ok(match &self.key {
             Some(path) => path.clone(),
             None => keys::folder().map_err(refused)?.join(file),
-        };
-        keys::read(&path).map_err(refused)
+        })
+    }
+
+    /// Tells what a server refuses over HTTP to who has the key of `file`; the exit code.
+    pub(super) fn not_answered(&self, problem: &Value, file: &str) -> Result<ExitCode, StudyError> {
+        if problem["status"] == WRONG_KEY {
+            let path = self.key_path(file)?;
+            let path = path.display();
+            tell(&format!("`{path}` is not a key of this server: {KEYS}"));
+            return Ok(ExitCode::from(REFUSED));
+        }
+        let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
+        // A false server may have written it.
+        tell(&plain(&format!("{}: {}", text("detail"), text("remedy"))));
+        Ok(ExitCode::from(REFUSED))
     }
 
     /// A session that may drive.
@@ -174,14 +193,6 @@ fn bring_to_rest(client: &mut Client, name: &str) -> Result<(), StudyError> {
         tell(NOT_RELEASED);
     }
     Ok(())
-}
-
-/// Tells what a server refuses over HTTP; its exit code.
-pub(super) fn not_answered(problem: &Value) -> ExitCode {
-    let text = |name: &str| problem[name].as_str().unwrap_or_default().to_owned();
-    // A false server may have written it.
-    tell(&plain(&format!("{}: {}", text("detail"), text("remedy"))));
-    ExitCode::from(REFUSED)
 }
 
 /// Bytes of a frame beside the command in it.
