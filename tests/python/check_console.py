@@ -6,7 +6,7 @@ Without a key and with a wrong one nothing is shown. With the right one: ready, 
 provoke a fault, read its remedy, stop with Esc from within a field. A slider asks for a stroke; a parameter is written, and not saved while armed. Who has the view key may look and
 stop. Signals are plotted, frozen, zoomed and saved; events are sieved and saved; what is done is recorded, and repeats to the bit. Somebody drives by
 hand, with wheels and legs and with the wheels alone: who lets go stops. The robot is seen in space, and on a slope on its
-ground. A page that did not run says so; one whose earlier events do not come keeps its STOP. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
+ground. Space holds, also on a button; a reload in mid-walk is asked about. A page that did not run says so; one whose earlier events do not come keeps its STOP. When the server goes, the page says so and nothing on it looks live. At three sizes, light and dark,
 nothing is wider than the window, STOP can be seen and hit, and axe-core finds nothing.
 """
 
@@ -345,7 +345,7 @@ def events(page):
 def sees_what_was(browser, console, lines):
     """Who comes later sees the events of before."""
     page = opened(browser, console, f"#v={console.keys['view']}")
-    page.wait_for_selector(".events li")
+    page.wait_for_selector(".events li:visible")
     page.wait_for_timeout(500)
     count = page.locator(".events li").count()
     expect(count >= min(lines, 50), f"who comes later sees {count} lines, who was there {lines}")
@@ -558,13 +558,127 @@ def parameters(page):
     expect("refused" in told and "disarm" in told.lower(), f"saving while armed, in the panel: {told!r}")
 
 
+def in_a_walk(page):
+    """Simulated time and way since power-up, s and mm."""
+    texts = "() => [[...document.querySelectorAll('.cell')].find((cell) => cell.firstChild.textContent === 'Time').lastChild.textContent, document.querySelector('.views .side svg title').textContent]"
+    time_s, way = page.evaluate(texts)
+    return float(time_s.split()[0]), float(re.search(r"(-?[0-9]+) mm travelled", way)[1])
+
+
+def speed_of(page):
+    """Over two seconds, mm/s."""
+    begin = in_a_walk(page)
+    page.wait_for_timeout(2000)
+    end = in_a_walk(page)
+    return (end[1] - begin[1]) / (end[0] - begin[0])
+
+
+def walk_is_as_set(page):
+    """The button says what it does; a speed that is set in a walk counts at once."""
+    knob = page.get_by_role("slider", name="Speed, mm/s")
+    knob.fill("50")
+    page.wait_for_timeout(300)
+    told = page.locator(".buttons button", has_text="Walk").inner_text()
+    expect("straight, 50 mm/s" in told, f"Walk says {told!r}")
+    expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
+    page.wait_for_timeout(3000)
+    slow = speed_of(page)
+    knob.fill("120")
+    page.wait_for_timeout(3000)
+    fast = speed_of(page)
+    expect(fast > 1.6 * slow > 0, f"set to 50 mm/s the robot walks at {slow:.0f} mm/s, then to 120 mm/s at {fast:.0f} mm/s")
+    knob.fill("100")
+    press(page, "Stop walking")
+    expect(waits(page, "Gait", ["done", "ready", "idle"], 20), f"Stop walking: {cell(page, 'Gait')}")
+    expect(becomes_ready(page), f"Ready after a walk: {page.inner_text('.answer')!r}")
+
+
+def space_holds(page):
+    """Space holds wherever the focus is but where one types or chooses, and presses no button once more."""
+    places = {
+        "Walk": lambda: None,  # it keeps the focus when it was pressed
+        "a slider": lambda: page.get_by_role("slider", name="Speed, mm/s").focus(),
+        "nothing": lambda: page.evaluate("document.activeElement.blur()"),
+    }
+    for where, focus in places.items():
+        expect(walks(page), f"Walk before Space on {where}: {page.inner_text('.answer')!r}")
+        focus()
+        for _ in range(2):
+            page.keyboard.press("Space")
+            expect(waits(page, "Gait", ["hold", "done"], 5), f"Space with the focus on {where}: {cell(page, 'Gait')}, {page.inner_text('.answer')!r}")
+        page.wait_for_timeout(1500)
+        expect(not cell(page, "Gait").startswith("walk"), f"a second Space on {where} walks on")
+        expect(page.inner_text(".answer").strip().startswith("Hold: done"), f"Space on {where}: {page.inner_text('.answer')!r}")
+        expect(becomes_ready(page), f"Ready after Space: {page.inner_text('.answer')!r}")
+    expect(walks(page), f"Walk before Space in a field: {page.inner_text('.answer')!r}")
+    field = page.get_by_label("Events whose text has")
+    field.focus()
+    page.keyboard.press("Space")
+    expect(field.input_value() == " " and cell(page, "Gait").startswith("walk"), f"Space in a field of text: {field.input_value()!r}, {cell(page, 'Gait')}")
+    field.fill("")
+    page.focus(".events")
+    page.keyboard.press("Space")
+    expect(waits(page, "Gait", ["hold", "done"], 5), f"Space on the list of events: {cell(page, 'Gait')}")
+    expect(becomes_ready(page), f"Ready after Space: {page.inner_text('.answer')!r}")
+
+
+def operator_leaves(page):
+    """Whoever reloads the page in mid-walk is asked before, and then told why the robot holds."""
+    page.set_viewport_size({"width": 1280, "height": 720})
+    for end in page.get_by_role("button", name="End", exact=True).all():
+        end.click()
+    asked = []
+
+    def answer(dialog):
+        asked.append(dialog.type)
+        dialog.accept()
+
+    page.on("dialog", answer)
+    for _ in range(ATTEMPTS):
+        expect(becomes_ready(page), f"Ready before leaving: {page.inner_text('.answer')!r}")
+        expect(walks(page), f"Walk before leaving: {page.inner_text('.answer')!r}")
+        # Lost by itself meanwhile, it is not this operator who leaves.
+        if cell(page, "Control") == "you":
+            break
+    page.reload()
+    try:
+        page.wait_for_selector(".fault:has-text('has ended: its page was closed or reloaded')", timeout=5000)
+    except Exception:
+        problems.append(f"after a reload: {page.inner_text('.faults')!r}")
+    expect("nothing new" not in page.inner_text(".faults"), f"after a reload: {page.inner_text('.faults')!r}")
+    expect(asked == ["beforeunload"], f"a reload in mid-walk asks {asked}")
+
+
+def server_is_gone(page):
+    """What is old looks old, all of it, and nothing can be pressed but STOP, which says that it is not confirmed."""
+    page.wait_for_selector(".banner:not([hidden])")
+    expect(page.get_attribute("body", "data-state") == "stale", "what is old looks live")
+    told = page.inner_text(".banner:not(.alarm)")
+    expect("reload" in told and told.strip().startswith("The server has ended"), f"the lost server is told as {told!r}")
+    page.set_viewport_size({"width": 1280, "height": 720})
+    page.evaluate("scrollTo(0, document.body.scrollHeight)")
+    page.wait_for_timeout(200)
+    box = page.locator(".banner:not(.alarm)").bounding_box()
+    expect(0 <= box["y"] < 720, f"further down the lost server is not told: {box}")
+    for part in [".cells", ".faultlist", ".control", ".joint", ".boardlist"]:
+        background = page.locator(part).first.evaluate("one => getComputedStyle(one).backgroundImage")
+        expect("gradient" in background, f"{part} looks live without a server")
+    for part in [".control", ".drive", ".try", ".form", "section[aria-label=Recording]", ".joints"]:
+        count = page.locator(f"{part} :is(button, input, select):not([disabled]):visible").count()
+        expect(count == 0, f"{count} things of {part} can be pressed without a server")
+    page.keyboard.press("Space")
+    expect("no connection" in page.inner_text(".answer"), f"Space without a server: {page.inner_text('.answer')!r}")
+    page.keyboard.press("Escape")
+    expect("CUT THE AIR" in page.inner_text(".banner.alarm"), "a stop without a server seems confirmed")
+
+
 def without_the_key(browser, console):
     page = opened(browser, console, "")
     expect("needs a key" in page.inner_text("body"), "without a key the page does not say what it needs")
     page.context.close()
     page = opened(browser, console, f"#k={'0' * 64}")
     page.wait_for_selector("[role=alert].alone")
-    expect("key" in page.inner_text("body"), f"a wrong key: {page.inner_text('body')!r}")
+    expect("The key in the address is wrong" in page.inner_text("body"), f"a wrong key: {page.inner_text('body')!r}")
     page.context.close()
 
 
@@ -581,6 +695,8 @@ def journey(browser, console, folder):
     with Robot(console.address, console.keys["view"], role="view") as robot:
         undisturbed(page, robot, slider)
         undisturbed(page, robot, parameters)
+        undisturbed(page, robot, walk_is_as_set)
+        undisturbed(page, robot, space_holds)
     drives_by_hand(page)
     drives_by_gamepad(page)
     expect(becomes_ready(page), f"Ready after driving: {page.inner_text('.answer')!r}")
@@ -685,10 +801,18 @@ def page_hangs(page):
 
 
 def looks_only(browser, console):
-    page = opened(browser, console, f"#v={console.keys['view']}")
+    """Whoever has the view key may look and stop, whichever way the address has it."""
+    for way in ["#v", "#k"]:
+        looks_only_by(browser, console, way)
+
+
+def looks_only_by(browser, console, way):
+    page = opened(browser, console, f"{way}={console.keys['view']}")
     page.wait_for_selector(".joint")
+    expect(cell(page, "You") == "watching only" and "view key" in page.inner_text(".answer"), "a viewer is not told that he is one")
     expect(waits(page, "State", ["STOPPED"]), "a viewer does not see the stop")
-    expect(page.locator(".buttons .btn:not([disabled])").count() == 0, "a viewer can press buttons")
+    for part in [".control", ".drive", ".try", ".form"]:
+        expect(page.locator(f"{part} .btn:not([disabled])").count() == 0, f"a viewer can press buttons of {part}")
     page.click(".stop")
     expect(waits(page, "State", ["STOPPED"]), "a viewer cannot stop")
     expect(page.locator(".banner.alarm").is_hidden(), "a viewer's stop is not confirmed")
@@ -731,11 +855,11 @@ def main(program, folder, axe):
             looks_only(browser, console)
             ground(browser, program, folder)
             looks(page, folder, axe)
+            operator_leaves(page)
             console.end()
             repeats(program, console)
-            page.wait_for_selector(".banner:not([hidden])")
-            expect(page.get_attribute("body", "data-state") == "stale", "what is old looks live")
-            expect("reload" in page.inner_text(".banner:not(.alarm)"), "the lost server is not told")
+            server_is_gone(page)
+            page.screenshot(path=folder / "gone.png")
         finally:
             console.end()
             browser.close()

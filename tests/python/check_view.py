@@ -88,6 +88,12 @@ def cause(browser, program, folder):
         expect(told.rstrip(".") == "joint 3: the position sensor reads outside its range, at 3.00 s", f"{report}: {told!r}")
         expect("potentiometer wiring" in page.inner_text("header"), f"{report} does not say what to do")
         page.screenshot(path=folder / f"cause-{report}.png")
+        readings = lambda: page.inner_text(".readings")
+        page.focus(".scrub")
+        page.keyboard.press("Home")
+        expect("no reading" not in readings(), f"{report}: before the fault there is {readings()!r}")
+        page.keyboard.press("End")
+        expect("no reading" in readings(), f"{report}: after the fault the joint seems to be read: {readings()!r}")
         page.context.close()
 
 

@@ -5,8 +5,24 @@ use serde_json::{Value, json};
 use wheeleg_access::host::HOST_TABLE;
 use wheeleg_config::faults::KINDS;
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits};
-use wheeleg_master::command::TABLE;
+use wheeleg_master::command::{CommandCode, TABLE};
 use wheeleg_telemetry::channels;
+
+/// What the arguments of a command usually are, for who leaves some of them out: forms begin with it. Few
+/// commands have such values: a slow walk straight ahead on level ground.
+#[must_use]
+pub fn usual(command: &str) -> Vec<(String, Value)> {
+    let arguments = match CommandCode::of_name(command) {
+        Some(CommandCode::Walk) => json!({
+            "speed": 100, "turn": 0, "pattern": "alternate", "lift": 60, "nose": -20,
+        }),
+        _ => json!({}),
+    };
+    match arguments {
+        Value::Object(arguments) => arguments.into_iter().collect(),
+        _ => Vec::new(),
+    }
+}
 
 /// First 16 digits of the BLAKE3 of what a list says.
 fn hash(list: &Value) -> String {
@@ -75,7 +91,15 @@ fn channel_list() -> Vec<Value> {
 #[must_use]
 pub fn command_list() -> Vec<Value> {
     let list = TABLE.iter().map(|row| {
-        let arguments: Vec<Value> = row.arguments.iter().map(argument).collect();
+        let usual = usual(row.name);
+        let arguments = row.arguments.iter().map(|row| {
+            let mut value = argument(row);
+            if let Some((_, usual)) = usual.iter().find(|(name, _)| name == row.name) {
+                value["usual"] = usual.clone();
+            }
+            value
+        });
+        let arguments: Vec<Value> = arguments.collect();
         json!({
             "name": row.name,
             "code": row.code as u16,
@@ -182,7 +206,12 @@ mod tests {
             assert_eq!(shown["name"], row.name);
             let arguments = shown["arguments"].as_array().expect("a list");
             assert_eq!(arguments.len(), row.arguments.len());
+            let has_usual = arguments.iter().filter(|a| !a["usual"].is_null()).count();
+            assert_eq!(has_usual, usual(row.name).len(), "{}", row.name);
         }
+        // A walk can be given without any argument.
+        let walk = usual("Walk").into_iter().collect();
+        assert!(crate::arguments::command(CommandCode::Walk, &walk).is_ok());
         assert_eq!(list[list.len() - 1]["code"], 0x030A);
         assert_eq!(catalogue.layout.len(), 16);
         assert_ne!(catalogue.layout, catalogue.commands);

@@ -15,6 +15,7 @@ use tungstenite::{Message, WebSocket};
 use self::url::Stream;
 pub use self::url::Url;
 use crate::api::SUBPROTOCOL;
+use crate::close::Close;
 use crate::error::ConsoleError;
 use wheeleg_access::Key;
 use wheeleg_access::hex;
@@ -24,6 +25,8 @@ use wheeleg_access::mac::Transcript;
 const LARGEST_ANSWER: usize = 1 << 20;
 /// What is said of another server.
 const NO_CONSOLE: &str = "this is not a Wheeleg console";
+/// What can be done about a key that is none of the server's.
+pub const KEYS: &str = "give the server's control.key to drive, or its view.key to watch and stop, with --key; `wheeleg serve` prints their paths";
 /// How often the control is kept by a beat.
 const BEAT: Duration = Duration::from_millis(50);
 /// How long a look for a message lasts.
@@ -169,6 +172,10 @@ impl Client {
         let auth = Message::text(auth.to_string());
         socket.send(auth).map_err(|e| failed(url, e))?;
         let welcome = text(url, &mut socket)?;
+        if welcome["reason"] == Close::WrongKey.reason() {
+            let what = format!("the key is not this server's key of the role `{role}`");
+            return Err(url.error_with(what, KEYS));
+        }
         if let Some(why) = welcome["text"].as_str() {
             return Err(url.error(why));
         }

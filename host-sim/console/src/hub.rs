@@ -155,6 +155,8 @@ struct Inner {
     desk: Desk,
     /// Name of the client that was in control last.
     last_holder: String,
+    /// Its connection has ended while it was in control.
+    last_is_gone: bool,
     /// Name of the client that has taken the control away from it.
     revoked_by: Option<String>,
     pending: BTreeMap<u32, Pending>,
@@ -222,6 +224,7 @@ impl Hub {
                 viewers,
                 desk: Desk::default(),
                 last_holder: String::new(),
+                last_is_gone: false,
                 revoked_by: None,
                 pending: BTreeMap::new(),
                 history: History::new(),
@@ -300,6 +303,7 @@ impl Hub {
     pub(crate) fn leave(&self, asking: &Asking) {
         let mut inner = self.inner();
         inner.clients.remove(&asking.id);
+        inner.last_is_gone |= inner.desk.holds(asking.id);
         inner.desk.leave(asking.id);
     }
 

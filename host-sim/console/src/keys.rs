@@ -16,6 +16,11 @@ pub const CONTROL_FILE: &str = "control.key";
 /// File of the view key.
 pub const VIEW_FILE: &str = "view.key";
 
+/// What a server can do about its own files.
+const MAKE: &str = "make new keys: wheeleg serve --new-key; clients need them then";
+/// What a client can do: new keys would lock out everybody.
+const GIVE: &str = "give the file control.key or view.key; `wheeleg serve` prints their paths";
+
 /// Digits of a key in its file.
 const DIGITS: usize = 64;
 
@@ -41,9 +46,9 @@ impl Keys {
             match make(&path) {
                 Ok(()) => {}
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(wrong(&path, format!("cannot be created: {e}"))),
+                Err(e) => return Err(wrong(&path, format!("cannot be created: {e}"), MAKE)),
             }
-            read(&path)
+            read_or(&path, MAKE)
         });
         Ok(Self {
             control: control?,
@@ -60,7 +65,7 @@ impl Keys {
             let path = folder.join(name);
             match fs::remove_file(&path) {
                 Err(e) if e.kind() != ErrorKind::NotFound => {
-                    return Err(wrong(&path, format!("cannot be removed: {e}")));
+                    return Err(wrong(&path, format!("cannot be removed: {e}"), MAKE));
                 }
                 _ => {}
             }
@@ -86,13 +91,18 @@ pub fn folder() -> Result<PathBuf, ConsoleError> {
     Ok(state.join("wheeleg"))
 }
 
-/// Reads a key.
+/// Reads the key of a client.
 ///
 /// # Errors
 /// [`ConsoleError::Key`] if the file cannot be read, others can read it, or it holds no key.
 pub fn read(path: &Path) -> Result<Key, ConsoleError> {
-    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
-    let file = owners_alone(path)?;
+    read_or(path, GIVE)
+}
+
+/// The same; `help`: what can be done about a file that is no key.
+fn read_or(path: &Path, help: &str) -> Result<Key, ConsoleError> {
+    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"), help);
+    let file = owners_alone(path, help)?;
     let mut text = String::new();
     file.take(DIGITS as u64 + 3)
         .read_to_string(&mut text)
@@ -102,20 +112,22 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
         None => Err(wrong(
             path,
             format!("is not a key: a key is {DIGITS} hexadecimal digits"),
+            help,
         )),
         Some(bytes) if bytes == [0; 32] => {
-            Err(wrong(path, "is not a key: it is all zeros".to_owned()))
+            let what = "is not a key: it is all zeros".to_owned();
+            Err(wrong(path, what, help))
         }
         Some(bytes) => Ok(Key::new(bytes)),
     }
 }
 
-/// Opens a file that its owner alone can read.
+/// Opens a file that its owner alone can read; `help`: what can be done if it cannot be read.
 ///
 /// # Errors
 /// [`ConsoleError::Key`] if it cannot be read, or others can read it.
-pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
-    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"));
+pub(crate) fn owners_alone(path: &Path, help: &str) -> Result<File, ConsoleError> {
+    let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"), help);
     // Nobody is to change who may read a device or a folder, nor to wait for who writes to a pipe.
     let file = open_file(path).map_err(cannot)?;
     match open_to_others(&file).map_err(cannot)? {
@@ -131,11 +143,11 @@ pub(crate) fn owners_alone(path: &Path) -> Result<File, ConsoleError> {
     }
 }
 
-fn wrong(path: &Path, what: String) -> ConsoleError {
+fn wrong(path: &Path, what: String, help: &str) -> ConsoleError {
     ConsoleError::Key {
         path: path.to_owned(),
         what,
-        help: "make new keys: wheeleg serve --new-key; clients need them then".to_owned(),
+        help: help.to_owned(),
     }
 }
 
@@ -146,7 +158,7 @@ fn make_folder(folder: &Path) -> Result<(), ConsoleError> {
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder
         .create(folder)
-        .map_err(|e| wrong(folder, format!("cannot be created: {e}")))
+        .map_err(|e| wrong(folder, format!("cannot be created: {e}"), MAKE))
 }
 
 fn make(path: &Path) -> std::io::Result<()> {
@@ -209,6 +221,14 @@ mod tests {
             let error = read(&path).expect_err("refused");
             assert!(error.to_string().contains(word), "{error}");
             assert!(!error.to_string().contains("aaaa"), "{error}");
+            // New keys are for the server to make: those of everybody else would no longer work.
+            let help = |error: &ConsoleError| match error {
+                ConsoleError::Key { help, .. } => help.clone(),
+                other => panic!("{other}"),
+            };
+            assert!(!help(&error).contains("new"), "{error:?}");
+            let error = Keys::open(home.path()).expect_err("refused");
+            assert!(help(&error).contains("--new-key"), "{error:?}");
         }
         fs::write(&path, "a".repeat(64)).expect("written");
         fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).expect("set");

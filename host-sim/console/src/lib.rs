@@ -38,7 +38,7 @@ mod tls;
 pub mod unpack;
 
 pub use api::SUBPROTOCOL;
-pub use catalogue::command_list;
+pub use catalogue::{command_list, usual};
 pub use error::ConsoleError;
 pub use live::{Live, Port, SlowAdapter};
 pub use record::{FOLDER, Summary};

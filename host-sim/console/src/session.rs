@@ -184,10 +184,7 @@ pub(crate) async fn send_all<F: Future<Output = Message>>(
 
 async fn refuse(socket: &mut WebSocket, why: Close) {
     let (text, remedy) = match why {
-        Close::WrongKey => (
-            "the key is wrong",
-            "open the address that the server prints",
-        ),
+        Close::WrongKey => ("the key is wrong", "open an address that the server prints"),
         Close::Wait => (
             "too many wrong keys",
             "wait a minute, then open the address that the server prints",

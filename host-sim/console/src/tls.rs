@@ -73,7 +73,7 @@ impl Certificate {
         let first = chain.first();
         let first = first.ok_or_else(|| wrong(&files.certificate, "holds no certificate"))?;
         let fingerprint = Fingerprint::of(first);
-        let text = contents(Ok(keys::owners_alone(&files.key)?), &files.key)?;
+        let text = contents(Ok(keys::owners_alone(&files.key, KEY_FILE)?), &files.key)?;
         let key = PrivateKeyDer::from_pem_slice(&text).map_err(|e| match e {
             pem::Error::NoItemsFound => wrong(&files.key, "holds no private key"),
             other => wrong(&files.key, other),
@@ -132,6 +132,9 @@ fn config(
     config.alpn_protocols = vec![b"http/1.1".to_vec()];
     Ok(Arc::new(config))
 }
+
+/// What can be done where the private key cannot be read.
+const KEY_FILE: &str = "give the private key of the certificate, PEM, with --tls-key";
 
 fn wrong(path: &Path, what: impl fmt::Display) -> ConsoleError {
     ConsoleError::other(

@@ -35,6 +35,8 @@ export function driver(command) {
   let busy = false;
   /** The walk has begun: a change of it that is refused leaves it under way. */
   let walks = false;
+  /** The robot walks straight ahead, and nobody needs to hold on. */
+  let straight = false;
   /** The gamepad's shoulders were seen open since somebody had to let go. */
   let padOpen = false;
 
@@ -42,12 +44,16 @@ export function driver(command) {
     const input = html("input", { type: "range", min, max, value, step, "aria-label": `${name}, ${unit}` });
     const shown = html("output", {}, `${value} ${unit}`);
     input.addEventListener("input", () => say(shown, `${input.value} ${unit}`));
-    return { input, row: html("label", {}, html("span", {}, name), input, shown) };
+    const begin = (number) => {
+      input.value = String(number);
+      say(shown, `${input.value} ${unit}`);
+    };
+    return { input, begin, row: html("label", {}, html("span", {}, name), input, shown) };
   };
   const choice = (name, options) => html("select", { "aria-label": name }, options.map(([value, text]) => html("option", { value }, text)));
   const means = choice("What moves", [["walk", "Wheels and legs"], ["wheels", "Wheels alone"]]);
   const speed = slider("Speed", "mm/s", 10, FASTEST, 100, 10);
-  const turn = slider("Turn", "°/s", 1, TIGHTEST, 4, 1);
+  const turn = slider("Turn left, right", "°/s", 1, TIGHTEST, 4, 1);
   const lift = slider("Lift", "mm", 20, 170, 60, 10);
   const nose = slider("Nose", "mm", -120, 0, -20, 10);
   const pattern = choice("Pattern", [["alternate", "legs alternate"], ["tandem", "legs in tandem"]]);
@@ -66,8 +72,21 @@ export function driver(command) {
   }
   const hold = (who, ahead, left) => held.set(who, [ahead, left]);
   const release = (who) => held.delete(who) && held.size === 0 && stop();
+  /** Walks straight ahead until somebody stops it. */
+  async function walkOn() {
+    straight = true;
+    await command("Walk", order(1, 0));
+    straight = false;
+  }
+  // What is set meanwhile counts at once.
+  for (const field of [speed.input, lift.input, nose.input, pattern]) field.addEventListener("change", () => straight && held.size === 0 && command("Walk", order(1, 0)));
   /** Lets go of everything, and gives no command: another one stops the robot. */
   function letGo() {
+    straight = false;
+    drop();
+  }
+  /** Nobody holds on any more. */
+  function drop() {
     held.clear();
     moving = null;
     given = "";
@@ -77,7 +96,7 @@ export function driver(command) {
   /** Lets go, and stops what moves. */
   async function stop() {
     const was = moving;
-    letGo();
+    drop();
     if (was === "walk" && !(await command("StopGait"))) command("Hold");
     if (was === "wheels") command("Hold");
   }
@@ -161,7 +180,13 @@ export function driver(command) {
   function refused(way) {
     if (moving !== way) return;
     if (walks) stop();
-    else letGo();
+    else drop();
   }
-  return { root, stop, letGo, order };
+  /** Begins with the usual walk, of which the turn is none. @param {{name: string, usual?: any}[]} walk its arguments */
+  function begin(walk) {
+    const usual = (name) => walk.find((argument) => argument.name === name)?.usual;
+    for (const [one, name] of /** @type {[typeof speed, string][]} */ ([[speed, "speed"], [lift, "lift"], [nose, "nose"]])) if (usual(name) !== undefined) one.begin(usual(name));
+    pattern.value = usual("pattern") ?? pattern.value;
+  }
+  return { root, stop, letGo, begin, walk: walkOn, /** What a walk will be. */ about: () => `straight, ${speed.input.value} mm/s` };
 }

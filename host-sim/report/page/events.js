@@ -9,6 +9,9 @@ const KEPT = 500;
 const ALIKE_NS = 50e6;
 /** Lines among which such a one is looked for. */
 const RECENT = 32;
+/** What the boards write for whoever looks for a cause in them: many lines, left out at first. */
+const LOG = "log";
+const BUT_LOG = "but log";
 const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
 const FIRST_WHEEL = 7;
 const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "revoked_by", "text"];
@@ -40,7 +43,7 @@ function cell(value) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string}} RobotEvent */
+/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string, gone?: boolean}} RobotEvent */
 /** @typedef {{events: RobotEvent[], boards: number[], before: string, after: string, root: HTMLElement, what: HTMLElement}} Line */
 
 /** List, sieve and table. */
@@ -53,7 +56,7 @@ export function eventsView() {
   let newest = 0;
   const missing = html("p", { class: "effect bad", role: "status", hidden: true });
   const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
-  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: "" }, "every kind"));
+  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_LOG }, "all but logs of boards"), html("option", { value: "" }, "every kind"));
   const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, name(b))));
   const words = html("input", { type: "search", "aria-label": "Events whose text has", placeholder: "text", size: 8, oninput: sieve });
   const count = html("span", { class: "effect", role: "status" });
@@ -64,7 +67,8 @@ export function eventsView() {
     const { kind } = line.events[0];
     const wanted = words.value.trim().toLowerCase();
     const of = board.value === "" || (board.value === "0" ? line.events[0].board === 0 : line.events.some((event) => event.board === Number(board.value)));
-    return of && (kinds.value === "" || kind === kinds.value) && line.what.textContent.toLowerCase().includes(wanted);
+    const asked = kinds.value === "" || (kinds.value === BUT_LOG ? kind !== LOG : kind === kinds.value);
+    return of && asked && line.what.textContent.toLowerCase().includes(wanted);
   }
   function sieve() {
     for (const line of lines) line.root.hidden = !fits(line);

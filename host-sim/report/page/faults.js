@@ -6,9 +6,12 @@ import { html, say, sign, fixed } from "./dom.js";
 const BOARDS = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8"];
 /** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
 const HOLDS = {
-  operator_lost: ["Operator lost: the robot holds.", "Take the control, clear the fault, and press Ready."],
+  operator_lost: ["Operator lost: the robot holds.", "Press Take control, Clear fault and Ready."],
 };
 const LOST = "The operator saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
+/** The boards' fault EmergencyStop, and how it is ended on this page. */
+const E_STOP = 39;
+const AFTER_STOP = "Remove the cause, then press Clear fault, and Ready once the reservoir is full.";
 /** A pause of the page, or of the line, that is shorter does not lose an operator, ms. */
 const PAUSE_MS = 250;
 /** What was longer ago is not why an operator is lost now, ms. */
@@ -53,31 +56,49 @@ const acting = (faults, boards) =>
     return board === 0 || boards.includes(board);
   });
 
-/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault */
-export function faultsView(ours) {
+/** Why the operator was lost, as the event of it tells; nothing where it does not.
+ * @param {import("./events.js").RobotEvent} event */
+function told({ holder, revoked_by, gone }) {
+  if (revoked_by) return `${revoked_by}, at the robot's computer, has revoked the control of ${holder}.`;
+  return gone ? `The connection of ${holder} has ended: its page was closed or reloaded, or its program has ended.` : "";
+}
+
+/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault
+ * @param {() => boolean} looks whether who sees it may only look */
+export function faultsView(ours, looks) {
   const list = html("ul", { class: "faults" });
   /** Why the operator was lost, as found when that was seen. */
   let why = "";
+  /** The newest loss of an operator. @type {import("./events.js").RobotEvent | null} */
+  let loss = null;
   let shown = "";
   const inTheWay = (faults) => faults.map((fault) => html("p", {}, `Injected${ours(fault) ? " by you" : ""}: `, html("code", {}, fault), ". Press End under Faults to try, then Clear fault."));
   const card = (title, remedy, injected, number) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${title}`), html("p", {}, remedy), inTheWay(injected), number && html("small", {}, number));
   return {
-    root: html("section", { class: "panel faultlist" }, html("h2", {}, "Faults"), list),
+    root: html("section", { class: "panel faultlist", "data-live": true }, html("h2", {}, "Faults"), list),
+    /** @param {import("./events.js").RobotEvent} event */
+    event(event) {
+      if (event.code !== "hold" || event.detail !== "operator_lost" || event.number <= (loss?.number ?? 0)) return;
+      loss = event;
+      why = told(event);
+      shown = "";
+    },
     /** One line for what many boards have. @param {any} state @param {boolean} drove whether this page was in control @param {Pauses} pauses */
     state(state, drove, pauses) {
       const key = JSON.stringify([state.hold, state.faults, state.boards.map((b) => b.faults)]);
       if (key === shown) return;
       shown = key;
       if (state.hold !== "operator_lost") why = "";
-      else if (why === "") why = drove ? pauses.reason() : LOST;
+      // The event of it may come a moment later, and then counts.
+      else if (why === "") why = (loss && told(loss)) || (drove ? pauses.reason() : LOST);
       const rows = new Map();
       for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
       const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Fix what the boards and events report, then clear the fault and press Ready."];
       // A stop is told by the boards.
       const held = state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault";
-      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`, f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));
+      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`, f.number === E_STOP && !looks() ? AFTER_STOP : f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));
       // Who holds on to a fault of their own is told once.
-      if (held) cards.unshift(card(cause, `${why} ${remedy}`.trim(), cards.length > 0 || state.hold === "operator_lost" ? [] : state.faults, ""));
+      if (held) cards.unshift(card(cause, `${why} ${looks() ? "" : remedy}`.trim(), cards.length > 0 || state.hold === "operator_lost" ? [] : state.faults, ""));
       list.replaceChildren(...(cards.length > 0 ? cards : [html("li", { class: "none" }, sign("met"), " No board has a fault.")]));
     },
   };

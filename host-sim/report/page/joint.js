@@ -7,6 +7,9 @@ const STROKE_MM = 180;
 /** Faults that say of a reading that it is none: SensorRange, SensorRate. */
 const NO_READING = new Set([32, 33]);
 
+/** Whether a board says that its sensor gives no reading. @param {any} about of the state */
+export const isBlind = (about) => (about?.faults ?? []).some((f) => NO_READING.has(f.number));
+
 /** @param {string} name @param {number} board @param {(stroke_mm: number) => void} ask gives the command */
 export function jointCard(name, board, ask) {
   const picture = svg("svg", { viewBox: "0 0 260 48", class: "cyl", role: "img" });
@@ -22,9 +25,13 @@ export function jointCard(name, board, ask) {
   const side = html("span", { class: "ask" });
   const slider = html("input", { type: "range", min: 0, max: STROKE_MM, step: 1, value: STROKE_MM / 2, "aria-label": `${name}, stroke to ask for, mm` });
   const wanted = html("output", {}, `${slider.value} mm`);
-  const send = html("button", { class: "btn", type: "button", title: "JointReference 0x0101, layer 0", "aria-label": `Send the stroke to ${name}`, onclick: () => ask(Number(slider.value)) }, "Send");
-  /** Somebody has moved it; until then it stands where the joint is asked to be. */
+  const send = html("button", { class: "btn", type: "button", title: "JointReference 0x0101, layer 0", "aria-label": `Send the stroke to ${name}`, onclick: () => give() }, "Send");
+  /** Somebody has moved it, and not sent it; else it stands where the joint is asked to be. */
   let touched = false;
+  function give() {
+    touched = false;
+    ask(Number(slider.value));
+  }
   slider.addEventListener("input", () => {
     touched = true;
     say(wanted, `${slider.value} mm`);
@@ -32,13 +39,16 @@ export function jointCard(name, board, ask) {
   const root = html("article", { class: "panel joint", "data-live": true }, html("h2", {}, `${name} `, html("small", {}, `board ${board}`)), html("p", {}, value, side), picture, html("div", { class: "ask-for" }, slider, wanted, send));
   return {
     root,
-    /** @param {any} s newest sample @param {any} about its board, of the state @param {boolean} drives whether this page may drive */
-    update(s, about, drives) {
+    /** Whether who looks may drive. @param {boolean} drives */
+    allow(drives) {
+      for (const one of [slider, send]) one.toggleAttribute("disabled", !drives);
+    },
+    /** @param {any} s newest sample @param {any} about its board, of the state */
+    update(s, about) {
       const found = about?.faults ?? [];
-      const blind = found.some((f) => NO_READING.has(f.number));
+      const blind = isBlind(about);
       root.classList.toggle("bad", found.length > 0);
       root.classList.toggle("blind", blind);
-      for (const one of [slider, send]) one.toggleAttribute("disabled", !drives);
       if (!s) return;
       if (!touched && Number.isFinite(s.commanded_mm)) {
         slider.value = String(Math.round(s.commanded_mm));

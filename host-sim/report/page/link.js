@@ -41,6 +41,18 @@ const READERS = {
 
 /** @typedef {{status: string, reason?: string, text?: string, holder?: string, age_ms?: number}} Answer */
 /** @typedef {{key: string, role: "control" | "view", name: string}} Identity */
+/** Why a connection ends, by the code of its close. @type {Object<number, string>} */
+const ENDS = { 4003: "The server has closed the connection: a frame was not sound", 4004: "The server has closed the connection: this page or its line is too slow", 4006: "The server has ended" };
+
+/** The server does not let this page in; `wrong`: the key is not one of this role. */
+export class Refused extends Error {
+  /** @param {string} text @param {boolean} wrong */
+  constructor(text, wrong) {
+    super(text);
+    this.wrong = wrong;
+  }
+}
+
 /** @typedef {{sample: (topic: string, t_us: number, values: Object<string, any>) => void, state: (state: any) => void,
  *   event: (event: any) => void, asked: (by: string, session: string) => void, offered: (by: string) => void,
  *   revoked: (by: string) => void, closed: (why: string) => void}} Listener */
@@ -87,6 +99,7 @@ export class Link {
     const headers = isSecureContext ? { Authorization: `Bearer ${this.identity.key}` } : undefined;
     const response = await fetch(`/api/v1/${path}`, { headers });
     const answer = await response.json();
+    if (response.status === 401) throw new Error("The key in the address is wrong. Open the address that `wheeleg serve` prints.");
     if (!response.ok) throw new Error(`${answer.detail}: ${answer.remedy}`);
     return answer;
   }
@@ -110,7 +123,7 @@ export class Link {
         }
       };
     });
-    socket.onclose = (close) => this.end(close.reason || "the connection has ended");
+    socket.onclose = (close) => this.end(ENDS[close.code] ?? "The connection has ended");
     socket.onmessage = (message) => (typeof message.data === "string" ? this.told(JSON.parse(message.data)) : this.samples(message.data));
     return { robot, commands: commands.commands, faults: faults.injectable };
   }
@@ -128,7 +141,7 @@ export class Link {
       this.socket.send(JSON.stringify({ op: "auth", role, name, nonce: hexadecimal(this.client), ...this.hashes, mac: hexadecimal(proof) }));
       return false;
     }
-    if (message.op !== "welcome") throw new Error(`${message.text ?? "refused"}. ${message.remedy ?? ""}`);
+    if (message.op !== "welcome") throw new Refused(`${message.text ?? "refused"}. ${message.remedy ?? ""}`, ["wrong_key", "look_only", "wait"].includes(message.reason));
     const expected = hmac(key, Uint8Array.from([...prefixed("s1"), ...this.common, ...prefixed(message.session)]));
     if (hexadecimal(expected) !== message.mac) throw new Error("this is not your robot: its server does not have the key");
     this.session = message.session;

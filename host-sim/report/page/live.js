@@ -2,14 +2,15 @@
 import { html, svg, set, say, fixed, sign } from "./dom.js";
 import { reliefHeights } from "./ground.js";
 import { sideView, topView, footView } from "./robot.js";
-import { Link } from "./link.js";
+import { Link, Refused } from "./link.js";
 import { HZ, Scope } from "./scope.js";
 import { LINKS, boardsView } from "./boards.js";
 import { Pauses, faultsToTry, faultsView } from "./faults.js";
 import { driver } from "./drive.js";
-import { jointCard } from "./joint.js";
+import { isBlind, jointCard } from "./joint.js";
 import { eventsView } from "./events.js";
 import { parametersView } from "./parameters.js";
+import { refusal } from "./words.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
@@ -22,12 +23,14 @@ const ECHO_MS = 100;
 const DROVE_MS = 5000;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
 const WHEELS = ["/wheel/7", "/wheel/8"];
+const AIR = "/supply";
 
 /** The key from the address, which must not stay there, or of this tab. @returns {import("./link.js").Identity | null} */
 function identity() {
-  const given = /^#([kv])=([0-9a-f]{64})$/.exec(location.hash);
+  const given = /^#([kv])=([0-9a-f]{64})$/.exec(location.hash.trim());
   if (given) {
     sessionStorage.setItem("key", given[2]);
+    // After #k= either key may stand; which of them it is, the server knows.
     sessionStorage.setItem("role", given[1] === "k" ? "control" : "view");
     history.replaceState(null, "", location.pathname);
   }
@@ -57,11 +60,12 @@ const button = (name, hint, act) => html("button", { class: "btn", type: "button
 const codes = new Map();
 const answer = html("p", { class: "answer", role: "status" }, "No command sent yet.");
 /** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
-function tell(what, { status, text, reason, holder }, places = [answer]) {
+function tell(what, given, places = [answer]) {
+  const { status, reason, holder } = given;
   const held = holder ? ` (${holder} is in control)` : "";
   // A command that ran for long and was ended was not refused.
   const verdict = reason === "interrupted" ? "ended early" : "refused";
-  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${text || reason}${held}`;
+  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${refusal(what, given, { air_bar: air_bar(), injected: now.state?.faults ?? [] })}${held}`;
   const code = codes.get(what);
   for (const place of places) {
     place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`, code ? html("small", {}, ` ${code}`) : "");
@@ -70,7 +74,10 @@ function tell(what, { status, text, reason, holder }, places = [answer]) {
 }
 /** @param {string} name @param {Object<string, any>} [args] @param {() => void} [taken] @param {HTMLElement[]} [beside] shows the answer, too */
 async function command(name, args, taken, beside = []) {
-  if (!link) return false;
+  if (!link) {
+    say(answer, `${name}: not sent, there is no connection.`);
+    return false;
+  }
   const places = [answer, ...beside];
   for (const place of places) say(place, `${name} …`);
   const given = await link.command(name, args, taken);
@@ -102,7 +109,7 @@ function unconfirmed() {
 }
 
 // ---- head ----
-const head = { robot: cell("Robot", true), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock", true), control: cell("Control") };
+const head = { robot: cell("Robot", true), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock", true), control: cell("Control"), you: cell("You"), air: cell("Air", true) };
 const banner = html("p", { class: "banner", role: "alert", hidden: true });
 
 // ---- views ----
@@ -121,6 +128,7 @@ function pose() {
       sensed_mm: three.map((s) => known(s?.sensed_mm, 90)),
       load_n: foot.normal_force_n || 0,
       switches: foot.switches ?? 0,
+      blind: [0, 1, 2].some((i) => isBlind(now.state?.boards[3 * side + i])),
     };
   });
   const body = now.of.get("/body") ?? {};
@@ -135,6 +143,8 @@ function spacePose(robot) {
   const body = now.of.get("/body") ?? {};
   return { ...robot, x_mm: robot.travel_mm, roll_deg: known(body.roll_deg) };
 }
+/** Pressure in the reservoir, bar; no number of real boards, none of which measures it. */
+const air_bar = () => now.of.get(AIR)?.pressure_bar ?? NaN;
 /** Sizes of the robot, and the ground if it is not level; from the server. @type {any} */
 let drawing = null;
 /** @type {any} */
@@ -174,7 +184,7 @@ const joints = JOINTS.map((name, i) => jointCard(name, i + 1, (stroke) => comman
 
 // ---- faults, boards, events ----
 const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]));
-const faults = faultsView(toTry.ours);
+const faults = faultsView(toTry.ours, () => link?.identity.role === "view");
 const pauses = new Pauses();
 /** When this page was last in control. */
 let drove_ms = -Infinity;
@@ -195,7 +205,7 @@ function showRecording(state) {
   else if (r) {
     lastRecording = r.id;
     say(recorded, `${r.id}, ${fixed((state.master_us - r.since_us) * 1e-6)} s${r.dropped > 0 ? `; ${r.dropped} messages lost: the disk is too slow` : ""}`);
-  } else say(recorded, lastRecording ? `Recorded: ${lastRecording}. On the command line, “wheeleg replay” repeats it and “wheeleg view” shows its log.` : "Not recording.");
+  } else say(recorded, lastRecording ? `Recorded: ${lastRecording}. On the command line, “wheeleg replay runs/live/${lastRecording}” repeats it and “wheeleg view runs/live/${lastRecording}” shows its log, unless the server was given another folder.` : "Not recording.");
   recorded.classList.toggle("bad", Boolean(r?.failure) || (r?.dropped ?? 0) > 0);
 }
 
@@ -213,13 +223,13 @@ function showFields() {
   say(effect, chosen.effect);
   fields.replaceChildren(
     ...chosen.arguments.map((a) => {
-      const label = `${a.name} [${a.unit}]`;
+      const label = a.unit === "1" ? a.name : `${a.name}, ${a.unit}`;
       const range = a.min != null ? `${a.min} to ${a.max}` : "";
       let input;
-      if (a.choices) input = html("select", { name: a.name, "data-kind": "text" }, a.choices.map((c) => html("option", {}, c)));
+      if (a.choices) input = html("select", { name: a.name, "data-kind": "text" }, a.choices.map((c) => html("option", { selected: c === a.usual }, c)));
       else if (a.kind === "flag") input = html("select", { name: a.name, "data-kind": "flag" }, html("option", {}, "false"), html("option", {}, "true"));
       else if (a.kind === "text" || a.kind === "parameter") input = html("input", { name: a.name, "data-kind": "text" });
-      else input = html("input", { name: a.name, "data-kind": "number", type: "number", step: "any", min: a.min, max: a.max, required: true, value: a.min != null && a.min > 0 ? a.min : 0 });
+      else input = html("input", { name: a.name, "data-kind": "number", type: "number", step: "any", min: a.min, max: a.max, required: true, value: a.usual ?? (a.min != null && a.min > 0 ? a.min : 0) });
       return html("label", { title: a.description }, html("span", {}, label), input, html("small", {}, range));
     }),
   );
@@ -237,7 +247,11 @@ form.addEventListener("submit", (submit) => {
 // ---- what the operator does ----
 const take = button("Take control", "", () => command(mine() ? "ReleaseControl" : "TakeControl"));
 const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
-const walk = button("Walk", "as set below", () => (stepping() ? command("StopGait") : command("Walk", byHand.order(1, 0))));
+const walk = button("Walk", "straight", () => {
+  if (!stepping()) return byHand.walk();
+  byHand.letGo();
+  command("StopGait");
+});
 const hold = button("Hold", html("small", { class: "key" }, "Space"), () => command("Hold"));
 const disarm = button("Disarm", "", () => command("Disarm"));
 const clear = button("Clear fault", "", () => command("ClearFault"));
@@ -255,24 +269,39 @@ const byHand = driver(command);
 const parameters = parametersView(command, () => (link ? link.ask("parameters") : Promise.reject(new Error(lost))));
 /** Who asked for the control last, and how long that is offered here. @type {{session: string, until_ms: number} | null} */
 let heir = null;
+/** What is said of that. */
+let asking = "";
 const handOver = html("div", { class: "row", hidden: true }, html("button", { class: "btn", type: "button", onclick: () => heir && command("HandOver", { to: heir.session }) }));
 const mine = () => Boolean(link && now.state?.control?.session === link.session && !now.state.control.ended);
 const stepping = () => Boolean(now.state?.stepping);
 
-addEventListener("keydown", (key) => {
-  const inField = key.target instanceof Element && key.target.matches("input, select, textarea");
-  if (key.key === "Escape") {
-    key.preventDefault();
-    stop();
-  } else if (key.key === " " && !inField && !(key.target instanceof HTMLButtonElement)) {
-    key.preventDefault();
-    byHand.letGo();
-    command("Hold");
-  } else if (key.key === "?" && !inField) {
-    keys.open = !keys.open;
-  }
-});
-const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, outside of a field"], ["↑ ↓ ← →", "drive by hand, on its buttons"], ["← →", "on a plot: its cursor, by 20 ms; with Shift by 200 ms"], ["↑ ↓ ← → + −", "on the view in space: turn it, and come nearer or go away"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
+/** Where a space is typed, or opens a list. A slider is no such field. @param {KeyboardEvent} key */
+const inField = ({ target }) => target instanceof Element && target.matches("input:not([type=range]), select, textarea");
+/** Whether it holds. A space on STOP stops, which is more. @param {KeyboardEvent} key */
+const holds = (key) => key.key === " " && !inField(key) && !(key.target instanceof Node && stopButton.contains(key.target));
+addEventListener(
+  "keydown",
+  (key) => {
+    if (key.key === "Escape") {
+      key.preventDefault();
+      stop();
+    } else if (holds(key)) {
+      key.preventDefault();
+      if (key.repeat) return;
+      byHand.letGo();
+      command("Hold");
+    } else if (key.key === "?" && !inField(key)) {
+      keys.open = !keys.open;
+      if (keys.open) keys.scrollIntoView({ block: "center" });
+    }
+  },
+  true,
+);
+// Some browsers press the button that has the focus when the key comes up.
+addEventListener("keyup", (key) => holds(key) && key.preventDefault(), true);
+const keys = html("details", { class: "keyhelp" }, html("summary", {}, "Keys"), html("dl", {}, [["Esc", "STOP, from anywhere"], ["Space", "Hold, except in text and number fields and in lists; on STOP it stops"], ["↑ ↓ ← →", "drive by hand, on its buttons"], ["← →", "on a plot: its cursor, by 20 ms; with Shift by 200 ms"], ["↑ ↓ ← → + −", "on the view in space: turn it, and come nearer or go away"], ["?", "this list"]].flatMap(([key, what]) => [html("dt", {}, html("kbd", {}, key)), html("dd", {}, what)])));
+const controls = html("section", { class: "panel control", "data-live": true, "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), handOver, answer);
+const recorder = html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded);
 /** Who does not look does not drive. */
 const leaves = () => {
   byHand.stop();
@@ -280,6 +309,8 @@ const leaves = () => {
 };
 document.addEventListener("visibilitychange", () => document.hidden && leaves());
 addEventListener("pagehide", leaves);
+// Whoever reloads or closes the page in mid-walk loses the robot, which holds: the browser asks before.
+addEventListener("beforeunload", (event) => mine() && stepping() && event.preventDefault());
 
 // ---- the page ----
 function build({ robot, commands: list, faults: injectable }) {
@@ -290,20 +321,27 @@ function build({ robot, commands: list, faults: injectable }) {
   for (const { name, code, layer } of list) codes.set(name, `0x${code.toString(16).padStart(4, "0")}, layer ${layer}`);
   for (const [pressed, names] of gives) pressed.title = names.map((name) => `${name} ${codes.get(name)}`).join("; ");
   which.replaceChildren(...[0, 1, 2].map((layer) => html("optgroup", { label: ["Layer 0: joints, wheels, boards", "Layer 1: gait", "Simulation, and who is in control"][layer] }, list.filter((c) => c.layer === layer).map((c) => html("option", { value: c.name }, `${c.name} 0x${c.code.toString(16).padStart(4, "0")}`)))));
+  if (link?.identity.role === "view") say(answer, "You have the view key: you may watch, and press STOP. Driving needs the control key.");
+  say(head.you.value, "watching only");
   which.value = "JointReference";
   showFields();
   toTry.offer(injectable);
+  byHand.begin(list.find((c) => c.name === "Walk")?.arguments ?? []);
   page.replaceChildren(
     html(
       "header",
-      { class: "bar" },
-      html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
-      html("div", { class: "cells" }, head.mode.root, head.gait.root, head.control.root, head.link.root, head.time.root, head.speed.root, head.robot.root),
-      html("div", { class: "stopbox" }, stopButton),
+      { class: "top" },
+      html(
+        "div",
+        { class: "bar" },
+        html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
+        html("div", { class: "cells", "data-live": true }, head.mode.root, head.gait.root, head.control.root, link?.identity.role === "view" && head.you.root, head.link.root, head.time.root, head.air.root, head.speed.root, head.robot.root),
+        html("div", { class: "stopbox" }, stopButton),
+      ),
+      alarm,
+      banner,
     ),
-    alarm,
     ...(isSecureContext ? [] : [html("p", { class: "banner", role: "note" }, sign("warn"), " Not protected: anyone on the network can read and alter what is shown. From here the robot can be looked at and stopped, not driven.")]),
-    banner,
     html(
       "main",
       {},
@@ -319,11 +357,11 @@ function build({ robot, commands: list, faults: injectable }) {
       html(
         "div",
         { class: "col" },
-        html("section", { class: "panel control", "aria-label": "Control" }, html("div", { class: "buttons" }, take, ready, walk, hold, clear, disarm), handOver, answer),
+        controls,
         faults.root,
         boards.root,
         byHand.root,
-        html("section", { class: "panel", "aria-label": "Recording" }, html("h2", {}, "Recording"), html("div", { class: "buttons one" }, record), recorded),
+        recorder,
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
         robot.simulated && toTry.root,
         keys,
@@ -349,18 +387,28 @@ function showState(state) {
   say(head.control.value, whose(state));
   const speed = state.pace.paused ? "paused" : `× ${fixed(state.pace.factor)}`;
   say(head.speed.value, speed);
+  say(head.air.value, `${fixed(air_bar())} bar`);
   say(take.firstElementChild, mine() ? "Release control" : "Take control");
   say(walk.firstElementChild, state.stepping ? "Stop walking" : "Walk");
-  say(walk.lastElementChild, state.stepping ? "feet down" : "as set below");
-  const looks = link?.identity.role !== "control";
-  for (const b of [take, ready, walk, hold, disarm, clear, record]) b.toggleAttribute("disabled", looks);
-  parameters.allow(!looks);
+  say(walk.lastElementChild, state.stepping ? "feet down" : byHand.about());
   boards.state(state);
   showRecording(state);
   if (mine()) drove_ms = performance.now();
-  handOver.hidden ||= !mine() || !heir || performance.now() > heir.until_ms;
+  const late = !mine() || !heir || performance.now() > heir.until_ms;
+  if (late && !handOver.hidden && answer.textContent === asking) say(answer, "");
+  handOver.hidden ||= late;
   faults.state(state, performance.now() - drove_ms < DROVE_MS, pauses);
   toTry.state(state.faults);
+}
+
+/** Who may only look, and who has no connection, presses nothing but STOP. */
+function permit() {
+  const drives = link?.identity.role === "control";
+  for (const part of [controls, byHand.root, toTry.root, recorder, form]) {
+    for (const one of part.querySelectorAll("button, input, select")) one.toggleAttribute("disabled", !drives);
+  }
+  parameters.allow(drives);
+  for (const joint of joints) joint.allow(drives);
 }
 
 /** Draws the newest state, and only then counts it as seen. */
@@ -384,7 +432,7 @@ function paint() {
   views.top.update(robot);
   if (space && plan.classList.contains("in-space")) space.update(spacePose(robot));
   robot.legs.forEach((state, i) => views.feet[i].update(state));
-  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i], link?.identity.role === "control"));
+  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
   scope?.paint(now.t_us * 1e-6);
   if (now.state) showState(now.state);
   if (!stale) say(head.link.value, link ? `${fixed(link.delay_ms, 0)} ms` : "–");
@@ -404,10 +452,15 @@ const listener = {
     now.state = state;
     now.heard_ms = performance.now();
     now.t_us = Math.max(now.t_us, state.master_us);
+    permit();
   },
-  event: events.add,
+  event(event) {
+    events.add(event);
+    faults.event(event);
+  },
   asked(by, session) {
-    say(answer, `${by} asks for the control.`);
+    asking = `${by} asks for the control.`;
+    say(answer, asking);
     heir = { session, until_ms: performance.now() + ASKED_MS };
     say(handOver.firstElementChild, `Hand the control over to ${by}`);
     handOver.hidden = false;
@@ -419,22 +472,43 @@ const listener = {
     say(answer, `${by}, at the robot's computer, has revoked your control. Check the robot, then take control again.`);
   },
   closed(why) {
-    lost = `${why}. Nothing is sent any more; reload the page to look again.`;
+    lost = `${why}. What is shown is old, and nothing is sent any more; reload the page to look again.`;
     link = null;
+    permit();
   },
 };
+
+/** Connects; the key after #k= may be the one that only looks and stops.
+ * @param {import("./link.js").Identity} who */
+async function connect(who) {
+  const first = new Link(who, listener);
+  try {
+    return { opened: first, about: await first.open() };
+  } catch (refused) {
+    if (!(refused instanceof Refused && refused.wrong && who.role === "control")) throw refused;
+    const looking = new Link({ ...who, role: "view" }, listener);
+    const about = await looking.open().catch(() => {
+      throw refused;
+    });
+    sessionStorage.setItem("role", "view");
+    return { opened: looking, about };
+  }
+}
 
 async function begin() {
   const who = identity();
   if (!who) {
-    page.replaceChildren(html("p", { class: "alone" }, isSecureContext ? "This page needs a key. Open the address that `wheeleg serve` prints on its terminal: it ends in #k= and the key. Without a terminal, add #k= and the digits of the file control.key, whose place `wheeleg serve` prints." : "This page needs a key. Add #v= and the digits of the file view.key, whose place `wheeleg serve` prints."));
+    page.replaceChildren(html("p", { class: "alone" }, isSecureContext ? "This page needs a key. Open an address that `wheeleg serve` prints on its terminal. Without a terminal, add #k= and the digits of a key file to this address: control.key to drive, view.key to watch and stop. `wheeleg serve` prints the paths of both." : "This page needs a key. Add #k= and the digits of the file view.key to this address; `wheeleg serve` prints its path."));
     return;
   }
-  const opened = new Link(who, listener);
-  const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", ...WHEELS, ...LINKS]);
+  /** @type {Link} */
+  let opened;
+  const drawn = new Set([...JOINTS.map((_, i) => `/joint/${i + 1}`), "/foot/left", "/foot/right", "/body", AIR, ...WHEELS, ...LINKS]);
   const said = (error) => (error instanceof Error ? error.message : String(error));
   try {
-    const about = await opened.open();
+    const connected = await connect(who);
+    const { about } = connected;
+    opened = connected.opened;
     link = opened;
     scope = new Scope([...opened.channels.values()], (topic) => {
       if (drawn.has(topic)) return;
@@ -455,7 +529,9 @@ async function begin() {
   await opened.subscribe([...drawn], HZ);
   if (!isSecureContext) return events.noPast("the server gives them over HTTPS only");
   try {
-    events.past((await opened.ask("events")).events);
+    const kept = (await opened.ask("events")).events;
+    events.past(kept);
+    kept.forEach(faults.event);
   } catch (error) {
     events.noPast(said(error));
   }

@@ -13,7 +13,11 @@ import { showFilm } from "./film.js";
  *   commanded_mm: number[][], sensed_mm: number[][], load_n: number[][], switches: number[][],
  *   travel_mm: number[], pitch_deg: number[], y_mm: number[], z_mm: number[], yaw_deg: number[], supply_bar: number[],
  *   ground?: import("./ground.js").Ground,
+ *   blind: {joint: number, from: number, to: number}[],
  *   phases: import("./transport.js").Phase[], marks: import("./transport.js").Mark[]}} Motion */
+
+/** Whether a joint has no reading at a time. @param {Motion} m @param {number} joint @param {number} t s */
+const isBlind = (m, joint, t) => m.blind.some((b) => b.joint === joint && t >= b.from && t <= b.to);
 
 /** State of the robot at a time. @param {Motion} m @param {number} t s @returns {import("./robot.js").Pose} */
 function pose(m, t) {
@@ -24,6 +28,7 @@ function pose(m, t) {
     sensed_mm: strokes(m.sensed_mm, 3 * side, value),
     load_n: value(m.load_n[side]),
     switches: held(m.t, m.switches[side], t),
+    blind: [0, 1, 2].some((i) => isBlind(m, 3 * side + i, t)),
   });
   const place = { y_mm: value(m.y_mm), z_mm: value(m.z_mm), yaw_deg: value(m.yaw_deg) };
   return { travel_mm: value(m.travel_mm), pitch_deg: value(m.pitch_deg), ...place, legs: [legState(0), legState(1)] };
@@ -63,8 +68,9 @@ function showMotion(place, motion, player) {
     top.update(now);
     now.legs.forEach((state, i) => feet[i].update(state));
     say(read.phase, motion.phases.find((p) => t >= p.from && t < p.to)?.name ?? "stands");
-    say(read.horizontal, `${fixed(now.legs[0].sensed_mm[1])} mm`);
-    say(read.vertical, `${fixed(now.legs[0].sensed_mm[2])} mm`);
+    const stroke = (joint) => (isBlind(motion, joint, t) ? "no reading" : `${fixed(now.legs[0].sensed_mm[joint])} mm`);
+    say(read.horizontal, stroke(1));
+    say(read.vertical, stroke(2));
     say(read.travel, `${fixed(now.travel_mm / 1000, 3)} m`);
     say(read.air, `${fixed(linear(motion.t, motion.supply_bar, t) ?? held(motion.t, motion.supply_bar, t))} bar`);
   });

@@ -7,7 +7,8 @@ import { floorSide, terrainAbove, terrainSide } from "./ground.js";
 
 /** @typedef {import("./shape.js").Geometry} Geometry */
 /** @typedef {import("./shape.js").Strokes} Strokes */
-/** @typedef {{commanded_mm: Strokes, sensed_mm: Strokes, load_n: number, switches: number}} Leg */
+/** @typedef {{commanded_mm: Strokes, sensed_mm: Strokes, load_n: number, switches: number, blind?: boolean}} Leg
+ * `blind`: a sensor of it gives no reading; it is drawn where its last one was. */
 /** Where the middle of the axle is, if it is known, how far the left and the right wheel have turned, at the
  * rim, if that is told apart, and how the legs are.
  * @typedef {{travel_mm: number, wheels_mm?: [number, number], pitch_deg: number, y_mm?: number, z_mm?: number, yaw_deg?: number, legs: [Leg, Leg]}} Pose */
@@ -97,8 +98,7 @@ export function sideView(picture, g, heights) {
     const setSensed = verticalCylinder(sensed, false);
     const load = svg("path", { class: "r-force" }, group);
     const tag = svg("text", { class: "r-tag", "text-anchor": "end" }, group);
-    say(tag, side.name);
-    return { crank, barrel, rod, commanded, setCommanded, sensed, setSensed, load, tag };
+    return { group, crank, barrel, rod, commanded, setCommanded, sensed, setSensed, load, tag };
   });
   const nearWheel = wheelSide(picture, g, -g.track_mm / 2);
 
@@ -133,6 +133,8 @@ export function sideView(picture, g, heights) {
         const [x, y] = oblique(...at.o6, 0);
         set(part.sensed, { transform: `translate(${x},${y})` });
         part.setSensed(at.sole);
+        part.group.classList.toggle("blind", state.blind ?? false);
+        say(part.tag, state.blind ? `${side.name}: no reading` : side.name);
         const differs = state.commanded_mm.some((c, j) => Math.abs(c - state.sensed_mm[j]) > VISIBLE_MM);
         part.commanded.style.display = differs ? "" : "none";
         if (differs) {

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 use wheeleg_config::Drawing;
+use wheeleg_protocol::{Address, Fault};
+use wheeleg_telemetry::EventCode;
 
 /// The robot over time.
 #[derive(Serialize)]
@@ -26,6 +28,71 @@ pub(crate) struct Motion {
     pub(crate) supply_bar: Vec<f64>,
     pub(crate) phases: Vec<Phase>,
     pub(crate) marks: Vec<Mark>,
+    /// When a joint had no reading.
+    pub(crate) blind: Vec<Blind>,
+}
+
+/// A time in which a board reported that its sensor gives no reading.
+#[derive(Serialize)]
+pub(crate) struct Blind {
+    /// Which of the six, from 0.
+    pub(crate) joint: usize,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+}
+
+/// When the joints had no reading, from the events of their boards in their order.
+#[derive(Default)]
+pub(crate) struct Readings {
+    /// Begin and end, s; the last time may not be over.
+    missing: [Vec<(f64, Option<f64>)>; 6],
+}
+
+impl Readings {
+    /// Takes an event of a board.
+    pub(crate) fn look(
+        &mut self,
+        t_s: f64,
+        code: Option<EventCode>,
+        board: Address,
+        fault: Option<Fault>,
+    ) {
+        let joint = board.node().map(|node| node.index());
+        let Some(joint) = joint.filter(|joint| *joint < self.missing.len()) else {
+            return;
+        };
+        let no_reading = matches!(fault, Some(Fault::SensorRange | Fault::SensorRate));
+        match (code, self.is_missing(joint)) {
+            (Some(EventCode::FaultLatched), false) if no_reading => {
+                self.missing[joint].push((t_s, None));
+            }
+            (Some(EventCode::FaultsCleared), true) => {
+                if let Some((_, to)) = self.missing[joint].last_mut() {
+                    *to = Some(t_s);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether a joint has no reading after the newest event.
+    pub(crate) fn is_missing(&self, joint: usize) -> bool {
+        self.missing[joint]
+            .last()
+            .is_some_and(|(_, to)| to.is_none())
+    }
+
+    /// For the page of a record that ends at `end`.
+    pub(crate) fn blind(&self, end: f64) -> Vec<Blind> {
+        let joints = self.missing.iter().enumerate();
+        let times = joints.flat_map(|(joint, times)| times.iter().map(move |time| (joint, time)));
+        let blind = times.map(|(joint, (from, to))| Blind {
+            joint,
+            from: *from,
+            to: to.unwrap_or(end),
+        });
+        blind.collect()
+    }
 }
 
 /// A phase of the gait.
@@ -141,4 +208,32 @@ pub(crate) fn phase_name(phase: u8, step: u32) -> Option<(String, bool)> {
 /// A thousandth of a unit is finer than a drawing shows.
 pub(crate) fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3 + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_has_no_reading_from_its_fault_until_it_is_cleared() {
+        let mut readings = Readings::default();
+        let board = |number| Address::new(number).expect("a board");
+        let (latched, cleared) = (
+            Some(EventCode::FaultLatched),
+            Some(EventCode::FaultsCleared),
+        );
+        let range = Some(Fault::SensorRange);
+        readings.look(1.0, latched, board(3), Some(Fault::EmergencyStop));
+        readings.look(1.0, latched, board(7), range);
+        assert!(!readings.is_missing(2));
+        readings.look(2.0, latched, board(3), range);
+        readings.look(2.5, latched, board(3), Some(Fault::SensorRate));
+        assert!(readings.is_missing(2) && !readings.is_missing(1));
+        readings.look(3.0, cleared, board(3), None);
+        assert!(!readings.is_missing(2));
+        readings.look(4.0, latched, board(3), range);
+        let blind = readings.blind(9.0);
+        let times: Vec<_> = blind.iter().map(|b| (b.joint, b.from, b.to)).collect();
+        assert_eq!(times, [(2, 2.0, 3.0), (2, 4.0, 9.0)]);
+    }
 }

@@ -98,11 +98,16 @@ impl Url {
     }
 
     pub(super) fn error(&self, what: impl ToString) -> ConsoleError {
+        let help = "start a server with `wheeleg serve`; give its address with --url and its key with --key";
+        self.error_with(what, help)
+    }
+
+    /// An error, and what can be done about it.
+    pub(super) fn error_with(&self, what: impl ToString, help: &str) -> ConsoleError {
         ConsoleError::Link {
             url: format!("http{}://{}", if self.tls { "s" } else { "" }, self.host),
             what: what.to_string(),
-            help: "start a server with `wheeleg serve`; give its address with --url and its key with --key"
-                .to_owned(),
+            help: help.to_owned(),
         }
     }
 

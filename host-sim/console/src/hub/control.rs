@@ -139,7 +139,9 @@ impl Inner {
                 (Input::Revoked { id, holder, by }, Asked::Revoke { hold })
             }
             Order::Host(command) => {
-                if !self.desk.may_command_host(id) {
+                // Whoever sits at the robot's computer may break something while another drives.
+                let breaks = matches!(command, HostCommand::Inject(_) | HostCommand::EndFault(_));
+                if !self.desk.may_command_host(id) && !(breaks && client.is_local) {
                     return self.tell(id, &self.held(n, now));
                 }
                 let what = match &command {
@@ -183,7 +185,9 @@ impl Inner {
     fn held(&self, n: u64, now: Instant) -> Value {
         let name = self.desk.name().unwrap_or_default();
         let text = match self.desk.holder().map(|holder| holder.ended) {
-            Some(None) => format!("{name:?} has control"),
+            Some(None) => format!(
+                "{name:?} has control: wait until it is released, or end it on the robot's computer with `wheeleg ctl revoke`"
+            ),
             Some(Some(_)) => format!(
                 "{name:?} is no longer in control, but its lease is not over: resume the clock if it is paused, then ask again"
             ),
@@ -228,6 +232,7 @@ impl Inner {
                 }
                 if let Some(holder) = self.desk.holder().filter(|h| h.client == client) {
                     self.last_holder.clone_from(&holder.name);
+                    self.last_is_gone = holder.ended == Some(Ended::Gone);
                     if holder.ended != Some(Ended::Revoked) {
                         self.revoked_by = None;
                     }

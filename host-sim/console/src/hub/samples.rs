@@ -58,6 +58,7 @@ impl Inner {
                 let mut event = event_json(moving.number, moving.t_ns, event);
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();
+                    event["gone"] = self.last_is_gone.into();
                     if let Some(by) = &self.revoked_by {
                         event["revoked_by"] = by.as_str().into();
                     }

@@ -237,6 +237,7 @@ fn a_thousand_commands_from_before_a_reconnection_are_each_refused() {
     let old_us = gone.seen_us();
     drop(gone);
     rig.until("lost", |state| state["hold"] == "operator_lost");
+    assert_eq!(rig.event("hold")["gone"], true);
     let mut driver = rig.control("driver");
     look(&mut driver, "state");
     done(&mut driver, "TakeControl");
@@ -348,7 +349,10 @@ fn pace_and_faults_are_host_commands() {
             .is_some_and(|text| text.len() > 10),
         "{faults}"
     );
-    let outcome = driver.carry_out("EndFault", &fault, 500).expect("sent");
+    let mut other = rig.control("other");
+    assert_eq!(refusal(&mut other, "Pause", &json!({})), "control_held");
+    // At the robot's computer faults are for everybody with the control key.
+    let outcome = other.carry_out("EndFault", &fault, 500).expect("sent");
     assert_eq!(outcome, Outcome::Done);
     rig.until("ended", |state| state["faults"] == json!([]));
     done(&mut driver, "ClearFault");
@@ -491,8 +495,8 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     );
     let event = rig.event("hold");
     assert_eq!(
-        (&event["holder"], &event["revoked_by"]),
-        (&json!("driver"), &json!("owner"))
+        (&event["holder"], &event["revoked_by"], &event["gone"]),
+        (&json!("driver"), &json!("owner"), &json!(false))
     );
     // For a while others at the robot's computer may take it; where they do not, everybody.
     let reserved_for = &state["reserved_for"];

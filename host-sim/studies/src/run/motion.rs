@@ -2,8 +2,9 @@
 
 use super::figures::Source;
 use super::ground::picture;
-use crate::motion::{Mark, Motion, Phase, phase_name, rounded};
+use crate::motion::{Blind, Mark, Motion, Phase, Readings, phase_name, rounded};
 use wheeleg_config::Drawing;
+use wheeleg_protocol::Fault;
 use wheeleg_telemetry::Row;
 
 /// Instants of the motion, at most; a short run has one every 20 ms.
@@ -58,7 +59,21 @@ pub(super) fn motion(source: &Source<'_>) -> Motion {
         t: t.into_iter().map(rounded).collect(),
         phases: phases(source, end),
         marks: marks(source),
+        blind: blind(source, end),
     }
+}
+
+/// When joints had no reading.
+fn blind(source: &Source<'_>, end: f64) -> Vec<Blind> {
+    let mut readings = Readings::default();
+    for row in &source.recording.events {
+        let cause = &row.v.cause;
+        if let Some(board) = cause.board() {
+            let fault = cause.fault_code().and_then(Fault::from_code);
+            readings.look(source.t(row.t_s()), Some(cause.code()), board, fault);
+        }
+    }
+    readings.blind(end)
 }
 
 fn phases(source: &Source<'_>, end: f64) -> Vec<Phase> {

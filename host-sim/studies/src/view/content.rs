@@ -13,7 +13,7 @@ use super::signals::{self, Signal, foot, joint, signal};
 use super::thin::Thin;
 use crate::StudyError;
 use crate::cause::{self, Cause, FaultEvent};
-use crate::motion::{Mark, Motion, Phase, phase_name, rounded};
+use crate::motion::{Mark, Motion, Phase, Readings, phase_name, rounded};
 
 /// Most instants of the robot that plays; a short log has one every 20 ms.
 const INSTANTS: usize = 3_000;
@@ -104,6 +104,7 @@ pub(super) struct Content {
     pub(super) end: Read,
     /// Every stroke, for a comparison.
     pub(super) strokes: [Vec<(u64, f32)>; 6],
+    readings: Readings,
     robot: Instants,
     phases: Vec<(u64, Option<(String, bool)>)>,
     /// The mode of each board.
@@ -202,6 +203,7 @@ impl Content {
                 whole: true,
             },
             strokes: Default::default(),
+            readings: Readings::default(),
             robot: Instants::default(),
             phases: Vec::new(),
             modes: BTreeMap::new(),
@@ -232,12 +234,15 @@ impl Content {
                     field: names[i],
                 };
                 latest.insert(signal, value);
+                let sensed = signal.channel < 6 && signal.field == "sensed_mm";
+                // What a board says is no reading leaves a gap.
+                let is_read = !sensed || !content.readings.is_missing(signal.channel);
                 content
                     .signals
                     .entry(signal)
                     .or_default()
-                    .push(logged.t_ns, value);
-                if keep_strokes && signal.channel < 6 && signal.field == "sensed_mm" {
+                    .push(logged.t_ns, if is_read { value } else { f64::NAN });
+                if keep_strokes && sensed && is_read {
                     content.strokes[signal.channel].push((logged.t_ns, value as f32));
                 }
             });
@@ -276,6 +281,11 @@ impl Content {
         let code = EventCode::of_name(&code);
         let board = Address::new(logged.number("board").unwrap_or_default() as u8);
         let board = board.filter(|board| board.is_node());
+        let fault = Fault::from_code(logged.number("fault").unwrap_or_default() as u8);
+        if let Some(board) = board {
+            let t_s = logged.t_ns as f64 * 1e-9;
+            self.readings.look(t_s, code, board, fault);
+        }
         let mode = match board {
             Some(board) if code == Some(EventCode::Mode) => {
                 self.modes.insert(board, detail.clone())
@@ -293,7 +303,7 @@ impl Content {
             kind: EventKind::of_name(&kind),
             code,
             detail,
-            fault: Fault::from_code(logged.number("fault").unwrap_or_default() as u8),
+            fault,
             boards: board.into_iter().collect(),
             mode,
             text,
@@ -374,6 +384,7 @@ impl Content {
             y_mm: column(19),
             z_mm: column(20),
             yaw_deg: column(21),
+            blind: self.readings.blind(end),
             // It is no signal of the log.
             ground: None,
             phases: self.shown_phases(end),

@@ -180,8 +180,10 @@ fn beside(logs: &[PathBuf]) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_protocol::{Address, Fault};
+    use wheeleg_telemetry::event::BoardChange;
     use wheeleg_telemetry::{
-        BodySample, FootSample, JointSample, MasterSample, Recorder, SupplySample,
+        BodySample, Cause, FootSample, JointSample, MasterSample, Recorder, SupplySample,
     };
 
     /// A log of one second, of a robot that its maker calls `robot`.
@@ -258,11 +260,67 @@ mod tests {
         log(&other, "wheeleg-2003", 93.5);
         let told = viewed(&options(&[&one, &other])).expect("a page");
         assert!(told.verdict.contains("up to 3.500 mm"), "{}", told.verdict);
+        let parts = "part at 0.60 s, left yaw, and differ";
+        assert!(told.verdict.contains(parts), "{}", told.verdict);
         assert_eq!(told.page, folder.path().join("compared.html"));
         let page = std::fs::read_to_string(&told.page).expect("written");
         assert!(page.contains("data-seek=\"0.600\""));
         let same = viewed(&options(&[&one, &one])).expect("a page");
         assert!(same.verdict.contains("are equal"), "{}", same.verdict);
+    }
+
+    /// A board that reports no reading leaves a gap, and a comparison names its fault.
+    #[test]
+    fn what_is_no_reading_is_not_drawn_as_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [sound, broken] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
+        log(&sound, "wheeleg-2003", 90.0);
+        let mut recorder = Recorder::create(&broken).expect("created");
+        for ms in 0..1_000_u64 {
+            let t_ns = ms * 1_000_000;
+            if ms == 600 {
+                let board = Address::new(3).expect("a board");
+                let change = BoardChange::FaultLatched(Fault::SensorRange);
+                recorder.event(t_ns, Cause::Board { board, change });
+            }
+            for joint in 0..6 {
+                let sample = JointSample {
+                    commanded_mm: 90.0,
+                    sensed_mm: if ms < 600 { 90.0 } else { 179.9 },
+                    ..JointSample::default()
+                };
+                recorder.joint(t_ns, joint, sample);
+            }
+            if ms.is_multiple_of(10) {
+                recorder.body(t_ns, BodySample::default());
+                recorder.supply(t_ns, SupplySample::default());
+                recorder.master(t_ns, MasterSample::default());
+            }
+            for foot in 0..2 {
+                recorder.foot(t_ns, foot, FootSample::default());
+            }
+        }
+        drop(recorder.finish().expect("finished"));
+        let whole = std::fs::read_to_string(viewed(&options(&[&broken])).expect("a page").page);
+        let whole = whole.expect("written");
+        assert!(whole.contains(r#""blind":[{"joint":2,"from":0.6"#));
+        let curves = |joint: &str| {
+            let begin = whole
+                .find(&format!(r#""title":"{joint}""#))
+                .expect("a panel");
+            let panel = &whole[begin..];
+            panel[..panel.find("</script>").expect("its end")].to_owned()
+        };
+        assert!(curves("Left yaw").contains("179.9"));
+        assert!(!curves("Left vertical").contains("179.9"));
+        let told = viewed(&options(&[&sound, &broken]))
+            .expect("a page")
+            .verdict;
+        let fault = "Second log: joint 3: the position sensor reads outside its range, at 0.60 s";
+        assert!(
+            told.contains(fault) && told.contains("part at 0.60 s"),
+            "{told}"
+        );
     }
 
     #[test]

@@ -123,11 +123,10 @@ fn panel(plot: &Plot, logs: &[Named]) -> Panel {
     let content = Drawn::lines((plot.unit, y_range), lines);
     let x_range = (x_range.0, x_range.1.max(x_range.0 + 1e-3));
     let mut panel = Panel::new(plot.title.clone(), x_range, 120, content).over(TIME);
-    let faults = logs[0]
-        .content
-        .faults()
-        .map(|event| event.t_ns as f64 * 1e-9);
-    panel.marks = faults.take(MARKS).collect();
+    for log in logs {
+        let faults = log.content.faults().map(|event| event.t_ns as f64 * 1e-9);
+        panel.marks.extend(faults.take(MARKS));
+    }
     panel.marked = "fault";
     panel.on_clock = true;
     panel
@@ -167,6 +166,16 @@ fn about(log: &Named) -> About {
     }
 }
 
+/// The faults of the two logs: which log has what first.
+fn faults(logs: &[Named]) -> String {
+    let both = ["First", "Second"].into_iter().zip(logs);
+    let told = both.filter_map(|(which, log)| {
+        let (cause, count) = log.content.cause()?;
+        Some(format!(". {which} log: {}", sentence(&cause, count)))
+    });
+    told.collect()
+}
+
 /// The sentence at the head.
 pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
     let largest = differences
@@ -177,18 +186,32 @@ pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
         ([_, _], None) => "The two logs have no time in common".to_owned(),
         ([_, _], Some(d)) if d.largest_mm == 0.0 => {
             format!(
-                "The strokes of the two logs are equal up to {:.2} s, the last time that both have",
-                d.until_s
+                "The strokes of the two logs are equal up to {:.2} s, the last time that both have{}",
+                d.until_s,
+                faults(logs)
             )
         }
         ([_, _], Some(d)) => format!(
-            "The strokes of the two logs differ by up to {:.3} mm: {}, at {:.2} s",
+            "The strokes of the two logs {}differ by up to {:.3} mm: {}, at {:.2} s{}",
+            parting(differences),
             d.largest_mm,
             d.joint.to_lowercase(),
-            d.largest_s
+            d.largest_s,
+            faults(logs)
         ),
         _ => single(&logs[0]),
     }
+}
+
+/// Where the logs part first.
+fn parting(differences: &[Difference]) -> String {
+    let apart = differences
+        .iter()
+        .filter_map(|d| Some((d.apart_s?, d.joint)));
+    let first = apart.min_by(|a, b| a.0.total_cmp(&b.0));
+    first.map_or_else(String::new, |(t_s, joint)| {
+        format!("part at {t_s:.2} s, {}, and ", joint.to_lowercase())
+    })
 }
 
 fn single(log: &Named) -> String {

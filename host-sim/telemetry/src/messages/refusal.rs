@@ -2,7 +2,7 @@
 
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject};
 use wheeleg_master::finding::Finding;
-use wheeleg_protocol::{Fault, FaultBits};
+use wheeleg_protocol::{Fault, FaultBits, NackReason};
 
 use super::{board, other_interface};
 
@@ -59,6 +59,11 @@ pub(super) fn refusal(reason: &Refusal) -> String {
             "{} was reset meanwhile: do it again, and read back what it holds",
             board(node)
         ),
+        // A board keeps a fault whose cause is there: to clear it first would be no way out.
+        Refusal::NodeRefused {
+            node,
+            reason: NackReason::FaultLatched,
+        } => format!("{}: a fault is latched: remove its cause, then clear it", board(node)),
         Refusal::NodeRefused { node, reason } => format!("{}: {}", board(node), reason.text()),
         Refusal::NodeBusy { node } => format!(
             "{} stays busy, as while it stores parameters: give it again",

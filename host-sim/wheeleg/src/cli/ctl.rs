@@ -17,8 +17,10 @@ use serde_json::{Map, Value, json};
 use wheeleg_access::Key;
 use wheeleg_access::host::{HOLD_S, SPEED, STEP_MAX};
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
-use wheeleg_console::keys::VIEW_FILE;
+use wheeleg_console::keys::{CONTROL_FILE, VIEW_FILE};
 use wheeleg_console::unpack::unpack;
+use wheeleg_console::usual;
+use wheeleg_master::command::CommandCode;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::channels;
@@ -26,7 +28,7 @@ use wheeleg_telemetry::channels;
 use super::exit::{self, LOST};
 use super::{fitted, print, say, show, stop_on_signals, tell, tell_error, whole};
 use param::ParamCommand;
-use reach::{Reach, ended, not_answered};
+use reach::{Reach, ended};
 
 /// Arguments of `wheeleg ctl`.
 #[derive(Debug, Args)]
@@ -60,6 +62,12 @@ enum CtlCommand {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
         #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
         command: Vec<String>,
+    },
+    /// Print the newest events, the oldest of them first.
+    Events {
+        /// How many, 1 to 256.
+        #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1_u32, 256))]
+        last: u32,
     },
     /// Stop the robot.
     Stop,
@@ -144,6 +152,7 @@ pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
         CtlCommand::Watch { channels, hz } => watch(reach, &reach.key(VIEW_FILE)?, channels, *hz),
         #[cfg(unix)]
         CtlCommand::Top => top::top(reach, &reach.key(VIEW_FILE)?),
+        CtlCommand::Events { last } => events(reach, &reach.key(VIEW_FILE)?, *last),
         CtlCommand::Stop => {
             let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
             stopped.or_else(|why| match why.downcast_ref() {
@@ -174,7 +183,7 @@ pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
 fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let (code, state) = http(&reach.url(), "GET", "state", key)?;
     if code != 200 {
-        return Ok(not_answered(&state));
+        return reach.not_answered(&state, VIEW_FILE);
     }
     if reach.json {
         return Ok(print(&format!("{state:#}\n"))?);
@@ -191,7 +200,7 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{}, {:.2} s after power-up, ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
+        "{}, {:.2} s after power-up, boards ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
         word(&state["robot"]),
         state["master_us"].as_f64().unwrap_or(0.0) * 1e-6,
         state["ready"],
@@ -214,6 +223,13 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
             ),
         };
     }
+    for fault in state["faults"].as_array().into_iter().flatten() {
+        let fault = word(fault);
+        let _ = writeln!(
+            text,
+            "injected {fault}; `wheeleg ctl end-fault {fault}` ends it"
+        );
+    }
     for board in state["boards"].as_array().into_iter().flatten() {
         let _ = writeln!(text, "board {}  {}", board["address"], word(&board["mode"]));
         for fault in board["faults"].as_array().into_iter().flatten() {
@@ -224,6 +240,27 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     Ok(show(&text)?)
 }
 
+/// Prints the newest events that the server keeps.
+fn events(reach: &Reach, key: &Key, last: u32) -> miette::Result<ExitCode> {
+    let path = format!("events?last={last}");
+    let (code, list) = http(&reach.url(), "GET", &path, key)?;
+    if code != 200 {
+        return reach.not_answered(&list, VIEW_FILE);
+    }
+    if reach.json {
+        return Ok(print(&format!("{list:#}\n"))?);
+    }
+    let lines = list["events"].as_array().into_iter().flatten();
+    Ok(show(&lines.map(event_line).collect::<String>())?)
+}
+
+fn event_line(event: &Value) -> String {
+    let t_s = event["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
+    // A false server may have written it.
+    let text = plain(event["text"].as_str().unwrap_or_default());
+    format!("{t_s:10.3} s  {text}\n")
+}
+
 fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let url = reach.url().prompt();
     if url.is_exposed() {
@@ -232,11 +269,13 @@ fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let (code, answer) = http(&url, "POST", "stop", key)?;
     match code {
         200 if reach.json => Ok(print(&format!("{answer}\n"))?),
-        200 => Ok(print("stopped: the stop is in SYNC, and latched\n")?),
+        200 => Ok(print(
+            "stopped. To go on: `wheeleg ctl take -- ClearFault`, then `wheeleg ctl take -- Arm`\n",
+        )?),
         504 => Ok(not_confirmed()),
         403 => stop_by_session(reach, &url, key),
         _ => {
-            not_answered(&answer);
+            reach.not_answered(&answer, VIEW_FILE)?;
             Ok(not_confirmed())
         }
     }
@@ -353,11 +392,7 @@ fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> miette::Result
                 if reach.json {
                     event.to_string()
                 } else {
-                    let t_s = event["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
-                    format!(
-                        "{t_s:10.3} s  {}",
-                        event["text"].as_str().unwrap_or_default()
-                    )
+                    event_line(&event).trim_end().to_owned()
                 }
             }
             Some(Incoming::Samples {
@@ -435,6 +470,9 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
             return Err(StudyError::refused(twice, "give each argument once").into());
         }
     }
+    for (argument, value) in usual(name) {
+        given.entry(argument).or_insert(value);
+    }
     let stop = stop_on_signals()?;
     let command = (name.as_str(), Value::Object(given));
     match (reach.in_control_unless(&[command], &stop)?, stop.signal()) {
@@ -442,8 +480,30 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
             tell(&format!("{}: `{name}` was ended", signal.label()));
             Ok(ExitCode::from(signal.exit_code()))
         }
-        (end, _) => reach.print_outcome(&end.unwrap_or(Outcome::Unknown)),
+        (end, _) => {
+            let end = end.unwrap_or(Outcome::Unknown);
+            if CommandCode::of_name(name) == Some(CommandCode::ClearFault) {
+                tell_injected(reach, &end)?;
+            }
+            reach.print_outcome(&end)
+        }
     }
+}
+
+/// Tells of the faults whose cause lasts until somebody ends it, where faults could not be cleared.
+fn tell_injected(reach: &Reach, end: &Outcome) -> Result<(), StudyError> {
+    if !matches!(end, Outcome::Refused { .. }) || reach.url().is_exposed() {
+        return Ok(());
+    }
+    let key = reach.key(CONTROL_FILE)?;
+    let (_, state) = http(&reach.url(), "GET", "state", &key).map_err(refused)?;
+    for fault in state["faults"].as_array().into_iter().flatten() {
+        let fault = plain(fault.as_str().unwrap_or_default());
+        tell(&format!(
+            "injected: {fault}; end it first: `wheeleg ctl end-fault {fault}`"
+        ));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -84,7 +84,9 @@ pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
     };
     let whole = tell_unwritten(unwritten.into_iter().collect());
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
-        tell("stopped; the part replayed so far was compared");
+        if replayed.compared > 0 {
+            tell("stopped; the part replayed so far was compared");
+        }
         return Ok(ExitCode::from(signal.exit_code()));
     }
     if !whole {
@@ -116,6 +118,9 @@ fn as_text(replayed: &Replayed) -> String {
     let summary = &replayed.summary;
     let s = |ms: u64| ms as f64 * 1e-3;
     let verdict = match replayed.parted {
+        None if replayed.compared == 0 && replayed.stopped => {
+            "stopped before the first hash: nothing was compared".to_owned()
+        }
         None if replayed.compared == 0 => "the recording has no hash to compare with".to_owned(),
         None => format!(
             "the replay is bit-identical: {} hashes compared",

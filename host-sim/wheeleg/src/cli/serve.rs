@@ -118,7 +118,7 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
         Keys::open
     };
     let keys = open(&folder)?;
-    let control = keys.control.to_hex();
+    let (control, view) = (keys.control.to_hex(), keys.view.to_hex());
     let live = Live {
         speed: match args.speed {
             Speed::Times(speed) => Some(speed),
@@ -162,15 +162,19 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     // The key is for who sits here; no pipe and no log gets it.
     if std::io::stdout().is_terminal() && !server.is_look_only() {
         let _ = writeln!(text, "open     {url}/#k={control}");
+        let _ = writeln!(text, "watch    {url}/#v={view}");
     } else {
-        let _ = writeln!(text, "open     {url}/");
+        let _ = writeln!(
+            text,
+            "open     {url}/\n         with #k= and the digits of a key behind it"
+        );
     }
     if let Some(fingerprint) = server.fingerprint() {
         let _ = writeln!(text, "SHA-256  {fingerprint}");
     }
     let _ = writeln!(
         text,
-        "to drive {}\nto look  {}",
+        "control key  {}\nview key     {}",
         folder.join(CONTROL_FILE).display(),
         folder.join(VIEW_FILE).display()
     );
@@ -187,7 +191,7 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
         let socket = url.replacen("http", "ws", 1);
         let _ = writeln!(
             text,
-            "viewers  {socket}/foxglove?token=KEY, with the key from the file to look"
+            "viewers  {socket}/foxglove?token=KEY, with the view key"
         );
     }
     let _ = writeln!(

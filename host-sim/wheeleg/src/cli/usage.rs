@@ -22,6 +22,11 @@ pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C
         None => Ok(parsed),
     });
     parsed.map_err(|mut wrong| {
+        let is_ctl = line.get(1).is_some_and(|word| word == "ctl");
+        if is_ctl && wrong.kind() == ErrorKind::InvalidSubcommand {
+            let tip = ContextValue::StyledStrs(vec![TAKE.into()]);
+            wrong.insert(ContextKind::Suggested, tip);
+        }
         let option = match wrong.get(ContextKind::InvalidArg) {
             Some(ContextValue::String(text)) => text.clone(),
             _ => return wrong,
@@ -43,6 +48,9 @@ pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C
         wrong
     })
 }
+
+/// Where the commands of the robot are.
+const TAKE: &str = "commands of the robot go through `take`, as `wheeleg ctl take -- Walk`; `wheeleg commands` lists them";
 
 /// Longest word of a command line, bytes: no path, and no name, is longer.
 const LONGEST: usize = 4096;
@@ -141,6 +149,8 @@ mod tests {
         assert!(!common.contains("tip:"), "{common}");
         let near = said(&["wheeleg", "run", "--sed", "1"]);
         assert!(near.contains("similar argument exists: '--seed'"), "{near}");
+        let ctl = said(&["wheeleg", "ctl", "walk"]);
+        assert!(ctl.contains("`wheeleg ctl take -- Walk`"), "{ctl}");
         let command = said(&["wheeleg", "lst"]);
         assert!(command.contains("'list'"), "{command}");
     }

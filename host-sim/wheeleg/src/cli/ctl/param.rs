@@ -10,7 +10,7 @@ use wheeleg_protocol::Node;
 use wheeleg_studies::StudyError;
 
 use super::super::{print, whole};
-use super::reach::{Reach, not_answered};
+use super::reach::Reach;
 
 /// Number of boards, whose addresses begin at 1.
 const BOARDS: u8 = Node::ALL.len() as u8;
@@ -82,7 +82,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> miette::Result<E
     let key = reach.key(CONTROL_FILE)?;
     let (code, all) = http(&reach.url(), "GET", "parameters", &key)?;
     if code != 200 {
-        return Ok(not_answered(&all));
+        return reach.not_answered(&all, CONTROL_FILE);
     }
     let (value, unit) = reported(&all, board, parameter).ok_or_else(|| {
         StudyError::refused(

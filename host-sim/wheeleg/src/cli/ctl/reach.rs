@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use wheeleg_access::Key;
 use wheeleg_access::request::FRAME_MAX;
-use wheeleg_console::client::{Client, Outcome, Url};
+use wheeleg_console::client::{Client, KEYS, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint};
 use wheeleg_master::command::CommandCode;
@@ -19,6 +19,8 @@ use wheeleg_studies::view::plain;
 use super::super::exit::{LOST, REFUSED};
 use super::super::{print, tell, tell_error};
 
+/// Status of HTTP for a key that is none of the server's.
+const WRONG_KEY: u16 = 401;
 /// What is said where the control could not be given back.
 const NOT_RELEASED: &str = "the control is not released: the robot will hold";
 /// Longest time that a walk needs to put both feet down.
@@ -32,16 +34,16 @@ const VALID_MS: u32 = 1_000;
 #[derive(Debug, Args)]
 pub(super) struct Reach {
     /// Address of the server.
-    #[arg(long, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
+    #[arg(long, global = true, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
     url: Url,
     /// SHA-256 of the certificate of a server with TLS, as it prints it.
-    #[arg(long, value_name = "HEX", value_parser = Fingerprint::parse)]
+    #[arg(long, global = true, value_name = "HEX", value_parser = Fingerprint::parse)]
     fingerprint: Option<Fingerprint>,
     /// File of the key [default: the one that `wheeleg serve` has made].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, global = true, value_name = "FILE")]
     key: Option<PathBuf>,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub(super) json: bool,
 }
 
@@ -57,11 +59,34 @@ impl Reach {
 
     /// The key that is given, or that of `file`.
     pub(super) fn key(&self, file: &str) -> miette::Result<Key> {
-        let path = match &self.key {
+        Ok(keys::read(&self.key_path(file)?)?)
+    }
+
+    fn key_path(&self, file: &str) -> miette::Result<PathBuf> {
+        Ok(match &self.key {
             Some(path) => path.clone(),
             None => keys::folder()?.join(file),
+        })
+    }
+
+    /// Tells what a server refuses over HTTP to who has the key of `file`; the exit code.
+    pub(super) fn not_answered(&self, problem: &Value, file: &str) -> miette::Result<ExitCode> {
+        if problem["status"] == WRONG_KEY {
+            let path = self.key_path(file)?;
+            tell_server(
+                format!("`{}` is not a key of this server", path.display()),
+                KEYS,
+            );
+            return Ok(ExitCode::from(REFUSED));
+        }
+        // A false server may have written it.
+        let text = |name: &str| plain(problem[name].as_str().unwrap_or_default());
+        let remedy = match text("remedy") {
+            remedy if remedy.is_empty() => ANSWERS.to_owned(),
+            remedy => remedy,
         };
-        Ok(keys::read(&path)?)
+        tell_server(text("detail"), remedy);
+        Ok(ExitCode::from(REFUSED))
     }
 
     /// A session that may drive.
@@ -175,18 +200,6 @@ fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
         tell(NOT_RELEASED);
     }
     Ok(())
-}
-
-/// Tells what a server refuses over HTTP; its exit code.
-pub(super) fn not_answered(problem: &Value) -> ExitCode {
-    // A false server may have written it.
-    let text = |name: &str| plain(problem[name].as_str().unwrap_or_default());
-    let remedy = match text("remedy") {
-        remedy if remedy.is_empty() => ANSWERS.to_owned(),
-        remedy => remedy,
-    };
-    tell_server(text("detail"), remedy);
-    ExitCode::from(REFUSED)
 }
 
 /// What helps where nobody answers.

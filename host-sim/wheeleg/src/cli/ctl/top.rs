@@ -285,7 +285,7 @@ impl Seen {
         let holder = super::holder(state).unwrap_or_else(|| "free".to_owned());
         let t_s = state["master_us"].as_f64().unwrap_or(0.0) * 1e-6;
         format!(
-            " Esc STOP | {mode} | {} | {of} {clock} | {}, step {} | control: {holder} | {t_s:.2} s | q leave ",
+            " Esc STOP, q quits | {mode} | {} | {of} {clock} | {}, step {} | control: {holder} | {t_s:.2} s ",
             word(&state["robot"]),
             word(&state["phase"]),
             state["step"].as_u64().unwrap_or(0),
