@@ -532,7 +532,7 @@ fn a_board_seats_where_the_relation_takes_it_to() {
 fn a_longer_stroke_is_told_to_the_boards_too() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let robot = include_str!("../../host-sim/robots/wheeleg.toml");
-    let longer = changed(robot, &vec![("cylinder.stroke", 183.0, "mm")]);
+    let longer = changed(robot, &[("cylinder.stroke", 183.0, "mm")]);
     let path = folder.path().join("robot.toml");
     fs::write(&path, &longer).expect("written");
     let scenario = folder.path().join("stand.toml");
