@@ -491,12 +491,12 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
 }
 
 /// Tells of the faults whose cause lasts until somebody ends it, where faults could not be cleared.
-fn tell_injected(reach: &Reach, end: &Outcome) -> Result<(), StudyError> {
+fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
     if !matches!(end, Outcome::Refused { .. }) || reach.url().is_exposed() {
         return Ok(());
     }
     let key = reach.key(CONTROL_FILE)?;
-    let (_, state) = http(&reach.url(), "GET", "state", &key).map_err(refused)?;
+    let (_, state) = http(&reach.url(), "GET", "state", &key)?;
     for fault in state["faults"].as_array().into_iter().flatten() {
         let fault = plain(fault.as_str().unwrap_or_default());
         tell(&format!(
