@@ -16,7 +16,7 @@ const ARGUMENTS_MAX: usize = 32;
 ///
 /// # Errors
 /// All that is wrong with them, in words.
-pub(crate) fn command(code: CommandCode, args: &Map<String, Json>) -> Result<Command, String> {
+pub fn command(code: CommandCode, args: &Map<String, Json>) -> Result<Command, String> {
     if args.len() > ARGUMENTS_MAX {
         return Err("too many arguments".to_owned());
     }

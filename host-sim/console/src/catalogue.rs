@@ -211,7 +211,7 @@ mod tests {
         }
         // A walk can be given without any argument.
         let walk = usual("Walk").into_iter().collect();
-        assert!(crate::arguments::command(CommandCode::Walk, &walk).is_ok());
+        assert!(wheeleg_access::arguments::command(CommandCode::Walk, &walk).is_ok());
         assert_eq!(list[list.len() - 1]["code"], 0x030A);
         assert_eq!(catalogue.layout.len(), 16);
         assert_ne!(catalogue.layout, catalogue.commands);
