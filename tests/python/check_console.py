@@ -581,14 +581,14 @@ def walk_is_as_set(page):
     told = page.locator(".buttons button", has_text="Walk").inner_text()
     expect("straight, 50 mm/s" in told, f"Walk says {told!r}")
     expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
-    page.wait_for_timeout(3000)
+    page.wait_for_timeout(2000)
     slow = speed_of(page)
     knob.fill("120")
-    page.wait_for_timeout(3000)
+    page.wait_for_timeout(2000)
     fast = speed_of(page)
     expect(fast > 1.6 * slow > 0, f"set to 50 mm/s the robot walks at {slow:.0f} mm/s, then to 120 mm/s at {fast:.0f} mm/s")
     knob.fill("100")
-    press(page, "Stop walking")
+    page.locator(".buttons button", has_text="Stop walking").click(timeout=3000)
     expect(waits(page, "Gait", ["done", "ready", "idle"], 20), f"Stop walking: {cell(page, 'Gait')}")
     expect(becomes_ready(page), f"Ready after a walk: {page.inner_text('.answer')!r}")
 
@@ -635,11 +635,11 @@ def operator_leaves(page):
 
     page.on("dialog", answer)
     for _ in range(ATTEMPTS):
-        expect(becomes_ready(page), f"Ready before leaving: {page.inner_text('.answer')!r}")
-        expect(walks(page), f"Walk before leaving: {page.inner_text('.answer')!r}")
         # Lost by itself meanwhile, it is not this operator who leaves.
-        if cell(page, "Control") == "you":
+        if becomes_ready(page) and walks(page) and cell(page, "Control") == "you":
             break
+    else:
+        problems.append(f"no walk before leaving: {page.inner_text('.answer')!r}")
     page.reload()
     try:
         page.wait_for_selector(".fault:has-text('has ended: its page was closed or reloaded')", timeout=5000)

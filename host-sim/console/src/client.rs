@@ -173,7 +173,7 @@ impl Client {
         socket.send(auth).map_err(|e| failed(url, e))?;
         let welcome = text(url, &mut socket)?;
         if welcome["reason"] == Close::WrongKey.reason() {
-            let what = format!("the key is not this server's key of the role `{role}`");
+            let what = format!("the key is wrong: it is not the server's key of the role `{role}`");
             return Err(url.error_with(what, KEYS));
         }
         if let Some(why) = welcome["text"].as_str() {
