@@ -252,6 +252,7 @@ const BRIEF: [(&str, &str); 29] = [
         "one case for `campaign run`, which is on the list",
     ),
     ("ctl status", "asks a server"),
+    ("ctl events", "asks a server"),
     (
         "ctl watch",
         "prints until it is stopped: `service` has its tests",

@@ -241,11 +241,12 @@ fn a_wrong_command_is_told_with_every_value_and_range() {
         (
             &["take", "--", "Walk", "speed=30", "pattern=trot"][..],
             1,
-            &[
-                "`pattern` is \"trot\"; allowed: alternate, tandem",
-                "`turn` is missing",
-                "`nose` is missing",
-            ][..],
+            &["`pattern` is \"trot\"; allowed: alternate, tandem"][..],
+        ),
+        (
+            &["take", "--", "JointReference", "stroke=999"],
+            1,
+            &["`joint` is missing", "`stroke` is 999; allowed: 0 to "],
         ),
         (
             &["take", "--", "SetGait", "push=-1"],
