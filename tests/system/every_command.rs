@@ -235,7 +235,7 @@ impl Inputs {
 }
 
 /// Commands that neither write nor compute for long, and why they are not on the list.
-const BRIEF: [(&str, &str); 29] = [
+const BRIEF: [(&str, &str); 30] = [
     ("list", "prints"),
     ("params", "prints"),
     ("faults list", "prints"),
