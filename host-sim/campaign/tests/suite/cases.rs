@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use wheeleg_campaign::{CampaignError, Case, Cases, Options, PlanFile, Shard, Store, run, status};
-use wheeleg_config::plan::{Factor, Plan, Value, Values};
+use wheeleg_config::plan::{Factor, Plan, Value};
 use wheeleg_config::{RobotConfig, builtin};
 use wheeleg_studies::analysis::{Analyser, LegIndices};
 use wheeleg_studies::study::Stop;
@@ -252,13 +252,17 @@ fn a_plan_whose_table_nobody_could_read_is_refused() {
         "{said}"
     );
 
-    let long = |bytes: usize| Factor {
-        values: Values::Grid(vec![Value::Text("d".repeat(bytes))]),
-        ..one.clone()
+    let described = |bytes: usize| {
+        plan_of(&format!(
+            "{HEAD}{BASE}[factor.d]\nparameter = \"robot.description\"\ngrid = [\"{}\"]\n",
+            "d".repeat(bytes)
+        ))
     };
-    plan.factors = vec![long(500); 3];
+    let mut plan = described(500);
+    let one = plan.factors[0].clone();
+    plan.factors = vec![one.clone(); 3];
     assert!(told(&plan).is_err());
-    plan.factors.push(long(1));
+    plan.factors.extend(described(1).factors);
     let said = told(&plan).expect("too long");
     assert!(
         said.contains("names of up to 1501 bytes") && said.contains("allowed are up to 1500"),

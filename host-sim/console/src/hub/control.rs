@@ -141,7 +141,8 @@ impl Inner {
             Order::Host(command) => {
                 // Whoever sits at the robot's computer may break something while another drives.
                 let breaks = matches!(command, HostCommand::Inject(_) | HostCommand::EndFault(_));
-                if !self.desk.may_command_host(id) && !(breaks && client.is_local) {
+                let may_break = breaks && client.is_local;
+                if !self.desk.may_command_host(id) && !may_break {
                     return self.tell(id, &self.held(n, now));
                 }
                 let what = match &command {
