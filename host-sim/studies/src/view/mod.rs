@@ -186,12 +186,18 @@ mod tests {
         BodySample, Cause, FootSample, JointSample, MasterSample, Recorder, SupplySample,
     };
 
-    /// A log of one second, of a robot that its maker calls `robot`.
-    fn log(path: &Path, robot: &str, stroke_mm: f64) {
+    /// A log of one second, of a robot that its maker calls `robot`. At 0.6 s its joints measure another
+    /// stroke, and board 3 may report a fault.
+    fn log(path: &Path, robot: &str, stroke_mm: f64, fault: Option<Fault>) {
         let mut recorder = Recorder::create(path).expect("created");
         recorder.provenance("robot", robot);
         for ms in 0..1_000_u64 {
             let t_ns = ms * 1_000_000;
+            if let Some(fault) = fault.filter(|_| ms == 600) {
+                let board = Address::new(3).expect("a board");
+                let change = BoardChange::FaultLatched(fault);
+                recorder.event(t_ns, Cause::Board { board, change });
+            }
             for joint in 0..6 {
                 let sample = JointSample {
                     commanded_mm: 90.0,
@@ -232,7 +238,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("log.mcap");
         let evil = "<script>alert(1)</script>\u{1b}]0;x\u{7}\u{202e}";
-        log(&path, evil, 90.0);
+        log(&path, evil, 90.0, None);
         let viewed = viewed(&options(&[&path])).expect("a page");
         assert_eq!(viewed.page, folder.path().join("log.html"));
         assert!(viewed.broken_off.is_empty());
@@ -256,8 +262,8 @@ mod tests {
     fn two_logs_differ_where_they_do() {
         let folder = tempfile::tempdir().expect("a folder");
         let [one, other] = ["one.mcap", "other.mcap"].map(|name| folder.path().join(name));
-        log(&one, "wheeleg-2003", 90.0);
-        log(&other, "wheeleg-2003", 93.5);
+        log(&one, "wheeleg-2003", 90.0, None);
+        log(&other, "wheeleg-2003", 93.5, None);
         let told = viewed(&options(&[&one, &other])).expect("a page");
         assert!(told.verdict.contains("up to 3.500 mm"), "{}", told.verdict);
         let parts = "part at 0.60 s, left yaw, and differ";
@@ -274,33 +280,8 @@ mod tests {
     fn what_is_no_reading_is_not_drawn_as_one() {
         let folder = tempfile::tempdir().expect("a folder");
         let [sound, broken] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
-        log(&sound, "wheeleg-2003", 90.0);
-        let mut recorder = Recorder::create(&broken).expect("created");
-        for ms in 0..1_000_u64 {
-            let t_ns = ms * 1_000_000;
-            if ms == 600 {
-                let board = Address::new(3).expect("a board");
-                let change = BoardChange::FaultLatched(Fault::SensorRange);
-                recorder.event(t_ns, Cause::Board { board, change });
-            }
-            for joint in 0..6 {
-                let sample = JointSample {
-                    commanded_mm: 90.0,
-                    sensed_mm: if ms < 600 { 90.0 } else { 179.9 },
-                    ..JointSample::default()
-                };
-                recorder.joint(t_ns, joint, sample);
-            }
-            if ms.is_multiple_of(10) {
-                recorder.body(t_ns, BodySample::default());
-                recorder.supply(t_ns, SupplySample::default());
-                recorder.master(t_ns, MasterSample::default());
-            }
-            for foot in 0..2 {
-                recorder.foot(t_ns, foot, FootSample::default());
-            }
-        }
-        drop(recorder.finish().expect("finished"));
+        log(&sound, "wheeleg-2003", 90.0, None);
+        log(&broken, "wheeleg-2003", 179.9, Some(Fault::SensorRange));
         let whole = std::fs::read_to_string(viewed(&options(&[&broken])).expect("a page").page);
         let whole = whole.expect("written");
         assert!(whole.contains(r#""blind":[{"joint":2,"from":0.6"#));
@@ -327,7 +308,7 @@ mod tests {
     fn what_cannot_be_shown_is_told_and_no_page_is_left() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("log.mcap");
-        log(&path, "wheeleg-2003", 90.0);
+        log(&path, "wheeleg-2003", 90.0, None);
         let part = |from_s, to_s| Options {
             from_s,
             to_s,
