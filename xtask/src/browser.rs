@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::anyhow;
 
-use crate::process::{command, output, run, target_dir};
+use crate::process::{check, command, output, run, target_dir};
 use crate::report::{Report, StepError, StepResult};
 use crate::{rust, tools};
 
@@ -25,26 +25,30 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         ensure_chromium()?;
         let python = tools::python()?;
         // A relative folder is meant from where the user stands, not from the root.
-        run(command(python)
-            .arg("tests/python/check_report.py")
-            .arg(std::path::absolute(run_dir)?)
-            .arg(axe()?))?;
+        check(
+            command(python)
+                .arg("tests/python/check_report.py")
+                .arg(std::path::absolute(run_dir)?)
+                .arg(axe()?),
+        )?;
         Ok(())
     });
     report.step("log in a browser", || {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no log to open"))?;
         ensure_chromium()?;
         let wheeleg = rust::build_wheeleg()?;
-        run(command(tools::python()?)
-            .arg("tests/python/check_view.py")
-            .arg(wheeleg)
-            .arg(std::path::absolute(run_dir)?.join("log.mcap"))
-            .arg(target_dir().join("view-shots"))
-            .arg(axe()?))?;
+        check(
+            command(tools::python()?)
+                .arg("tests/python/check_view.py")
+                .arg(wheeleg)
+                .arg(std::path::absolute(run_dir)?.join("log.mcap"))
+                .arg(target_dir().join("view-shots"))
+                .arg(axe()?),
+        )?;
         Ok(())
     });
     report.step("console in a browser", || {
-        run(&mut console("tests/python/check_console.py")?)?;
+        check(&mut console("tests/python/check_console.py")?)?;
         Ok(())
     });
 }
@@ -94,7 +98,7 @@ pub(crate) fn page_hours() -> StepResult<String> {
 /// A robot driven by a program of its own, with the client that we give away.
 pub(crate) fn client(report: &mut Report) {
     report.step("console from Python", || {
-        run(&mut of_program("tests/python/check_client.py")?)?;
+        check(&mut of_program("tests/python/check_client.py")?)?;
         Ok(())
     });
 }
@@ -102,7 +106,7 @@ pub(crate) fn client(report: &mut Report) {
 /// The HTTP API by its own document, asked at random.
 pub(crate) fn api(report: &mut Report) {
     report.step("console's HTTP API by its document", || {
-        run(&mut of_program("tests/python/check_api.py")?)?;
+        check(&mut of_program("tests/python/check_api.py")?)?;
         Ok(())
     });
 }
@@ -122,7 +126,7 @@ fn last_line(check: &mut Command) -> StepResult<String> {
 /// A robot looked at by a client of Foxglove's protocol, from its published text alone.
 pub(crate) fn viewer(report: &mut Report) {
     report.step("console for Foxglove and Lichtblick", || {
-        run(&mut of_program("tests/python/check_foxglove.py")?)?;
+        check(&mut of_program("tests/python/check_foxglove.py")?)?;
         Ok(())
     });
 }

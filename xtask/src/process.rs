@@ -1,11 +1,15 @@
 //! Running other programs: where the repository is, what is installed.
 
-use std::io::ErrorKind;
+use std::collections::VecDeque;
+use std::io::{BufRead as _, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::{env, fs};
 
 use anyhow::{Context, Result, bail};
+
+/// Lines that an error repeats of what a check said.
+const LAST_LINES: usize = 12;
 
 /// The root of the repository.
 pub(crate) fn root() -> PathBuf {
@@ -68,6 +72,33 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
         .with_context(|| format!("cannot start `{line}`"))?;
     if !status.success() {
         bail!("`{line}` ended with {status}");
+    }
+    Ok(())
+}
+
+/// As [`run`], for a check that says what it found: the end of that stands in the error as well,
+/// since of a long log often only the summary is read.
+pub(crate) fn check(command: &mut Command) -> Result<()> {
+    let line = line(command);
+    println!("    $ {line}");
+    let (says, end) = std::io::pipe()?;
+    let child = command.stdout(end.try_clone()?).stderr(end).spawn();
+    // What is read ends when nobody holds the other end.
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
+    let mut last = VecDeque::new();
+    for text in BufReader::new(says).split(b'\n') {
+        let text = String::from_utf8_lossy(&text?).into_owned();
+        println!("{text}");
+        last.push_back(text);
+        if last.len() > LAST_LINES {
+            last.pop_front();
+        }
+    }
+    let status = child.wait().with_context(|| format!("`{line}`"))?;
+    if !status.success() {
+        let last = Vec::from(last).join("\n    ");
+        bail!("`{line}` ended with {status}:\n    {last}");
     }
     Ok(())
 }
@@ -150,6 +181,17 @@ mod tests {
     fn a_command_is_told_without_the_place_of_its_program() {
         let told = line(Command::new("/opt/tools/bin/cargo").args(["test", "--locked"]));
         assert_eq!(told, "cargo test --locked");
+    }
+
+    #[test]
+    fn a_check_that_fails_repeats_what_it_said_last() {
+        let script = |script: &str| check(Command::new("sh").args(["-c", script]));
+        script("echo fine >&2").expect("succeeds");
+        let failed = script("seq 1 40; echo 'the page is wrong' >&2; exit 3");
+        let says = failed.expect_err("fails").to_string();
+        assert!(says.contains("exit status: 3"), "{says}");
+        assert!(says.ends_with("40\n    the page is wrong"), "{says}");
+        assert_eq!(says.lines().count(), 1 + LAST_LINES, "{says}");
     }
 
     fn measure(script: &str) -> Result<Vec<String>> {

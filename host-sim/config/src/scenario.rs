@@ -399,16 +399,16 @@ enum ActionKind {
 }
 
 fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<(f64, EventAction)> {
-    // The end of the scenario is a limit of its own, below: it is not allowed itself.
+    // Its range is the scenario's, without the end itself: see below.
     let at = FieldSpec::scalar(
         "at",
         Dimension::Time,
-        [0.0, MAX_DURATION_S],
+        [f64::MIN, f64::MAX],
         "time of the event, within the duration of the scenario",
     );
     let at_s = r.required(entry, &at);
     if let (Some(at_s), Some(end_s)) = (at_s, duration_s)
-        && at_s >= end_s
+        && !(0.0..end_s).contains(&at_s)
     {
         r.problem(
             entry.get("at").map(|(key, item)| item.span().unwrap_or(key)),
@@ -419,7 +419,8 @@ fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<(f64,
                 pretty(end_s)
             ),
             "does nothing",
-            Some("an event acts before the end: bring it forward, or raise `duration`".into()),
+            (at_s >= 0.0)
+                .then(|| "an event acts before the end: bring it forward, or raise `duration`".into()),
         );
     }
     let actions = [

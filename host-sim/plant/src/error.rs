@@ -91,6 +91,18 @@ pub enum PlantError {
         /// On both feet \[N\].
         feet_n: f64,
     },
+    /// In its start pose the robot has ground inside its chassis.
+    #[error(
+        "at the start place, x = 0 and y = 0, heading along x, ground stands {} m into the robot's chassis, at \
+         x = {} and y = {} m",
+        shown(*.into_m), shown(.place_m[0]), shown(.place_m[1])
+    )]
+    InChassis {
+        /// Where it stands highest above the belly \[m\].
+        place_m: [f64; 2],
+        /// How far above the belly \[m\].
+        into_m: f64,
+    },
     /// The mechanics could not be evaluated (closed loop cannot close, singular inertia).
     #[error("mechanics: {0}")]
     Mechanics(String),

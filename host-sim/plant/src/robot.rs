@@ -278,7 +278,8 @@ impl Plant {
     ///
     /// # Errors
     /// [`PlantError::NotStanding`] if the robot cannot stand in that pose on the ground at the
-    /// world's origin, [`PlantError::OnChassis`] if it lies there on its chassis.
+    /// world's origin, [`PlantError::OnChassis`] if it lies there on its chassis,
+    /// [`PlantError::InChassis`] if ground stands inside its chassis.
     pub fn initial_state(&self, seed: u64) -> Result<PlantState, PlantError> {
         let assembly = &self.assembly;
         let mechanics = &assembly.mechanics;
@@ -304,6 +305,12 @@ impl Plant {
                     bristle[i] = excess.max(-bears).min(bears) / c.friction.bristle_stiffness_n_m;
                 }
             }
+        }
+        if let Some((place, into_m)) = mechanics.touching.ground_in_chassis(&motion.state) {
+            return Err(PlantError::InChassis {
+                place_m: [place.x, place.y],
+                into_m,
+            });
         }
         let cylinders = assembly
             .cylinders

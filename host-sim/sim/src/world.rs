@@ -167,7 +167,9 @@ impl World {
         };
         let plant = Plant::new(plant).map_err(|e| refused("plant", &e))?;
         let state = plant.initial_state(seed).map_err(|e| match e {
-            PlantError::NotStanding | PlantError::OnChassis { .. } => {
+            PlantError::NotStanding
+            | PlantError::OnChassis { .. }
+            | PlantError::InChassis { .. } => {
                 standing::refused(scenario, &robot.file, plant.params(), &e)
             }
             other => refused("plant", &other),

@@ -1,5 +1,7 @@
 //! The robot against the terrain: forces of all contacts at one instant.
 
+mod inside;
+
 use std::cell::RefCell;
 
 use nalgebra::Vector3;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use wheeleg_plant::terrain::{HeightMap, Material, Part, Plane, Shape};
+use wheeleg_plant::terrain::{HeightMap, Material, Part, Plane, Shape, Solid};
 use wheeleg_plant::testing::wheeleg_2003;
 use wheeleg_plant::{Plant, PlantError};
 
@@ -165,4 +165,25 @@ fn a_start_on_the_chassis_is_refused() {
     assert!((least_n..most_n).contains(&sum_n), "{sum_n} {weight_n}");
     // With nothing behind it the robot falls.
     assert_eq!(on_ramp(30.0, -0.6).unwrap_err(), PlantError::NotStanding);
+}
+
+/// A block between corners and edges of the chassis, which no contact of it would feel.
+#[test]
+fn a_block_inside_the_chassis_is_refused() {
+    let with_block = |top_m: f64| {
+        let mut params = wheeleg_2003();
+        params.terrain.parts.push(Part {
+            shape: Shape::Solid(Solid::block([0.0; 2], [0.1; 2], 0.0, [0.0, top_m])),
+            material: Material::ROUGH,
+        });
+        Plant::new(&params).unwrap().initial_state(1)
+    };
+    let belly_m = wheeleg_2003().contacts.chassis.from_m[2] + wheeleg_2003().body.wheel_radius_m;
+    assert!(with_block(belly_m - 0.02).is_ok());
+    let error = with_block(belly_m + 0.03).unwrap_err();
+    let PlantError::InChassis { place_m, into_m } = error else {
+        panic!("{error}");
+    };
+    assert!((into_m - 0.03).abs() < 5e-3, "{into_m}");
+    assert!(place_m.iter().all(|m| m.abs() < 0.1), "{place_m:?}");
 }
