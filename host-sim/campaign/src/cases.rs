@@ -1,7 +1,7 @@
 //! Any case of a plan from its index.
 
 use wheeleg_config::plan::{Plan, Resolved, Resolver, Value};
-use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_config::{ConfigError, RobotConfig, Scenario};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 
@@ -9,6 +9,7 @@ use crate::CampaignError;
 use crate::columns::Columns;
 use crate::draw::Draws;
 use crate::identity::{CaseId, identity};
+use crate::simulate::why;
 
 /// Cells that are looked at before the first case.
 const CELLS: u64 = 1000;
@@ -129,13 +130,10 @@ impl<'a> Cases<'a> {
         let place = self.place(index);
         let values = self.values(place);
         let resolved = self.resolver.resolve(&values);
-        let (id, seed) = identity(self.plan, &values, place.replicate, resolved.as_ref().ok());
+        let (id, seed) = identity(self.plan, &values, place, resolved.as_ref().ok());
         let setup = match resolved {
             Ok(resolved) => checked(resolved),
-            Err(error) => {
-                let problems = error.problems().iter().map(ToString::to_string);
-                Err(problems.collect::<Vec<_>>().join("; "))
-            }
+            Err(error) => Err(problems(&error)),
         };
         Case {
             place,
@@ -147,6 +145,12 @@ impl<'a> Cases<'a> {
     }
 }
 
+/// All that is wrong with a file, on one line.
+pub(crate) fn problems(error: &ConfigError) -> String {
+    let problems = error.problems().iter().map(ToString::to_string);
+    problems.collect::<Vec<_>>().join("; ")
+}
+
 /// What the simulator, too, asks of the faults.
 fn checked(resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
     let Resolved {
@@ -154,6 +158,6 @@ fn checked(resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
     } = resolved;
     match faults::check(&scenario, &robot, &Nodes::default()) {
         Ok(()) => Ok((scenario, robot)),
-        Err(error) => Err(error.to_string()),
+        Err(error) => Err(why(&error)),
     }
 }

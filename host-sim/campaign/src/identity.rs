@@ -2,12 +2,17 @@
 //!
 //! Neither index nor shard nor order enters. Two programs that run the same content have the same
 //! case, so their results can be compared case by case.
+//!
+//! The samples of a plan that draws from lists alone would often be the same case, run again with the
+//! same noise. There the number of the sample belongs to the content.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde_json::{Value as Json, json};
 use wheeleg_config::plan::{Plan, Resolved, Sets, Value};
+
+use crate::cases::Place;
 
 /// Version of what is hashed.
 const FORMAT: u32 = 1;
@@ -43,10 +48,13 @@ impl FromStr for CaseId {
 pub(crate) fn identity(
     plan: &Plan,
     values: &[Value],
-    replicate: u64,
+    place: Place,
     resolved: Option<&Resolved>,
 ) -> (CaseId, u64) {
-    let mut content = content(plan, values, replicate, resolved);
+    let mut content = content(plan, values, place.replicate, resolved);
+    if plan.draws_from_lists_alone() {
+        content["sample"] = json!(place.sample);
+    }
     let hash = blake3::hash(canonical(&content).as_bytes());
     let (half, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
     let case = CaseId(u128::from_be_bytes(*half));

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use wheeleg_scene::Scene;
-use wheeleg_sim::Boards;
+use wheeleg_sim::{Boards, SimError};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::run::{self, Simulated};
@@ -12,7 +12,7 @@ use wheeleg_studies::study::Stop;
 use wheeleg_telemetry::{Keep, LogFile, Recorder};
 
 use crate::CampaignError;
-use crate::cases::Case;
+use crate::cases::{Case, problems};
 use crate::row::Status;
 
 /// What came of a case.
@@ -81,6 +81,14 @@ pub(crate) fn log(
     result
 }
 
+/// What a row says of an error: of a file what is wrong in it.
+pub(crate) fn why(error: &SimError) -> String {
+    match error {
+        SimError::Config(error) => problems(error),
+        other => other.to_string(),
+    }
+}
+
 fn recorded(
     case: &Case,
     recorder: Recorder<'_>,
@@ -114,7 +122,7 @@ fn recorded(
         ..
     } = match simulated {
         Ok(simulated) => simulated,
-        Err(error) => return Some(Outcome::without(Status::Error, error.to_string())),
+        Err(error) => return Some(Outcome::without(Status::Error, why(&error))),
     };
     let (status, error) = match (&outcome.failure, limit_s.filter(|_| over)) {
         (Some(failure), _) => (Status::Error, Some(failure.to_string())),

@@ -203,6 +203,21 @@ impl Scenario {
         r.refusal(&what)
     }
 
+    /// A refusal of the fault of this number, from 0, with what would do; `None` if the file has no such
+    /// fault.
+    #[must_use]
+    pub fn refuse_fault(&self, number: usize, why: &str, help: &str) -> Option<ConfigError> {
+        let Source { file, text } = &*self.source.0;
+        let what = format!("the scenario file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, false).ok()?;
+        let top = r.table("")?;
+        let (_, item) = top.get("faults")?;
+        let span = item.as_array()?.get(number)?.span();
+        let message = format!("`faults[{number}]`: {why}");
+        r.problem(span, message, "cannot be", Some(help.to_owned()));
+        Some(r.refusal(&what))
+    }
+
     /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
     /// beside it.
     ///

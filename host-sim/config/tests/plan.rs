@@ -385,6 +385,13 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
             vec!["factor.x.choice.weights", "2 numbers above 0"],
         ),
         (
+            on(
+                "supply.droop",
+                "choice = { values = [1.0, 2.0], weights = [1e308, 1e308], unit = \"bar\" }",
+            ),
+            vec!["factor.x.choice.weights", "finite sum"],
+        ),
+        (
             on("supply.droop", "grid = [1.0, 1.0]\nunit = \"bar\""),
             vec!["factor.x.grid", "none of them twice"],
         ),

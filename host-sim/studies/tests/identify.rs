@@ -247,6 +247,32 @@ fn written_axis_says_what_is_found(summary: &str, out: &Path) -> usize {
     count
 }
 
+/// 0.6 s of the very axis of the file: the fit takes noise for friction, and meets what it has not seen
+/// worse than the file does. That is no news of the bench, and nothing to build on.
+#[test]
+fn a_fit_that_is_worse_than_the_file_is_not_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut text = config().source.text.clone();
+    for (is, wanted) in [
+        ("viscous           = { value = 40.0,", "viscous = { value = 600.0,"),
+        ("mass = { value = 1.5,", "mass = { value = 5.0,"),
+    ] {
+        assert!(text.contains(is), "{is}");
+        text = text.replace(is, wanted);
+    }
+    let axis = folder.path().join("viscous.toml");
+    std::fs::write(&axis, text).expect("written");
+    let lab = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/short-viscous.csv");
+    let out = folder.path().join("out");
+    let summary = study_of(&lab, &axis.to_string_lossy(), &out).expect("it ends");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let off = |which: &str| summary[which]["held_out_mm"].as_f64().expect("a number");
+    assert!(off("before") < off("after"), "{summary}");
+    assert_eq!(summary["explained"], false, "{summary}");
+    assert_eq!(summary["worse_than_the_file"], true, "{summary}");
+    assert!(out.join("report.html").exists() && !out.join("axis.toml").exists());
+}
+
 /// A single stroke shuts no valve: what the file had for that delay stands beside what is assumed now.
 #[test]
 fn what_the_data_do_not_determine_is_marked_with_the_value_of_the_file() {

@@ -294,3 +294,37 @@ fn the_largest_plan_is_begun_and_told_in_a_moment() {
     let seconds = begun.elapsed().as_secs_f64();
     assert!(seconds < 10.0, "{seconds} s");
 }
+
+/// Drawn from a list, the same value comes again: its noise is another one, and so is the case.
+#[test]
+fn samples_from_a_list_alone_are_all_different_cases() {
+    const CHOICE: &str = "[factor.droop]\nparameter = \"robot.supply.droop\"\n\
+        choice = { values = [0.2, 0.3], unit = \"bar\" }\n";
+    let identities = |samples: u64| -> Vec<(String, u64)> {
+        let plan = plan_of(&format!("samples = {samples}\n{HEAD}{BASE}{CHOICE}"));
+        let cases = Cases::new(&plan).expect("a plan");
+        let all = (0..samples).map(|i| cases.case(i));
+        all.map(|case| (case.id.to_string(), case.seed)).collect()
+    };
+    let six = identities(6);
+    let ids: BTreeSet<_> = six.iter().map(|(id, _)| id).collect();
+    let seeds: BTreeSet<_> = six.iter().map(|(_, seed)| seed).collect();
+    assert_eq!((ids.len(), seeds.len()), (6, 6), "{six:?}");
+    // More samples leave those before them.
+    assert_eq!(identities(9)[..6], six[..]);
+}
+
+/// What only the start of a run finds wrong in the ground is in the row, with its values.
+#[test]
+fn a_ground_on_which_the_robot_does_not_stand_is_named_in_its_row() {
+    const SLOPE: &str = "[factor.slope]\nparameter = \"scenario.terrain[0].slope\"\n\
+        grid = [5, 40]\nunit = \"deg\"\n";
+    let text = format!("{HEAD}{BASE}{SLOPE}").replace("\"stand\"", "\"slope-10\"");
+    let plan = plan_of(&text);
+    let cases = Cases::new(&plan).expect("a plan");
+    let outcome = wheeleg_campaign::simulate(&cases.case(1), None, &Stop::default());
+    let error = outcome.expect("not stopped").error.expect("it does not stand");
+    for word in ["terrain[0]", "does not stand"] {
+        assert!(error.contains(word), "{error}");
+    }
+}

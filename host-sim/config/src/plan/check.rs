@@ -1,6 +1,7 @@
 //! Every value that a factor can have, against the ranges of the files: all that is wrong is
 //! told at once, before the first case.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -336,12 +337,33 @@ fn extremes(factor: &Factor) -> Vec<f64> {
     }
 }
 
-/// The values of a factor at which something is most likely to be wrong: all of a list, the ends
-/// of a distribution.
+/// Numbers of a list that are tried before the first case.
+const PROBES: usize = 20;
+
+/// Of a list those that are tried: all names, and of more than [`PROBES`] numbers the smallest, the
+/// largest and some between.
+fn tried(mut list: Vec<Value>) -> Vec<Value> {
+    let number = |value: &Value| match value {
+        Value::Number(n) => Some(*n),
+        Value::Flag(_) | Value::Text(_) => None,
+    };
+    if list.len() <= PROBES || list.iter().any(|value| number(value).is_none()) {
+        return list;
+    }
+    list.sort_by(|a, b| number(a).partial_cmp(&number(b)).unwrap_or(Ordering::Equal));
+    let last = list.len() - 1;
+    let places = (0..PROBES).map(|i| i * last / (PROBES - 1));
+    places.map(|place| list[place].clone()).collect()
+}
+
+/// The values of a factor at which something is most likely to be wrong: of a list those that are
+/// [tried], of a distribution its ends.
 fn probes(factor: &Factor) -> Vec<Value> {
     match &factor.values {
-        Values::Grid(list) => list.clone(),
-        Values::Drawn(Distribution::Choice(list)) => list.iter().map(|c| c.value.clone()).collect(),
+        Values::Grid(list) => tried(list.clone()),
+        Values::Drawn(Distribution::Choice(list)) => {
+            tried(list.iter().map(|c| c.value.clone()).collect())
+        }
         Values::Drawn(d) => {
             let ends = d.ends().map_or(Vec::new(), Vec::from);
             ends.into_iter().map(Value::Number).collect()

@@ -273,11 +273,12 @@ fn choice(r: &mut Reader, entry: &Entry) -> Option<Distribution> {
         .filter(|w| *w > 0.0 && w.is_finite())
         .collect();
     let given = item.as_array().map_or(0, toml_edit::Array::len);
-    if weights.len() != values.len() || given != values.len() {
+    let sum: f64 = weights.iter().sum();
+    if weights.len() != values.len() || given != values.len() || !sum.is_finite() {
         r.problem(
             Some(span),
             format!(
-                "`{}` = {} must be a list of {} numbers above 0, one for each value",
+                "`{}` = {} must be a list of {} numbers above 0 with a finite sum, one for each value",
                 entry.field_path("weights"),
                 item.to_string().trim(),
                 values.len()

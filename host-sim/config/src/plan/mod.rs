@@ -163,6 +163,18 @@ impl Plan {
     pub fn cases(&self) -> u64 {
         self.cells() * self.samples * self.replicates
     }
+
+    /// Whether two samples may well have the same values: some factors are drawn, and each of them from
+    /// a list.
+    #[must_use]
+    pub fn draws_from_lists_alone(&self) -> bool {
+        let drawn = self.factors.iter().filter_map(|factor| match &factor.values {
+            Values::Drawn(distribution) => Some(distribution),
+            Values::Grid(_) => None,
+        });
+        let mut from_list = drawn.map(|drawn| matches!(drawn, Distribution::Choice(_)));
+        from_list.next() == Some(true) && from_list.all(|from_list| from_list)
+    }
 }
 
 fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {

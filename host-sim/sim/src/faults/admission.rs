@@ -12,27 +12,51 @@ use wheeleg_remote_host::{NodeKind, Nodes};
 /// where the nodes run.
 ///
 /// # Errors
-/// [`SimError::Simulation`] with the first fault that cannot be, and why.
+/// [`SimError::Config`] or, of a fault that is not in the scenario's file, [`SimError::Simulation`] with the
+/// first fault that cannot be, and why.
 pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<(), SimError> {
-    for fault in &scenario.faults {
-        can_be_there(fault, nodes)?;
-        does_something(fault, robot)?;
-        if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
-            return Err(cannot_begin(fault));
-        }
-        if fault.from_s >= scenario.duration_s {
-            let end_s = scenario.duration_s;
-            return Err(SimError::simulation(
-                format!(
-                    "the fault `{fault}` does nothing: scenario `{}` ends at {end_s} s, before it \
-                     could begin",
-                    scenario.name
-                ),
-                format!("choose a begin from 0 s to below {end_s} s"),
-            ));
-        }
+    let mut alone = scenario.faults.iter().enumerate();
+    alone
+        .try_for_each(|(number, fault)| {
+            check_alone(fault, scenario, robot, nodes).map_err(|error| (number, error))
+        })
+        .and_then(|()| no_rivals(&scenario.faults))
+        .map_err(|(number, error)| in_file(scenario, number, error))
+}
+
+/// Checks a fault against everything but other faults.
+fn check_alone(
+    fault: &FaultSpec,
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    nodes: &Nodes,
+) -> Result<(), SimError> {
+    can_be_there(fault, nodes)?;
+    does_something(fault, robot)?;
+    if fault.kind.is_built_in() && (fault.from_s > 0.0 || fault.until_s.is_some()) {
+        return Err(cannot_begin(fault));
     }
-    no_rivals(&scenario.faults)
+    if fault.from_s >= scenario.duration_s {
+        let end_s = scenario.duration_s;
+        return Err(SimError::simulation(
+            format!(
+                "the fault `{fault}` does nothing: scenario `{}` ends at {end_s} s, before it \
+                 could begin",
+                scenario.name
+            ),
+            format!("choose a begin from 0 s to below {end_s} s"),
+        ));
+    }
+    Ok(())
+}
+
+/// The error of a fault, with its place if it stands in the scenario's file: others come from elsewhere.
+fn in_file(scenario: &Scenario, number: usize, error: SimError) -> SimError {
+    let SimError::Simulation { what, help } = &error else {
+        return error;
+    };
+    let refusal = scenario.refuse_fault(number, what, help);
+    refusal.map_or(error, |refusal| SimError::Config(Box::new(refusal)))
 }
 
 /// Checks a fault that begins now, beside those that are active.
@@ -249,8 +273,8 @@ fn whole(kind: FaultKind) -> &'static str {
 }
 
 /// Two faults of one part at a time: the end of one would undo the other. The same fault
-/// at the same place twice at a time has no meaning.
-fn no_rivals(faults: &[FaultSpec]) -> Result<(), SimError> {
+/// at the same place twice at a time has no meaning. The error has the number of the later one in the list.
+fn no_rivals(faults: &[FaultSpec]) -> Result<(), (usize, SimError)> {
     let mut by_begin: Vec<usize> = (0..faults.len()).collect();
     by_begin.sort_by(|a, b| faults[*a].from_s.total_cmp(&faults[*b].from_s));
     // Those under way are at different parts, of which a robot has few.
@@ -266,15 +290,17 @@ fn no_rivals(faults: &[FaultSpec]) -> Result<(), SimError> {
             let Some(part) = contested(lasts, begins) else {
                 continue;
             };
-            let [a, b] = [new.min(*old), new.max(*old)].map(|at| &faults[at]);
+            let later = new.max(*old);
+            let [a, b] = [new.min(*old), later].map(|at| &faults[at]);
             let from_s = begins.from_s;
-            return Err(SimError::simulation(
+            let error = SimError::simulation(
                 format!(
                     "the faults `{a}` and `{b}` overlap on {part} from {from_s} s on, where they \
                      cannot be combined"
                 ),
                 "leave one of them out, or end the first before the second begins",
-            ));
+            );
+            return Err((later, error));
         }
         under_way.push(new);
     }
@@ -418,6 +444,27 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A fault of the file is named with its line, one that was added by itself.
+    #[test]
+    fn a_fault_of_the_file_is_refused_at_its_place() {
+        const TEXT: &str = "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"2 s\"\n\
+            seed = 1\ntargets = \"none\"\nfaults = [\n\"pot-open:joint3@0.2s\",\n\
+            \"pot-open:joint3@0.4s\",\n]\n[motion]\nkind = \"stand\"\n";
+        let mut scenario = Scenario::parse("my.toml", TEXT).expect("sound");
+        let robot = builtin::robot("wheeleg").expect("built in");
+        let refused = |scenario: &Scenario| check(scenario, &robot, &Nodes::default()).expect_err("rivals");
+        let SimError::Config(refusal) = refused(&scenario) else {
+            panic!("an error of the file");
+        };
+        let said = refusal.problems()[0].summary();
+        assert!(said.starts_with("my.toml:9: `faults[1]`: "), "{said}");
+        assert!(said.contains("overlap on the potentiometer"), "{said}");
+        scenario.faults[1] = "pot-open:joint2@0.2s".parse().expect("a fault");
+        scenario.faults.push(scenario.faults[0].clone());
+        let added = refused(&scenario);
+        assert!(matches!(added, SimError::Simulation { .. }), "{added:?}");
     }
 
     #[test]

@@ -148,6 +148,9 @@ pub struct Summary<'a> {
     noise_mm: f64,
     /// Whether the rest of the measurement is met within three times the noise.
     explained: bool,
+    /// Whether the file's own values meet it and the fit's do not: the measurement is too short, and no
+    /// axis is written.
+    worse_than_the_file: bool,
     /// What the data do not determine.
     undetermined: &'a [String],
     /// The most telling next experiment, null if the plant plays none or the fit was stopped.
@@ -530,6 +533,13 @@ impl Identified {
         self.after.held_out_mm <= EXPLAINED * self.noise_mm
     }
 
+    /// Whether the file's own values meet the rest of the measurement and those of the fit do not: what was
+    /// measured is too short to tell more than the file does.
+    #[must_use]
+    pub fn is_worse_than_the_file(&self) -> bool {
+        !self.is_explained() && self.before.held_out_mm <= EXPLAINED * self.noise_mm
+    }
+
     /// The axis file with what was found.
     ///
     /// # Errors
@@ -573,6 +583,7 @@ impl Identified {
             after: self.after,
             noise_mm: self.noise_mm,
             explained: self.is_explained(),
+            worse_than_the_file: self.is_worse_than_the_file(),
             undetermined: &self.undetermined,
             next_experiment: self.experiments.first().map(|e| e.name),
         }
@@ -582,8 +593,8 @@ impl Identified {
         let stopped = self.stopped.clone();
         let summary = json(&self.summary(), stopped.as_ref());
         job.finish(self, summary, stopped, |job, identified| {
-            // A fit that was stopped is none to build on.
-            if identified.stopped.is_none() {
+            // Neither a fit that was stopped nor one that is worse than the file is one to build on.
+            if identified.stopped.is_none() && !identified.is_worse_than_the_file() {
                 job.keep(job.save(AXIS, &identified.toml));
             }
             if let Some(experiment) = identified.experiments.first() {

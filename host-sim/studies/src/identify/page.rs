@@ -109,6 +109,8 @@ pub(super) fn render(
         .count();
     let explained = if identified.is_explained() {
         "the held-out data are matched within three times the sensor's noise"
+    } else if identified.is_worse_than_the_file() {
+        "the file's values match the held-out data and the fit's do not: it is not written, measure for longer"
     } else {
         "the held-out data are not matched: the model lacks something that the bench has, such as a leak"
     };

@@ -53,7 +53,7 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Identifies, writes and prints. A measurement that the model does not explain is a target missed.
+/// Identifies, writes and prints. A measurement that the fit does not explain is a target missed.
 pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let default = |axis: &str| PathBuf::from("runs").join(format!("identify-{axis}"));
@@ -94,7 +94,9 @@ fn text(identified: &Identified, report: &Path) -> String {
         "held out       error {:.3} mm, with the file's values {:.3} mm; sensor noise {:.3} mm",
         identified.after.held_out_mm, identified.before.held_out_mm, identified.noise_mm
     );
-    if !identified.is_explained() {
+    if identified.is_worse_than_the_file() {
+        text.push_str("               the fit is worse than the file: measure for longer\n");
+    } else if !identified.is_explained() {
         text.push_str("               the model lacks something that the bench has\n");
     }
     if let Some(next) = identified.experiments.first() {
