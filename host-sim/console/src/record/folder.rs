@@ -332,8 +332,13 @@ pub(crate) fn list(root: &Path, most: usize) -> Vec<(Summary, u64)> {
     names.sort_unstable_by(|a, b| b.cmp(a));
     let read = names.iter().filter_map(|name| {
         let folder = root.join(name);
+        // A link leads to what is no recording of this server.
+        let is_folder = fs::symlink_metadata(&folder).is_ok_and(|about| about.is_dir());
+        let summary = is_folder.then(|| summary(&folder).ok())??;
         let bytes = parts(&folder.join(LOG)).map(|part| fs::metadata(part).map_or(0, |m| m.len()));
-        Some((summary(&folder).ok()?, bytes.sum()))
+        // Whatever the file says.
+        let id = name.clone();
+        Some((Summary { id, ..summary }, bytes.sum()))
     });
     read.take(most).collect()
 }
