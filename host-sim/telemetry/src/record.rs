@@ -36,8 +36,8 @@ fn part(rest: &[u8]) -> Option<(&[u8], &[u8])> {
 
 /// Bytes that a log may swell to, whatever its size.
 const FREE: u64 = 64 << 20;
-/// How many times its size it may swell to beyond. Ours swell to 20 times theirs, and as a text of
-/// zeros to 10,000 times: a small file would be read for hours.
+/// How many times its size it may swell to beyond. Ours swell to 10 times theirs, zeros to
+/// 10,000 times: a small file would be read for hours.
 const MOST: u64 = 500;
 
 /// How much a log swells as it is read.

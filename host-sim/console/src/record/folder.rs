@@ -378,6 +378,33 @@ mod tests {
         (times, texts, end.expect("a log").whole)
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn a_recording_is_listed_by_the_name_of_its_folder_and_a_link_is_none() {
+        let home = tempfile::tempdir().expect("a folder");
+        let folder = home.path().join("0007");
+        fs::create_dir(&folder).expect("created");
+        let summary = Summary {
+            id: "\u{1b}[31m<img>".to_owned(),
+            program: String::new(),
+            robot: String::new(),
+            scenario: String::new(),
+            seed: 1,
+            begin_us: 0,
+            end_us: None,
+            hash: None,
+            dropped: 0,
+            repeatable: false,
+            failure: None,
+        };
+        let text = serde_json::to_string(&summary).expect("JSON");
+        fs::write(folder.join(SUMMARY), text).expect("written");
+        std::os::unix::fs::symlink(&folder, home.path().join("0008")).expect("a link");
+        let listed = list(home.path(), 10);
+        let ids: Vec<&str> = listed.iter().map(|(summary, _)| &*summary.id).collect();
+        assert_eq!(ids, ["0007"]);
+    }
+
     #[test]
     fn a_long_log_is_cut_into_parts_that_are_read_as_one() {
         let root = tempfile::tempdir().expect("a folder");
