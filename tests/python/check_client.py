@@ -78,6 +78,17 @@ def refused(reason, act):
     raise AssertionError(f"not refused: {reason}")
 
 
+def names_of_others_are_not_taken_for_this_computer(key):
+    """However they begin: over plain HTTP nobody is given a proof of a key there."""
+    for host in ("127.0.0.1.evil.example:1", "127.evil.example:7420", "localhost.evil.example:1", "192.0.2.7:7420"):
+        try:
+            Robot(host, key)
+        except ValueError as error:
+            assert "intercepted" in str(error), error
+        else:
+            raise AssertionError(f"not refused: {host}")
+
+
 def set_dead_proxies():
     """From now on the environment names a proxy that is not there."""
     proxies = ("http_proxy", "https_proxy", "all_proxy")
@@ -257,6 +268,7 @@ def at_the_robot(program):
 def main(program):
     set_dead_proxies()
     with tempfile.TemporaryDirectory() as home, served(program, Path(home)) as (address, keys, recordings, _):
+        names_of_others_are_not_taken_for_this_computer(keys["control"])
         refused("wrong_key", lambda: Robot(address, "0" * 64))
         with false_server() as (false_address, heard):
             refused("nobody", lambda: Robot(false_address, keys["control"]))

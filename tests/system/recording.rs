@@ -86,6 +86,27 @@ impl Served {
     }
 }
 
+/// The port is in use: the keys are those of the server that runs.
+#[test]
+fn a_server_that_does_not_start_leaves_the_keys_as_they_are() {
+    let served = Served::new("");
+    let keys = || {
+        let folder = served.home.path().join("wheeleg");
+        ["control.key", "view.key"].map(|name| fs::read(folder.join(name)).expect("a key"))
+    };
+    let before = keys();
+    let address = served.address.trim_start_matches("http://");
+    let refused = Command::new(program::path())
+        .args(["serve", "stand", "--new-key", "--listen", address])
+        .env("XDG_STATE_HOME", served.home.path())
+        .output()
+        .expect("run");
+    assert_eq!(refused.status.code(), Some(2));
+    assert_eq!(before, keys());
+    assert_eq!(served.ctl(&["stop"]).status.code(), Some(0));
+    served.end("TERM");
+}
+
 fn replay(folder: &Path) -> (Option<i32>, Value) {
     let output = Command::new(program::path())
         .args(["replay", "--json"])

@@ -16,8 +16,8 @@ fn wheeleg(arguments: &[&str], home: &std::path::Path) -> Output {
 }
 
 /// What was told is shown, and nothing of it acts.
-fn assert_harmless(output: &Output, shown: &str) {
-    let told = String::from_utf8_lossy(&output.stderr);
+fn assert_harmless(told: &[u8], shown: &str) {
+    let told = String::from_utf8_lossy(told);
     assert!(told.contains(shown), "{told:?}");
     assert!(
         !told.contains(['\u{1b}', '\u{7}', '\u{9b}', '\u{202e}']),
@@ -41,29 +41,57 @@ fn texts_of_a_file_do_not_act_on_a_terminal() {
         std::fs::write(&path, text).expect("written");
         let output = wheeleg(&["run", path_text], home.path());
         assert_eq!(output.status.code(), Some(2));
-        assert_harmless(&output, shown);
+        assert_harmless(&output.stderr, shown);
     }
 }
 
-/// A server in place of ours, which does not have the key.
-#[test]
-fn texts_of_a_server_do_not_act_on_a_terminal() {
+/// What a command says to a server in place of ours, which does not have the key, and answers so.
+fn asked_of(command: &str, status: &'static str, body: &serde_json::Value) -> Output {
     let home = tempfile::tempdir().expect("a folder");
     wheeleg_console::keys::Keys::open(&home.path().join("wheeleg")).expect("keys");
+    let body = body.to_string();
     let listener = TcpListener::bind("127.0.0.1:0").expect("bound");
     let address = listener.local_addr().expect("an address").to_string();
     let server = std::thread::spawn(move || {
         let (mut stream, _) = listener.accept().expect("a client");
         let mut request = [0; 4096];
         let _ = stream.read(&mut request);
-        let body = serde_json::json!({ "detail": format!("refused{ACTS}"), "remedy": ACTS });
-        let body = body.to_string();
         let length = body.len();
-        let answer = format!("HTTP/1.1 401 Unauthorized\r\nContent-Length: {length}\r\n\r\n{body}");
+        let answer = format!("HTTP/1.1 {status}\r\nContent-Length: {length}\r\n\r\n{body}");
         stream.write_all(answer.as_bytes()).expect("sent");
     });
-    let output = wheeleg(&["ctl", "--url", &address, "stop"], home.path());
+    let output = wheeleg(&["ctl", "--url", &address, command], home.path());
     server.join().expect("it ends");
+    output
+}
+
+#[test]
+fn texts_of_a_server_do_not_act_on_a_terminal() {
+    let body = serde_json::json!({ "detail": format!("refused{ACTS}"), "remedy": ACTS });
+    let output = asked_of("stop", "401 Unauthorized", &body);
     assert_eq!(output.status.code(), Some(3));
-    assert_harmless(&output, "refused");
+    assert_harmless(&output.stderr, "refused");
+}
+
+/// A file keeps them for the terminal that shows it later.
+#[test]
+fn texts_of_a_server_do_not_act_on_a_terminal_later() {
+    let acts = |text: &str| format!("{text}{ACTS}\n");
+    let body = serde_json::json!({
+        "robot": acts("Robby"), "ready": acts("r"), "armed": acts("a"), "step": acts("s"),
+        "phase": acts("p"), "hold": acts("h"),
+        "pace": { "speed": acts("v"), "paused": acts("no") },
+        "control": { "holder": acts("who"), "ended": acts("why") },
+        "recording": { "id": acts("1"), "failure": acts("full") },
+        "faults": [acts("pot-open")],
+        "boards": [{
+            "address": acts("3"),
+            "mode": acts("m"),
+            "faults": [{ "cause": acts("c"), "remedy": acts("last") }],
+        }],
+    });
+    let output = asked_of("status", "200 OK", &body);
+    assert_eq!(output.status.code(), Some(0));
+    assert_harmless(&output.stdout, "Robby");
+    assert_harmless(&output.stdout, "last");
 }

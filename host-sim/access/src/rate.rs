@@ -6,6 +6,8 @@ use std::time::Instant;
 const PER_S: f64 = 100.0;
 /// Frames at once.
 const BURST: f64 = 200.0;
+/// Bytes of a message that cost as much as a frame.
+const BYTES: f64 = 1_024.0;
 
 /// A bucket of tokens.
 #[derive(Debug, Clone)]
@@ -26,12 +28,18 @@ impl Bucket {
 
     /// Takes a token, if there is one.
     pub fn take(&mut self, now: Instant) -> bool {
+        self.take_for(0, now)
+    }
+
+    /// Takes what a message of so many bytes costs, if there is so much: a token, and one for each KiB.
+    pub fn take_for(&mut self, bytes: usize, now: Instant) -> bool {
+        let cost = 1.0 + bytes as f64 / BYTES;
         let passed = now.saturating_duration_since(self.filled).as_secs_f64();
         self.filled = now;
         self.tokens = (self.tokens + PER_S * passed).min(BURST);
-        let has = self.tokens >= 1.0;
+        let has = self.tokens >= cost;
         if has {
-            self.tokens -= 1.0;
+            self.tokens -= cost;
         }
         has
     }
@@ -50,5 +58,16 @@ mod tests {
         assert_eq!(taken(&mut bucket, start), 200);
         assert_eq!(taken(&mut bucket, start + Duration::from_millis(500)), 50);
         assert_eq!(taken(&mut bucket, start + Duration::from_secs(100)), 200);
+    }
+
+    #[test]
+    fn long_messages_cost_more() {
+        let start = Instant::now();
+        let mut bucket = Bucket::new(start);
+        let taken = (0..1_000).filter(|_| bucket.take_for(31 * 1_024, start));
+        assert_eq!(taken.count(), 6);
+        // What is left is enough for short ones.
+        let taken = (0..1_000).filter(|_| bucket.take(start));
+        assert_eq!(taken.count(), 8);
     }
 }

@@ -18,6 +18,7 @@ reason and what to do. The contract is PROTOCOL.md, beside this folder.
 import contextlib
 import hashlib
 import hmac
+import ipaddress
 import json
 import secrets
 import struct
@@ -56,6 +57,14 @@ def _prefixed(*parts):
     return whole
 
 
+def _is_own(host):
+    """Whether a name or an address is this computer's own."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
 def _mac(key, data):
     return hmac.new(key, data, hashlib.sha256).digest()
 
@@ -68,8 +77,7 @@ class Robot:
 
     def __init__(self, host, key, role="control", name="python"):
         self.host = host.removeprefix("http://").removeprefix("ws://").rstrip("/")
-        own = self.host.rsplit(":", 1)[0].strip("[]")
-        if own not in ("localhost", "::1") and not own.startswith("127."):
+        if not _is_own(self.host.rsplit(":", 1)[0].strip("[]")):
             raise ValueError("over plain HTTP a key could be intercepted: reach the server through ssh -L")
         self.name, self.role = name, role
         self._digits = key.strip()

@@ -8,8 +8,8 @@ use axum::body::Body;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Extension, Query, Request, State};
 use axum::http::header::{
-    AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, REFERRER_POLICY,
-    X_CONTENT_TYPE_OPTIONS,
+    AUTHORIZATION, CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
+    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri};
@@ -118,10 +118,7 @@ pub(crate) fn router(server: Arc<Server>) -> Router {
     Router::new()
         .route("/ws", get(socket))
         .route(FOXGLOVE, get(viewer))
-        .route(
-            "/openapi.json",
-            get(|| async { json_text(OPENAPI.to_owned()) }),
-        )
+        .route("/openapi.json", get(|| async { json_text(OPENAPI) }))
         .nest("/api/v1", api)
         .fallback(get(page))
         .method_not_allowed_fallback(wrong_method)
@@ -152,8 +149,8 @@ fn problem(status: StatusCode, detail: &str, remedy: &str) -> Response {
     (status, kind, body.to_string()).into_response()
 }
 
-fn json_text(text: String) -> Response {
-    ([(CONTENT_TYPE, "application/json")], text).into_response()
+fn json_text(text: impl Into<Body>) -> Response {
+    ([(CONTENT_TYPE, "application/json")], text.into()).into_response()
 }
 
 /// Lets nobody in from a foreign page, and says to the browser what the page may do.
@@ -167,6 +164,9 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     let named = request.uri().authority().map(Authority::as_str);
     let host = host.filter(|host| named.is_none_or(|named| named == *host));
     let host = host.map(str::to_owned);
+    // Many requests may have come in one piece: between two of them it is others' turn, the robot's
+    // stop before all.
+    tokio::task::yield_now().await;
     let mut response = match host {
         Some(host) => {
             request.extensions_mut().insert(Host(host));
@@ -178,7 +178,17 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
             "open the address that the server prints",
         ),
     };
+    let refused = [
+        StatusCode::FORBIDDEN,
+        StatusCode::UNAUTHORIZED,
+        StatusCode::TOO_MANY_REQUESTS,
+    ];
+    let is_refused = refused.contains(&response.status());
     let headers = response.headers_mut();
+    if is_refused {
+        // Whoever has no key asks once on a connection.
+        headers.insert(CONNECTION, HeaderValue::from_static("close"));
+    }
     let mut set = |name: HeaderName, value| headers.insert(name, HeaderValue::from_static(value));
     set(CONTENT_SECURITY_POLICY, CSP);
     set(X_CONTENT_TYPE_OPTIONS, "nosniff");
@@ -211,9 +221,6 @@ async fn key(
         return plain();
     }
     if has_key(&server.context, request.headers()) {
-        // Many requests may have come in one piece: between two of them it is others' turn, the
-        // robot's stop before all.
-        tokio::task::yield_now().await;
         return next.run(request).await;
     }
     let remedy = "send `Authorization: Bearer KEY` with the digits of control.key or view.key";
@@ -281,10 +288,7 @@ async fn socket(
         return problem(StatusCode::BAD_REQUEST, &detail, "see PROTOCOL.md");
     }
     let context = Arc::clone(&server.context);
-    upgrade.on_upgrade(move |socket| async move {
-        session::serve(socket, context, host, peer).await;
-        drop(place);
-    })
+    upgrade.on_upgrade(move |socket| session::serve(socket, context, host, peer, place))
 }
 
 #[derive(Deserialize)]
@@ -352,8 +356,10 @@ async fn viewer(
     };
     let hub = Arc::clone(&context.hub);
     upgrade.on_upgrade(move |socket| async move {
-        foxglove::serve(socket, hub, viewing).await;
-        drop(place);
+        // A viewer has shown its key.
+        if place.keep() {
+            foxglove::serve(socket, hub, viewing).await;
+        }
     })
 }
 

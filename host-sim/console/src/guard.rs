@@ -1,16 +1,17 @@
 //! Who is let near: host and origin of a request, and what becomes of wrong keys.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};
+use tokio::sync::watch;
 
 /// Wrong keys of an address within [`WINDOW`] after which more are answered late.
 const WRONG_MAX: usize = 10;
-/// How long a wrong key is remembered.
+/// How long wrong keys are remembered, from the first on.
 const WINDOW: Duration = Duration::from_secs(60);
 /// Addresses that are remembered.
 const ADDRESSES: usize = 1_024;
@@ -34,13 +35,17 @@ pub(crate) struct Hosts {
 }
 
 impl Hosts {
-    /// Those of an address, of this computer, and `names` of the user's; `tls`: by HTTPS.
+    /// Those of an address, `localhost` if it is reached there, and `names` of the user's; `tls`: by
+    /// HTTPS.
     pub(crate) fn new(address: SocketAddr, names: &[String], tls: bool) -> Self {
         let port = address.port();
         let own = (!address.ip().is_unspecified()).then(|| address.to_string());
         let named = names.iter().map(|name| format!("{name}:{port}"));
         let mut names: Vec<String> = own.into_iter().chain(named).collect();
-        names.push(format!("localhost:{port}"));
+        // Elsewhere somebody else may listen under that name, and hand on what they hear.
+        if address.ip().is_unspecified() || other_loopback(address.ip()).is_some() {
+            names.push(format!("localhost:{port}"));
+        }
         let (scheme, usual) = if tls {
             ("https://", 443)
         } else {
@@ -109,73 +114,160 @@ pub(crate) fn is_local(client: IpAddr, own: IpAddr) -> bool {
     client.is_loopback() || client == own
 }
 
+/// The other address that `localhost` stands for on many computers. A server at one of them listens
+/// at the other too: else another user could, and clients would take theirs for ours.
+pub(crate) fn other_loopback(own: IpAddr) -> Option<IpAddr> {
+    match own {
+        IpAddr::V4(Ipv4Addr::LOCALHOST | Ipv4Addr::UNSPECIFIED) => Some(Ipv6Addr::LOCALHOST.into()),
+        IpAddr::V6(Ipv6Addr::LOCALHOST) => Some(Ipv4Addr::LOCALHOST.into()),
+        _ => None,
+    }
+}
+
 /// Connections at a time.
 const CONNECTIONS: usize = 128;
-/// Those of one address: from others there are always places.
+/// Those of one address.
 const OF_ONE_ADDRESS: usize = 96;
 
-/// Places for connections.
+/// Places for connections. Whoever comes gets one: where all are taken, the address that has most gives
+/// its oldest, unless a key was proved on it. So nobody is kept out who wants to stop the robot.
 #[derive(Debug, Default)]
-pub(crate) struct Places(Mutex<BTreeMap<IpAddr, usize>>);
+pub(crate) struct Places(Mutex<Taken>);
+
+#[derive(Debug, Default)]
+struct Taken {
+    next: u64,
+    /// By number, the oldest first.
+    all: BTreeMap<u64, Holder>,
+}
+
+#[derive(Debug)]
+struct Holder {
+    address: IpAddr,
+    /// It has proved a key, and keeps its place.
+    stays: bool,
+    /// Gone: the place is another's.
+    _held: watch::Sender<()>,
+}
+
+impl Taken {
+    /// The oldest of the places of an address that were taken without a key.
+    fn oldest(&self, address: IpAddr) -> Option<u64> {
+        let mut all = self.all.iter();
+        let oldest = all.find(|(_, holder)| holder.address == address && !holder.stays);
+        oldest.map(|(number, _)| *number)
+    }
+
+    /// The address that has taken most places without a key.
+    fn most(&self) -> Option<IpAddr> {
+        let mut counts = BTreeMap::<IpAddr, usize>::new();
+        for holder in self.all.values().filter(|holder| !holder.stays) {
+            *counts.entry(holder.address).or_default() += 1;
+        }
+        let most = counts.into_iter().max_by_key(|(_, count)| *count);
+        most.map(|(address, _)| address)
+    }
+}
 
 /// A connection's place, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Place {
     places: Arc<Places>,
-    address: IpAddr,
+    number: u64,
+    held: watch::Receiver<()>,
 }
 
 impl Places {
-    /// A place, if there is one.
+    fn taken(&self) -> MutexGuard<'_, Taken> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A place; none if all are held by those who have proved a key.
     pub(crate) fn take(self: &Arc<Self>, address: IpAddr) -> Option<Place> {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let own = all.get(&address).copied().unwrap_or(0);
-        if own >= OF_ONE_ADDRESS || all.values().sum::<usize>() >= CONNECTIONS {
-            return None;
+        let mut taken = self.taken();
+        let own = taken.all.values().filter(|h| h.address == address).count();
+        let gives = if own >= OF_ONE_ADDRESS {
+            Some(address)
+        } else if taken.all.len() >= CONNECTIONS {
+            Some(taken.most()?)
+        } else {
+            None
+        };
+        if let Some(gives) = gives {
+            let oldest = taken.oldest(gives)?;
+            taken.all.remove(&oldest);
         }
-        all.insert(address, own + 1);
+        let number = taken.next;
+        taken.next += 1;
+        let (sender, held) = watch::channel(());
+        let holder = Holder {
+            address,
+            stays: false,
+            _held: sender,
+        };
+        taken.all.insert(number, holder);
         Some(Place {
             places: Arc::clone(self),
-            address,
+            number,
+            held,
         })
+    }
+}
+
+impl Place {
+    /// A key was proved on it: nobody else gets the place. False: it is another's already.
+    pub(crate) fn keep(&self) -> bool {
+        let mut taken = self.places.taken();
+        let holder = taken.all.get_mut(&self.number);
+        holder.map(|holder| holder.stays = true).is_some()
+    }
+
+    /// Waits until the place is another's.
+    pub(crate) async fn lost(&self) {
+        let mut held = self.held.clone();
+        while held.changed().await.is_ok() {}
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let all = &self.places.0;
-        let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(own) = all.get_mut(&self.address) {
-            *own -= 1;
-            if *own == 0 {
-                all.remove(&self.address);
-            }
-        }
+        self.places.taken().all.remove(&self.number);
     }
+}
+
+/// Wrong keys of one address.
+#[derive(Debug)]
+struct Wrong {
+    /// When the first of them came.
+    since: Instant,
+    count: usize,
 }
 
 /// Wrong keys of the last minute, by address.
 #[derive(Debug, Default)]
-pub(crate) struct WrongKeys(Mutex<BTreeMap<IpAddr, Vec<Instant>>>);
+pub(crate) struct WrongKeys(Mutex<BTreeMap<IpAddr, Wrong>>);
 
 impl WrongKeys {
-    /// A wrong key came; true if there were too many of them from there.
+    /// A wrong key came; true if there were too many of them from there. However many addresses are
+    /// remembered, it is the same little work.
     pub(crate) fn count(&self, address: IpAddr, now: Instant) -> bool {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let recent = |times: &mut Vec<Instant>| {
-            times.retain(|t| now.saturating_duration_since(*t) < WINDOW);
-            !times.is_empty()
-        };
-        all.retain(|_, times| recent(times));
         if all.len() >= ADDRESSES && !all.contains_key(&address) {
             all.pop_first();
         }
-        let times = all.entry(address).or_default();
-        if times.len() > WRONG_MAX {
-            times.remove(0);
+        let none = Wrong {
+            since: now,
+            count: 0,
+        };
+        let wrong = all.entry(address).or_insert(none);
+        if now.saturating_duration_since(wrong.since) >= WINDOW {
+            *wrong = Wrong {
+                since: now,
+                count: 0,
+            };
         }
-        times.push(now);
-        times.len() > WRONG_MAX
+        wrong.count += 1;
+        wrong.count > WRONG_MAX
     }
 }
 
@@ -281,21 +373,63 @@ mod tests {
     }
 
     #[test]
-    fn one_address_does_not_take_all_places() {
+    fn whoever_comes_gets_a_place_and_keeps_it_with_a_key() {
+        use futures_util::FutureExt as _;
         let places = Arc::new(Places::default());
-        let [a, b, c] = [1, 2, 3].map(|n| IpAddr::from([127, 0, 0, n]));
-        let take = |address, count: usize| -> Vec<Place> {
-            (0..count).map_while(|_| places.take(address)).collect()
+        let address = |n| IpAddr::from([127, 0, 0, n]);
+        let take = |n, count: usize| -> Vec<Place> {
+            (0..count).map_while(|_| places.take(address(n))).collect()
         };
-        let of_a = take(a, 1_000);
-        assert_eq!(of_a.len(), OF_ONE_ADDRESS);
-        let of_b = take(b, 1_000);
-        assert_eq!(of_b.len(), CONNECTIONS - OF_ONE_ADDRESS);
-        assert!(places.take(c).is_none());
-        drop(of_a);
-        assert!(places.take(c).is_some());
-        drop(of_b);
-        assert!(places.0.lock().expect("not poisoned").is_empty());
+        let still = |held: &[Place]| {
+            let still = held.iter().filter(|p| p.lost().now_or_never().is_none());
+            still.count()
+        };
+        // Over and over from two addresses: one has its most, and all places are taken.
+        let driver = take(1, 1);
+        assert!(driver[0].keep());
+        let (of_a, of_b) = (take(1, 1_000), take(2, 1_000));
+        let (a, b) = (still(&of_a), still(&of_b));
+        assert_eq!(a + b, CONNECTIONS - 1);
+        assert!(a < OF_ONE_ADDRESS && b <= OF_ONE_ADDRESS, "{a} {b}");
+        // From a third one there are places all the same, and they are not taken away at once.
+        let of_c = take(3, 4);
+        let refilled = (take(1, 30), take(2, 30));
+        assert_eq!((of_c.len(), still(&of_c), still(&driver)), (4, 4, 1));
+        assert_eq!(places.taken().all.len(), CONNECTIONS);
+        let lost = of_a.iter().find(|p| p.lost().now_or_never().is_some());
+        assert!(!lost.expect("the oldest").keep());
+        // With a key on all of them there is none.
+        drop((of_a, of_b, of_c));
+        let all = take(1, OF_ONE_ADDRESS - 1);
+        assert!(all.iter().all(Place::keep) && places.take(address(1)).is_none());
+        drop((all, driver, refilled));
+        assert!(places.taken().all.is_empty());
+    }
+
+    #[test]
+    fn a_server_answers_to_localhost_where_nobody_else_can_listen_under_that_name() {
+        let names = |address: &str| {
+            let address = address.parse().expect("an address");
+            let hosts = Hosts::new(address, &["robot.example".to_owned()], true);
+            hosts.names.iter().any(|name| name == "localhost:7420")
+        };
+        for own in ["127.0.0.1:7420", "[::1]:7420", "0.0.0.0:7420", "[::]:7420"] {
+            assert!(names(own), "{own}");
+        }
+        for other in ["127.0.0.5:7420", "192.0.2.7:7420", "[2001:db8::7]:7420"] {
+            assert!(!names(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn wrong_keys_cost_the_same_however_many_addresses_are_remembered() {
+        let wrong = WrongKeys::default();
+        let begin = Instant::now();
+        for i in 0..200_000_u32 {
+            wrong.count(IpAddr::V4((i % 1_024).into()), begin);
+        }
+        // A walk over all of them took 25 us each time.
+        assert!(begin.elapsed() < Duration::from_secs(2), "{begin:?}");
     }
 
     #[test]

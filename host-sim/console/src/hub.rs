@@ -79,8 +79,6 @@ struct Client {
     subscriptions: BTreeMap<u16, Subscription>,
     /// It is on the robot's own computer.
     is_local: bool,
-    /// When the holder of the control was told last that this client asks for it.
-    asked: Option<Instant>,
 }
 
 /// A request that is not at its end.
@@ -153,6 +151,8 @@ struct Inner {
     clients: BTreeMap<ClientId, Client>,
     viewers: Viewers,
     desk: Desk,
+    /// When the holder of the control was told last that somebody asks for it.
+    asked: Option<Instant>,
     /// Name of the client that was in control last.
     last_holder: String,
     /// Its connection has ended while it was in control.
@@ -197,7 +197,7 @@ pub(crate) struct Hub {
 pub(crate) struct Stops {
     /// Number of the last one that the master has taken.
     taken: u64,
-    /// It goes out: the bit is in SYNC, or the clock stands.
+    /// It goes out: the bit is in SYNC, which boards answer, or the clock stands.
     sent: bool,
     /// Master time, µs.
     now_us: u64,
@@ -223,6 +223,7 @@ impl Hub {
                 clients: BTreeMap::new(),
                 viewers,
                 desk: Desk::default(),
+                asked: None,
                 last_holder: String::new(),
                 last_is_gone: false,
                 revoked_by: None,
@@ -291,7 +292,6 @@ impl Hub {
                 outbox: Arc::clone(outbox),
                 subscriptions: BTreeMap::new(),
                 is_local,
-                asked: None,
             },
         );
         let now_us = inner.status.map_or(0, |status| status.now_us);
@@ -443,7 +443,8 @@ impl Hub {
             inner.take_status(status);
             self.stops.send_replace(Stops {
                 taken: status.stops,
-                sent: status.emergency_stop || status.pace.paused,
+                // Of a SYNC that no board answers nobody knows whether it was heard.
+                sent: (status.emergency_stop && status.hears()) || status.pace.paused,
                 now_us: status.now_us,
             });
         }

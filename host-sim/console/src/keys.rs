@@ -41,26 +41,56 @@ impl Keys {
     /// key.
     pub fn open(folder: &Path) -> Result<Self, ConsoleError> {
         make_folder(folder)?;
-        let [control, view] = [CONTROL_FILE, VIEW_FILE].map(|name| {
-            let path = folder.join(name);
-            match make(&path) {
-                Ok(()) => {}
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(wrong(&path, format!("cannot be created: {e}"), MAKE)),
-            }
-            read_or(&path, MAKE)
-        });
+        Self::draw()?.put(folder)?;
+        let [control, view] =
+            [CONTROL_FILE, VIEW_FILE].map(|name| read_or(&folder.join(name), MAKE));
+        let (control, view) = (control?, view?);
+        if control.to_hex() == view.to_hex() {
+            let what = format!("is the same key as {CONTROL_FILE}: who may look could drive");
+            return Err(wrong(&folder.join(VIEW_FILE), what, MAKE));
+        }
+        Ok(Self { control, view })
+    }
+
+    /// New keys, which are in no file yet.
+    ///
+    /// # Errors
+    /// [`ConsoleError::Other`] if the system has no random numbers.
+    pub fn draw() -> Result<Self, ConsoleError> {
+        let key = || {
+            let mut bytes = [0; 32];
+            let drawn = getrandom::fill(&mut bytes).map(|()| Key::new(bytes));
+            drawn.map_err(|e| {
+                let what = format!("the system has no random numbers for a key: {e}");
+                ConsoleError::other(what, "try again later")
+            })
+        };
         Ok(Self {
-            control: control?,
-            view: view?,
+            control: key()?,
+            view: key()?,
         })
     }
 
-    /// Makes both keys anew: the old ones open nothing any more.
+    /// Puts the keys in those files of `folder` that are not there.
+    fn put(&self, folder: &Path) -> Result<(), ConsoleError> {
+        for (name, key) in [(CONTROL_FILE, &self.control), (VIEW_FILE, &self.view)] {
+            let path = folder.join(name);
+            match make(&path, key) {
+                Err(e) if e.kind() != ErrorKind::AlreadyExists => {
+                    return Err(wrong(&path, format!("cannot be created: {e}"), MAKE));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the keys in place of those in `folder`: the old ones open nothing any more.
     ///
     /// # Errors
-    /// As [`Keys::open`].
-    pub fn renew(folder: &Path) -> Result<Self, ConsoleError> {
+    /// [`ConsoleError::Key`] if a file cannot be removed or made.
+    pub fn replace(&self, folder: &Path) -> Result<(), ConsoleError> {
+        make_folder(folder)?;
         for name in [CONTROL_FILE, VIEW_FILE] {
             let path = folder.join(name);
             match fs::remove_file(&path) {
@@ -70,7 +100,7 @@ impl Keys {
                 _ => {}
             }
         }
-        Self::open(folder)
+        self.put(folder)
     }
 }
 
@@ -158,18 +188,27 @@ fn make_folder(folder: &Path) -> Result<(), ConsoleError> {
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder
         .create(folder)
-        .map_err(|e| wrong(folder, format!("cannot be created: {e}"), MAKE))
+        .map_err(|e| wrong(folder, format!("cannot be created: {e}"), MAKE))?;
+    match open_to_writers(folder) {
+        None => Ok(()),
+        Some(mode) => Err(ConsoleError::Key {
+            path: folder.to_owned(),
+            what: format!("others can write to this folder, and change its keys (mode {mode:o})"),
+            help: format!(
+                "chmod 700 {}; then make new keys: wheeleg serve --new-key",
+                folder.display()
+            ),
+        }),
+    }
 }
 
-fn make(path: &Path) -> std::io::Result<()> {
+fn make(path: &Path, key: &Key) -> std::io::Result<()> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let mut file = options.open(path)?;
-    let mut key = [0; 32];
-    getrandom::fill(&mut key).map_err(std::io::Error::other)?;
-    writeln!(file, "{}", hex::encode(&key))
+    writeln!(file, "{}", key.to_hex())
 }
 
 /// Permissions of a file that others than its owner may open.
@@ -178,6 +217,20 @@ fn open_to_others(file: &File) -> std::io::Result<Option<u32>> {
     use std::os::unix::fs::PermissionsExt as _;
     let mode = file.metadata()?.permissions().mode() & 0o777;
     Ok((mode & 0o077 != 0).then_some(mode))
+}
+
+/// Permissions of a folder that others than its owner may write to.
+#[cfg(unix)]
+fn open_to_writers(folder: &Path) -> Option<u32> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let mode = fs::metadata(folder).ok()?.permissions().mode() & 0o777;
+    (mode & 0o022 != 0).then_some(mode)
+}
+
+/// As below.
+#[cfg(not(unix))]
+fn open_to_writers(_folder: &Path) -> Option<u32> {
+    None
 }
 
 /// Where files have no such permissions, the folder of the user is what protects them.
@@ -201,8 +254,31 @@ mod tests {
         assert_ne!(first.control.to_hex(), first.view.to_hex());
         let mode = fs::metadata(folder.join(VIEW_FILE)).expect("there");
         assert_eq!(mode.permissions().mode() & 0o777, 0o600);
-        let renewed = Keys::renew(&folder).expect("made");
-        assert_ne!(first.control.to_hex(), renewed.control.to_hex());
+        let drawn = Keys::draw().expect("drawn");
+        assert_ne!(first.control.to_hex(), drawn.control.to_hex());
+        drawn.replace(&folder).expect("made");
+        let renewed = Keys::open(&folder).expect("read");
+        assert_eq!(drawn.control.to_hex(), renewed.control.to_hex());
+    }
+
+    #[test]
+    fn keys_that_are_equal_or_that_others_could_change_are_refused() {
+        let home = tempfile::tempdir().expect("a folder");
+        let [control, view] = [CONTROL_FILE, VIEW_FILE].map(|name| home.path().join(name));
+        Keys::open(home.path()).expect("made");
+        let open_to = |mode| {
+            let mode = fs::Permissions::from_mode(mode);
+            fs::set_permissions(home.path(), mode).expect("set");
+            Keys::open(home.path()).map_err(|error| error.to_string())
+        };
+        assert!(open_to(0o755).is_ok());
+        for mode in [0o777, 0o770, 0o722] {
+            let error = open_to(mode).expect_err("refused");
+            assert!(error.contains("others can write"), "{error}");
+        }
+        fs::copy(view, control).expect("copied");
+        let error = open_to(0o700).expect_err("refused");
+        assert!(error.contains("the same key"), "{error}");
     }
 
     #[test]

@@ -32,6 +32,8 @@ struct Parameter {
 #[derive(Debug, Clone)]
 pub(crate) struct Parameters {
     all: BTreeMap<String, Parameter>,
+    /// Those of all.
+    places: BTreeSet<Place>,
     /// The robot's description, as a parameter of the viewers' protocol.
     description: String,
     /// [`Self::document`], until a board tells a value.
@@ -58,8 +60,10 @@ impl Parameters {
                 (name, parameter)
             })
         });
+        let all: BTreeMap<String, Parameter> = boards.collect();
         Self {
-            all: boards.collect(),
+            places: all.values().map(|parameter| parameter.place).collect(),
+            all,
             description: json!({ "name": DESCRIPTION, "value": urdf }).to_string(),
             document: OnceCell::new(),
         }
@@ -96,35 +100,35 @@ impl Parameters {
     /// has it.
     pub(crate) fn list(&self, names: &[String]) -> String {
         let texts: Vec<&str> = match names.is_empty() {
-            true => self.shown().map(|(_, text)| text).collect(),
-            false => self.named(names).map(|(_, text)| text).collect(),
+            true => self.shown().collect(),
+            false => self.named(names).collect(),
         };
         format!("[{}]", texts.join(","))
     }
 
-    /// Names of those of `names` that there are, or of all.
-    pub(crate) fn names(&self, names: &[String]) -> BTreeSet<&str> {
-        match names.is_empty() {
-            true => self.shown().map(|(name, _)| name).collect(),
-            false => self.named(names).map(|(name, _)| name).collect(),
-        }
+    /// Boards and numbers of all that boards have.
+    pub(crate) fn places(&self) -> &BTreeSet<Place> {
+        &self.places
     }
 
-    /// Name and text of all.
-    fn shown(&self) -> impl Iterator<Item = (&str, &str)> {
-        let of_boards = self.all.iter().map(|(name, p)| (&**name, &*p.shown));
-        of_boards.chain([(DESCRIPTION, &*self.description)])
+    /// Board and number of the one with this name, if a board has it.
+    pub(crate) fn place(&self, name: &str) -> Option<Place> {
+        self.all.get(name).map(|parameter| parameter.place)
     }
 
-    /// Name and text of those of `names` that there are, each once however often it is named: a
-    /// short request has no endless answer.
-    fn named(&self, names: &[String]) -> impl Iterator<Item = (&str, &str)> {
+    /// Texts of all.
+    fn shown(&self) -> impl Iterator<Item = &str> {
+        let of_boards = self.all.values().map(|parameter| &*parameter.shown);
+        of_boards.chain([&*self.description])
+    }
+
+    /// Texts of those of `names` that there are, each once however often it is named: a short request
+    /// has no endless answer.
+    fn named(&self, names: &[String]) -> impl Iterator<Item = &str> {
         let once: BTreeSet<&str> = names.iter().map(String::as_str).collect();
         once.into_iter().filter_map(|name| {
-            let of_board = self.all.get_key_value(name);
-            let of_board = of_board.map(|(name, p)| (&**name, &*p.shown));
-            let description = (name == DESCRIPTION).then_some((DESCRIPTION, &*self.description));
-            of_board.or(description)
+            let of_board = self.all.get(name).map(|parameter| &*parameter.shown);
+            of_board.or((name == DESCRIPTION).then_some(&*self.description))
         })
     }
 
@@ -204,6 +208,11 @@ mod tests {
         let all = json(&parameters().list(&[]));
         let all = all.as_array().expect("a list");
         let boards = 6 * params_at(1).len() + 2 * params_at(7).len();
+        assert_eq!(parameters().places().len(), boards);
+        assert!(
+            boards < crate::foxglove::ITEMS_MAX,
+            "all can be named at once"
+        );
         assert_eq!(all.len(), boards + 1);
         assert_eq!(
             all[boards],
@@ -253,7 +262,6 @@ mod tests {
             listed,
             json!([{ "name": DESCRIPTION, "value": "<robot/>" }])
         );
-        assert_eq!(parameters.names(&names).len(), 1);
         let names = [GAIN, GAIN, "/nothing"].map(str::to_owned);
         let listed = json(&parameters.list(&names));
         assert_eq!(listed.as_array().expect("a list").len(), 1);

@@ -1,5 +1,5 @@
 //! A connection that ends when its client takes nothing for too long: who asks and never reads
-//! keeps no place.
+//! keeps no place. And one that reads little at a time: who sends without end waits its turn.
 
 use std::io::{ErrorKind, IoSlice};
 use std::pin::Pin;
@@ -12,12 +12,18 @@ use tokio::time::Sleep;
 /// Time in which a client must take something of what waits for it.
 pub(crate) const PROGRESS: Duration = Duration::from_secs(5);
 
-/// A stream whose writes fail after [`PROGRESS`] without any.
+/// Bytes that are read at a time. Between two reads it is the turn of others: whatever is made of
+/// the bytes, a client that sends without end has no more than these in front of anybody's stop.
+const READ: usize = 4 * 1024;
+
+/// A stream whose writes fail after [`PROGRESS`] without any, and which reads [`READ`] at a time.
 #[derive(Debug)]
 pub(crate) struct Progressing<S> {
     stream: S,
     /// Runs while a write waits.
     waits: Option<Pin<Box<Sleep>>>,
+    /// It has read, and is not at its next turn yet.
+    has_read: bool,
 }
 
 impl<S> Progressing<S> {
@@ -25,6 +31,7 @@ impl<S> Progressing<S> {
         Self {
             stream,
             waits: None,
+            has_read: false,
         }
     }
 
@@ -52,7 +59,17 @@ impl<S: AsyncRead + Unpin> AsyncRead for Progressing<S> {
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
+        if std::mem::take(&mut self.has_read) {
+            context.waker().wake_by_ref();
+            return Poll::Pending;
+        }
+        let most = buffer.remaining().min(READ);
+        let mut part = ReadBuf::new(buffer.initialize_unfilled_to(most));
+        ready!(Pin::new(&mut self.stream).poll_read(context, &mut part))?;
+        let read = part.filled().len();
+        buffer.advance(read);
+        self.has_read = true;
+        Poll::Ready(Ok(()))
     }
 }
 
@@ -93,5 +110,43 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Progressing<S> {
     ) -> Poll<std::io::Result<()>> {
         let shut = Pin::new(&mut self.stream).poll_shutdown(context);
         self.judge(context, shut)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::task::Waker;
+
+    use super::*;
+
+    /// However much has come: some of it, then the turn of others, then more.
+    #[test]
+    fn who_sends_without_end_is_read_a_little_at_a_time() {
+        let sent = vec![7; 10 * READ];
+        let mut stream = Progressing::new(Pretended(&sent));
+        let mut bytes = vec![0; 10 * READ];
+        let mut read = || {
+            let mut buffer = ReadBuf::new(&mut bytes);
+            let mut context = Context::from_waker(Waker::noop());
+            let read = Pin::new(&mut stream).poll_read(&mut context, &mut buffer);
+            read.map(|read| read.map(|()| buffer.filled().len()).ok())
+        };
+        for _ in 0..5 {
+            assert_eq!(read(), Poll::Ready(Some(READ)));
+            assert_eq!(read(), Poll::Pending, "no turn for others");
+        }
+    }
+
+    /// Bytes that have come, and a client that takes all.
+    struct Pretended<'a>(&'a [u8]);
+
+    impl AsyncRead for Pretended<'_> {
+        fn poll_read(
+            mut self: Pin<&mut Self>,
+            context: &mut Context<'_>,
+            buffer: &mut ReadBuf<'_>,
+        ) -> Poll<std::io::Result<()>> {
+            Pin::new(&mut self.0).poll_read(context, buffer)
+        }
     }
 }

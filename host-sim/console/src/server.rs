@@ -9,14 +9,17 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::Extension;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use serde_json::json;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpSocket};
-use tokio::runtime::Runtime;
+use tokio::runtime::{Handle, Runtime};
+use tokio::time::timeout;
 use tokio_rustls::TlsAcceptor;
 
 use wheeleg_config::{Drawing, Relief};
@@ -25,7 +28,9 @@ use wheeleg_telemetry::channels;
 use crate::api;
 use crate::error::ConsoleError;
 use crate::foxglove::{self, Viewers};
-use crate::guard::{Hosts, Peer, Places, WrongKeys, is_host, is_local, is_origin};
+use crate::guard::{
+    Hosts, Peer, Place, Places, WrongKeys, is_host, is_local, is_origin, other_loopback,
+};
 use crate::hub::{self, Hub};
 use crate::keys::Keys;
 use crate::live::{self, Live};
@@ -38,8 +43,12 @@ use crate::tls::{Certificate, Files, Fingerprint};
 
 /// Where the server listens unless it is told otherwise.
 pub const ADDRESS: &str = "127.0.0.1:7420";
-/// Threads of the server; the robot has its own.
-const WORKERS: usize = 2;
+/// Threads for those who have proved a key at the console; the robot has its own.
+const SESSIONS: usize = 2;
+/// Threads for all that others ask. Whoever floods it has one core at most.
+const REQUESTS: usize = 1;
+/// How often a port is looked for that is free at all addresses.
+const PORTS: usize = 16;
 /// Time in which a request must have come.
 const HEAD: Duration = Duration::from_secs(3);
 /// Bytes that may wait in the system for a client: who has a slow line sees what was so much before.
@@ -98,7 +107,7 @@ pub struct Server {
     goes_first: bool,
     notices: Arc<Notices>,
     hub: Arc<Hub>,
-    runtime: Option<Runtime>,
+    threads: Option<Threads>,
     robot: Option<JoinHandle<()>>,
     recorder: Option<JoinHandle<()>>,
     recorded: Arc<record::Shared>,
@@ -118,8 +127,8 @@ pub struct Prepared {
     options: Options,
     certificate: Option<Certificate>,
     page: Page,
-    runtime: Runtime,
-    listener: TcpListener,
+    threads: Threads,
+    listeners: Vec<TcpListener>,
     address: SocketAddr,
     robot_json: String,
     about: About,
@@ -145,10 +154,10 @@ impl Prepared {
         ensure_names(&options)?;
         let certificate = certificate(&options)?;
         let page = Page::new(options.page.as_deref())?;
-        let runtime = runtime()?;
-        let (listener, address) = {
-            let _inside = runtime.enter();
-            bind(options.listen)?
+        let threads = Threads::new()?;
+        let (listeners, address) = {
+            let _inside = threads.sessions.enter();
+            bind_all(options.listen)?
         };
         let robot_json = robot_json(&options.live);
         let about = about(&options.live)?;
@@ -156,8 +165,8 @@ impl Prepared {
             options,
             certificate,
             page,
-            runtime,
-            listener,
+            threads,
+            listeners,
             address,
             robot_json,
             about,
@@ -199,6 +208,7 @@ impl Prepared {
                 keys,
                 wrong_keys: WrongKeys::default(),
                 notices: Arc::clone(&notices),
+                sessions: self.threads.sessions.handle().clone(),
                 recordings: recordings.root,
                 look_only,
             }),
@@ -209,9 +219,18 @@ impl Prepared {
         });
         let fingerprint = self.certificate.as_ref().map(|c| c.fingerprint);
         let tls = self.certificate.map(|c| TlsAcceptor::from(c.config));
-        self.runtime.spawn(turn(Arc::clone(&hub)));
-        self.runtime
-            .spawn(accept(self.listener, server, tls, self.address_of));
+        let sessions = &self.threads.sessions;
+        sessions.spawn(turn(Arc::clone(&hub)));
+        let door = Door {
+            router: api::router(server),
+            tls,
+            places: Arc::default(),
+            requests: self.threads.requests.handle().clone(),
+            address_of: self.address_of,
+        };
+        for listener in self.listeners {
+            sessions.spawn(accept(listener, door.clone()));
+        }
         Ok(Server {
             address: self.address,
             name: names.into_iter().next(),
@@ -220,7 +239,7 @@ impl Prepared {
             goes_first,
             notices,
             hub,
-            runtime: Some(self.runtime),
+            threads: Some(self.threads),
             robot: Some(robot),
             recorder: Some(recordings.thread),
             recorded,
@@ -270,16 +289,32 @@ fn certificate(options: &Options) -> Result<Option<Certificate>, ConsoleError> {
 }
 
 /// Threads of the server.
-fn runtime() -> Result<Runtime, ConsoleError> {
-    tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(WORKERS)
-        .thread_name("console")
-        .enable_all()
-        .build()
-        .map_err(|e| {
-            let what = format!("the server's threads cannot be started: {e}");
-            ConsoleError::other(what, "end other programs, then try again")
+struct Threads {
+    /// Connections come here, all sockets are watched here, and who has proved a key at the console is
+    /// served here: nothing that others ask for is in front of a stop.
+    sessions: Runtime,
+    /// Requests, handshakes and viewers.
+    requests: Runtime,
+}
+
+impl Threads {
+    fn new() -> Result<Self, ConsoleError> {
+        let runtime = |name: &str, count| {
+            tokio::runtime::Builder::new_multi_thread()
+                .worker_threads(count)
+                .thread_name(name)
+                .enable_all()
+                .build()
+                .map_err(|e| {
+                    let what = format!("the server's threads cannot be started: {e}");
+                    ConsoleError::other(what, "end other programs, then try again")
+                })
+        };
+        Ok(Self {
+            sessions: runtime("sessions", SESSIONS)?,
+            requests: runtime("requests", REQUESTS)?,
         })
+    }
 }
 
 /// What the page draws of the robot.
@@ -381,12 +416,22 @@ impl Server {
     }
 
     #[doc(hidden)]
-    /// A worker of the server does nothing but wait for so long; for tests of what happens to the
-    /// robot then.
+    /// The server does nothing but wait for so long; for tests of what happens to the robot then.
     pub fn block_for(&self, time: Duration) {
-        if let Some(runtime) = &self.runtime {
-            for _ in 0..WORKERS {
-                runtime.spawn(async move { std::thread::sleep(time) });
+        self.block_requests_for(time);
+        if let Some(Threads { sessions, .. }) = &self.threads {
+            for _ in 0..SESSIONS {
+                sessions.spawn(async move { std::thread::sleep(time) });
+            }
+        }
+    }
+
+    #[doc(hidden)]
+    /// What serves requests and viewers does nothing but wait for so long; for tests of a stop then.
+    pub fn block_requests_for(&self, time: Duration) {
+        if let Some(Threads { requests, .. }) = &self.threads {
+            for _ in 0..REQUESTS {
+                requests.spawn(async move { std::thread::sleep(time) });
             }
         }
     }
@@ -397,8 +442,9 @@ impl Drop for Server {
         self.hub.end();
         // Time for the last words to everybody.
         std::thread::sleep(Duration::from_millis(20));
-        if let Some(runtime) = self.runtime.take() {
-            runtime.shutdown_timeout(Duration::from_millis(500));
+        if let Some(Threads { sessions, requests }) = self.threads.take() {
+            requests.shutdown_timeout(Duration::from_millis(500));
+            sessions.shutdown_timeout(Duration::from_millis(500));
         }
         if let Some(robot) = self.robot.take() {
             let _ = robot.join();
@@ -422,24 +468,58 @@ fn unmeasured(real: bool) -> BTreeMap<&'static str, &'static [&'static str]> {
     fields.collect()
 }
 
-fn bind(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), ConsoleError> {
-    let bind = || {
-        let socket = if listen.is_ipv4() {
-            TcpSocket::new_v4()?
-        } else {
-            TcpSocket::new_v6()?
+/// Listens at an address; at loopback at both that `localhost` may stand for, if the computer has them.
+fn bind_all(listen: SocketAddr) -> Result<(Vec<TcpListener>, SocketAddr), ConsoleError> {
+    let mut tries = 0;
+    loop {
+        tries += 1;
+        let (listener, address) = bind(listen)?;
+        let Some(other) = other_loopback(listen.ip()) else {
+            return Ok((vec![listener], address));
         };
-        // A server that restarts does not wait for connections of the one before.
-        #[cfg(unix)]
-        socket.set_reuseaddr(true)?;
-        // A client that reads slowly is noticed here, not seconds later.
-        socket.set_send_buffer_size(SEND_BUFFER)?;
-        socket.bind(listen)?;
-        let listener = socket.listen(BACKLOG)?;
-        let address = listener.local_addr()?;
-        Ok((listener, address))
+        let other = SocketAddr::new(other, address.port());
+        let e = match listen_at(other) {
+            Ok((second, _)) => return Ok((vec![listener, second], address)),
+            Err(e) => e,
+        };
+        // Where the computer has no such address, nobody else listens there either.
+        if e.kind() != ErrorKind::AddrInUse {
+            return Ok((vec![listener], address));
+        }
+        // Of the ports that the system gives, another may be free at both.
+        if listen.port() != 0 || tries == PORTS {
+            return Err(ConsoleError::Listen {
+                address: other.to_string(),
+                what: format!(
+                    "{e}: clients that ask for `localhost` could reach another program there"
+                ),
+                help: "end the program that listens there, or give another port with \
+                       --listen 127.0.0.1:PORT"
+                    .to_owned(),
+            });
+        }
+    }
+}
+
+fn listen_at(address: SocketAddr) -> std::io::Result<(TcpListener, SocketAddr)> {
+    let socket = if address.is_ipv4() {
+        TcpSocket::new_v4()?
+    } else {
+        TcpSocket::new_v6()?
     };
-    bind().map_err(|e: std::io::Error| ConsoleError::Listen {
+    // A server that restarts does not wait for connections of the one before.
+    #[cfg(unix)]
+    socket.set_reuseaddr(true)?;
+    // A client that reads slowly is noticed here, not seconds later.
+    socket.set_send_buffer_size(SEND_BUFFER)?;
+    socket.bind(address)?;
+    let listener = socket.listen(BACKLOG)?;
+    let address = listener.local_addr()?;
+    Ok((listener, address))
+}
+
+fn bind(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), ConsoleError> {
+    listen_at(listen).map_err(|e| ConsoleError::Listen {
         address: listen.to_string(),
         what: e.to_string(),
         help: match e.kind() {
@@ -468,15 +548,21 @@ async fn turn(hub: Arc<Hub>) {
 /// The address that a client at the other end of a connection has.
 type AddressOf = fn(SocketAddr) -> IpAddr;
 
-async fn accept(
-    listener: TcpListener,
-    server: Arc<api::Server>,
+/// What becomes of a connection.
+#[derive(Clone)]
+struct Door {
+    router: Router,
     tls: Option<TlsAcceptor>,
+    places: Arc<Places>,
+    /// Threads that serve it.
+    requests: Handle,
     address_of: AddressOf,
-) {
-    let places = Arc::new(Places::default());
-    let router = api::router(server);
+}
+
+async fn accept(listener: TcpListener, door: Door) {
     loop {
+        // Whoever connects without end waits for others between two connections.
+        tokio::task::yield_now().await;
         let (stream, peer) = match listener.accept().await {
             Ok(accepted) => accepted,
             Err(_) => {
@@ -485,49 +571,60 @@ async fn accept(
                 continue;
             }
         };
-        let ip = address_of(peer);
-        let Some(place) = places.take(ip) else {
-            // Closed at once: who holds all places loses them within seconds.
+        let ip = (door.address_of)(peer);
+        let Some(place) = door.places.take(ip) else {
+            // Closed at once.
             continue;
         };
         // Without it an answer waits for the client's acknowledgement: 40 ms.
         let _ = stream.set_nodelay(true);
         #[cfg(target_os = "linux")]
         let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
-        // A socket takes its place along.
-        let place = Arc::new(place);
-        let router = router
-            .clone()
-            .layer(Extension(Peer {
-                ip,
-                is_local: stream.local_addr().is_ok_and(|own| is_local(ip, own.ip())),
-            }))
-            .layer(Extension(Arc::clone(&place)));
-        let tls = tls.clone();
-        tokio::spawn(async move {
-            match tls {
-                None => serve(stream, router).await,
-                Some(tls) => {
-                    if let Ok(Ok(stream)) = tokio::time::timeout(HEAD, tls.accept(stream)).await {
-                        serve(stream, router).await;
+        let peer = Peer {
+            ip,
+            is_local: stream.local_addr().is_ok_and(|own| is_local(ip, own.ip())),
+        };
+        let (router, tls) = (door.router.clone(), door.tls.clone());
+        door.requests.spawn(async move {
+            // A socket takes its place along.
+            let place = Arc::new(place);
+            let served = async {
+                match tls {
+                    None => serve(stream, router, peer, &place).await,
+                    Some(tls) => {
+                        if let Ok(Ok(stream)) = timeout(HEAD, tls.accept(stream)).await {
+                            serve(stream, router, peer, &place).await;
+                        }
                     }
                 }
+            };
+            tokio::select! {
+                () = served => {}
+                () = place.lost() => {}
             }
-            drop(place);
         });
     }
 }
 
 /// Serves one connection until it ends.
-async fn serve(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
+async fn serve(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    router: Router,
+    peer: Peer,
+    place: &Arc<Place>,
+) {
+    let routes = TowerToHyperService::new(router);
+    let place = Arc::clone(place);
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(peer);
+        request.extensions_mut().insert(Arc::clone(&place));
+        routes.call(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD)
         .max_buf_size(16 * 1024)
-        .serve_connection(
-            TokioIo::new(Progressing::new(stream)),
-            TowerToHyperService::new(router),
-        )
+        .serve_connection(TokioIo::new(Progressing::new(stream)), service)
         .with_upgrades();
     let _ = connection.await;
 }

@@ -9,10 +9,11 @@ use futures_util::stream::SplitSink;
 use futures_util::{SinkExt as _, StreamExt as _};
 use serde::Deserialize;
 use serde_json::json;
+use tokio::runtime::Handle;
 use tokio::time::timeout;
 
 use crate::close::Close;
-use crate::guard::{Peer, WrongKeys};
+use crate::guard::{Peer, Place, WrongKeys};
 use crate::hub::{Hub, Role};
 use crate::keys::Keys;
 use crate::notices::Notices;
@@ -46,6 +47,8 @@ pub(crate) struct Context {
     pub(crate) wrong_keys: WrongKeys,
     /// For the person at the server.
     pub(crate) notices: Arc<Notices>,
+    /// Threads of the sessions.
+    pub(crate) sessions: Handle,
     /// Folder of the recordings.
     pub(crate) recordings: PathBuf,
     /// Others on the way can read all: nobody may drive, and no key is to be sent.
@@ -80,25 +83,56 @@ fn nonce() -> Option<[u8; 32]> {
     Some(out)
 }
 
-/// Serves one client until it is gone.
+/// Lets one client in, if it has a key. Who has none loses its place if another needs it.
 pub(crate) async fn serve(
     mut socket: WebSocket,
     context: Arc<Context>,
     host: String,
+    peer: Peer,
+    place: Arc<Place>,
+) {
+    let admitted = tokio::select! {
+        admitted = admit(&mut socket, &context, &host, peer) => admitted,
+        () = place.lost() => None,
+    };
+    let Some(admitted) = admitted.filter(|_| place.keep()) else {
+        return;
+    };
+    // Nothing that others ask is in front of its stop there.
+    let threads = context.sessions.clone();
+    threads.spawn(async move {
+        run(socket, &context, admitted, peer).await;
+        drop(place);
+    });
+}
+
+/// What a client has proved; `None`: it was refused, or is gone.
+async fn admit(
+    socket: &mut WebSocket,
+    context: &Context,
+    host: &str,
+    peer: Peer,
+) -> Option<Admitted> {
+    let mut why = match timeout(HANDSHAKE, handshake(socket, context, host)).await {
+        Ok(Ok(admitted)) => return Some(admitted),
+        Ok(Err(why)) => why?,
+        Err(_) => Close::Timeout,
+    };
+    if why == Close::WrongKey && context.wrong_keys.count(peer.ip, Instant::now()) {
+        tokio::time::sleep(LATE).await;
+        why = Close::Wait;
+    }
+    refuse(socket, why).await;
+    None
+}
+
+/// Serves one client until it is gone.
+async fn run(
+    mut socket: WebSocket,
+    context: &Context,
+    admitted: Admitted,
     Peer { ip: from, is_local }: Peer,
 ) {
-    let admitted = match timeout(HANDSHAKE, handshake(&mut socket, &context, &host)).await {
-        Ok(Ok(admitted)) => admitted,
-        Ok(Err(None)) => return,
-        Ok(Err(Some(mut why))) => {
-            if why == Close::WrongKey && context.wrong_keys.count(from, Instant::now()) {
-                tokio::time::sleep(LATE).await;
-                why = Close::Wait;
-            }
-            return refuse(&mut socket, why).await;
-        }
-        Err(_) => return refuse(&mut socket, Close::Timeout).await,
-    };
     let outbox = Arc::new(Outbox::default());
     let Admitted {
         role,
@@ -149,6 +183,8 @@ pub(crate) async fn serve(
                 };
                 let Entered { n, body, limited } = entered;
                 context.hub.ask(&asking, n, body, limited).await;
+                // Whoever sends without end waits for others between two frames.
+                tokio::task::yield_now().await;
             }
         };
         tokio::select! {

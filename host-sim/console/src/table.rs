@@ -13,8 +13,8 @@ use wheeleg_telemetry::channels;
 
 use crate::unpack::unpack;
 
-/// Samples of one piece.
-const PIECE: usize = 64;
+/// Samples of one piece: it is made at a time, and others wait for it.
+const PIECE: usize = 8;
 /// Name of the first column.
 const TIME: &str = "t_ns";
 

@@ -62,13 +62,20 @@ pub fn ensure_no_input(out: &Path, reads: &[&Path]) -> Result<(), ReportError> {
     }
 }
 
+/// Whether something stands at this path, also a link that leads nowhere: what is written to it would
+/// go wherever it leads.
+#[must_use]
+pub fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
 /// The first of `previous`, `previous-2`, … that does not exist.
 fn free_place(folder: &Path) -> PathBuf {
     let numbered = (2_u32..).map(|n| format!("{PREVIOUS}-{n}"));
     std::iter::once(PREVIOUS.to_owned())
         .chain(numbered)
         .map(|name| folder.join(name))
-        .find(|place| !place.exists())
+        .find(|place| !is_there(place))
         .unwrap_or_else(|| folder.join(PREVIOUS))
 }
 
@@ -135,7 +142,7 @@ impl Folder {
 impl Drop for Folder {
     /// Of a run that has written nothing, nothing is left.
     fn drop(&mut self) {
-        if results(self.also).any(|name| self.path.join(name).exists()) {
+        if results(self.also).any(|name| is_there(&self.path.join(name))) {
             return;
         }
         if let Some(previous) = &self.previous {
@@ -269,7 +276,7 @@ fn take(_: &File) -> std::io::Result<bool> {
 /// Moves the results in a folder to the next free `previous`, if there are any; where they are.
 fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<PathBuf>, ReportError> {
     let old: Vec<&str> = results(also)
-        .filter(|name| folder.join(name).exists())
+        .filter(|name| is_there(&folder.join(name)))
         .collect();
     if old.is_empty() {
         return Ok(None);
@@ -424,6 +431,26 @@ mod tests {
         assert!(!folder.join("axis.toml").exists());
         let kept = fs::read_to_string(folder.join("previous-2/axis.toml"));
         assert_eq!(kept.expect("kept"), "mine");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_nowhere_is_set_aside_like_a_result() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path().join("got");
+        let foreign = temporary.path().join("foreign");
+        fs::create_dir(&folder).expect("created");
+        let names = ["report.html", "summary.json", "log.mcap"];
+        for name in names.iter().chain(&["previous"]) {
+            std::os::unix::fs::symlink(&foreign, folder.join(name)).expect("a link");
+        }
+        let held = Folder::prepare(&folder, &[], &[]).expect("prepared");
+        for name in names {
+            fs::write(folder.join(name), "new").expect("written");
+            assert!(is_there(&folder.join("previous-2").join(name)), "{name}");
+        }
+        assert!(!is_there(&foreign));
+        drop(held);
     }
 
     #[test]

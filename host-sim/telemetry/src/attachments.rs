@@ -8,6 +8,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::derived::Attached;
 use super::log_file::{begins_as_log, opened};
+use super::record;
 use crate::LogError;
 
 /// Largest record that is read, bytes.
@@ -34,9 +35,7 @@ pub fn attachments(path: &Path) -> Result<Vec<Attached>, LogError> {
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { opcode, data }) if opcode == op::ATTACHMENT => {
-                if let Ok(Record::Attachment { header, data, .. }) =
-                    mcap::parse_record(opcode, data)
-                {
+                if let Some(Record::Attachment { header, data, .. }) = record::parse(opcode, data) {
                     found.push(Attached {
                         name: header.name,
                         media_type: header.media_type,

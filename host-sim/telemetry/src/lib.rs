@@ -35,6 +35,7 @@ mod memory;
 pub mod messages;
 pub mod phase;
 mod read;
+mod record;
 mod recorder;
 mod recover;
 mod registry;

@@ -13,6 +13,7 @@ use serde::de::{Deserializer as _, IgnoredAny, MapAccess, Visitor};
 
 use super::derived::{Derived, derived};
 use super::log_file::{begins_as_log, opened};
+use super::record::{self, Swelling};
 use super::samples::channels;
 use crate::LogError;
 
@@ -213,28 +214,34 @@ fn each(
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);
+    let mut swelling = Swelling::default();
     let mut topics: BTreeMap<u16, String> = BTreeMap::new();
     while let Some(event) = reader.next_event() {
         let (opcode, data) = match event {
             Ok(LinearReadEvent::ReadRequest(need)) => {
                 let read = uninterrupted(source, reader.insert(need));
-                reader.notify_read(read.map_err(|e| LogError::read(path, e))?);
+                let read = read.map_err(|e| LogError::read(path, e))?;
+                swelling.read(read);
+                reader.notify_read(read);
                 continue;
             }
             Ok(LinearReadEvent::Record { opcode, data }) => (opcode, data),
             // The place where it breaks off.
             Err(_) => return Ok(false),
         };
+        if !swelling.give(data.len()) {
+            return Ok(false);
+        }
         if opcode != op::CHANNEL && opcode != op::MESSAGE {
             continue;
         }
-        match mcap::parse_record(opcode, data) {
-            Ok(Record::Channel(channel)) => {
+        match record::parse(opcode, data) {
+            Some(Record::Channel(channel)) => {
                 // No channel of this program has a longer one.
                 let topic = Some(channel.topic).filter(|topic| topic.len() <= MAX_TOPIC);
                 topics.insert(channel.id, topic.unwrap_or_default());
             }
-            Ok(Record::Message { header, data }) => {
+            Some(Record::Message { header, data }) => {
                 // A message without its channel is no message.
                 let Some(topic) = topics.get(&header.channel_id) else {
                     return Ok(false);
@@ -248,8 +255,8 @@ fn each(
                     break;
                 }
             }
-            Ok(_) => {}
-            Err(_) => return Ok(false),
+            Some(_) => {}
+            None => return Ok(false),
         }
     }
     Ok(true)

@@ -13,6 +13,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use super::attachments::attachments;
 use super::log_file::{attach, begins_as_log, opened, options};
 use super::read::uninterrupted;
+use super::record::{self, Swelling};
 use crate::LogError;
 
 /// What [`recover`] made.
@@ -109,11 +110,18 @@ fn copy(
         .len();
     let mut source = BufReader::new(source);
     let mut reader = LinearReader::new_with_options(checked());
+    let mut swelling = Swelling::default();
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(need)) => {
                 let read = uninterrupted(&mut source, reader.insert(need));
-                reader.notify_read(read.map_err(|e| LogError::read(from, e))?);
+                let read = read.map_err(|e| LogError::read(from, e))?;
+                swelling.read(read);
+                reader.notify_read(read);
+            }
+            Ok(LinearReadEvent::Record { data, .. }) if !swelling.give(data.len()) => {
+                copy.recovered.was_whole = false;
+                break;
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 copy.take(opcode, data).map_err(failed)?;
@@ -160,12 +168,12 @@ struct Copy {
 impl Copy {
     /// Takes a record of the old log. A damaged one, such as a picture, costs nothing but itself.
     fn take(&mut self, opcode: u8, data: &[u8]) -> Result<(), McapError> {
-        match mcap::parse_record(opcode, data) {
-            Ok(Record::Schema { header, data }) => {
+        match record::parse(opcode, data) {
+            Some(Record::Schema { header, data }) => {
                 let id = self.log.add_schema(&header.name, &header.encoding, &data)?;
                 self.schemas.insert(header.id, id);
             }
-            Ok(Record::Channel(channel)) => {
+            Some(Record::Channel(channel)) => {
                 let schema = self.schemas.get(&channel.schema_id).copied();
                 self.recovered.was_whole &= channel.schema_id == 0 || schema.is_some();
                 let id = self.log.add_channel(
@@ -176,7 +184,7 @@ impl Copy {
                 )?;
                 self.channels.insert(channel.id, id);
             }
-            Ok(Record::Message { header, data }) => {
+            Some(Record::Message { header, data }) => {
                 let Some(channel_id) = self.channels.get(&header.channel_id).copied() else {
                     self.recovered.was_whole = false;
                     return Ok(());
@@ -189,8 +197,8 @@ impl Copy {
                 self.recovered.messages += 1;
                 self.recovered.last_ns = self.recovered.last_ns.max(header.log_time);
             }
-            Ok(_) => {}
-            Err(_) => self.recovered.was_whole = false,
+            Some(_) => {}
+            None => self.recovered.was_whole = false,
         }
         Ok(())
     }

@@ -11,7 +11,8 @@ mod viewers;
 mod write;
 
 pub use request::{
-    Call, MESSAGE_MAX, Malformed, Request, Setting, Subscription, parse_binary, parse_text,
+    Call, ITEMS_MAX, MESSAGE_MAX, Malformed, Request, Setting, Subscription, parse_binary,
+    parse_text,
 };
 
 pub(crate) use outbox::{Outbox, status};

@@ -1,7 +1,7 @@
 //! What waits for one viewer. Of samples and of the time the newest wins; of events the oldest go,
 //! and the viewer is told how many; a viewer that lets answers pile up is closed.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use axum::body::Bytes;
 use axum::extract::ws::Message;
@@ -90,11 +90,12 @@ impl Outbox {
         self.put(|contents| contents.messages.add(channel, data));
     }
 
-    /// Nothing of a subscription that has ended.
-    pub(crate) fn forget(&self, subscription: u32) {
+    /// Nothing of subscriptions that have ended.
+    pub(crate) fn forget(&self, ended: &BTreeSet<u32>) {
         let queue = &mut self.contents().messages;
-        queue.newest.retain(|_, d| d.subscription != subscription);
-        queue.events.retain(|d| d.subscription != subscription);
+        let goes_on = |data: &Data| !ended.contains(&data.subscription);
+        queue.newest.retain(|_, data| goes_on(data));
+        queue.events.retain(goes_on);
         queue.event_bytes = queue.events.iter().map(|d| d.payload.len()).sum();
     }
 }
@@ -197,7 +198,7 @@ mod tests {
             sent.push(subscription(&message));
         }
         assert_eq!(sent, [0, 1, 2, 0, 1, 2, 0, 1, 2]);
-        outbox.forget(1);
+        outbox.forget(&BTreeSet::from([1]));
         let rest: Vec<u32> = std::iter::from_fn(|| outbox.next())
             .map(|m| subscription(&m))
             .collect();

@@ -4,8 +4,12 @@
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::STOP_SERVICE;
+
 /// Largest message of a viewer: a list of all parameters by name.
 pub const MESSAGE_MAX: usize = 32 * 1024;
+/// Most items that a message names: more than there are parameters or channels.
+pub const ITEMS_MAX: usize = 512;
 
 /// What a viewer asks.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -58,6 +62,30 @@ pub enum Request {
     /// What this server does not offer.
     #[serde(other)]
     Other,
+}
+
+impl Request {
+    /// Whether it is a call of the one service.
+    #[must_use]
+    pub fn is_stop(&self) -> bool {
+        matches!(self, Self::Call(call) if call.service == STOP_SERVICE)
+    }
+
+    /// Items that it names.
+    #[must_use]
+    pub fn items(&self) -> usize {
+        match self {
+            Self::Subscribe { subscriptions } => subscriptions.len(),
+            Self::Unsubscribe { subscription_ids } => subscription_ids.len(),
+            Self::GetParameters {
+                parameter_names, ..
+            }
+            | Self::SubscribeParameterUpdates { parameter_names }
+            | Self::UnsubscribeParameterUpdates { parameter_names } => parameter_names.len(),
+            Self::SetParameters { parameters, .. } => parameters.len(),
+            Self::FetchAsset { .. } | Self::Call(_) | Self::Other => 1,
+        }
+    }
 }
 
 /// A channel that is wanted.

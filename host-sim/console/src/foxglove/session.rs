@@ -11,12 +11,15 @@ use tokio::time::timeout;
 use super::STOP_SERVICE;
 use super::channels;
 use super::outbox::{Outbox, status};
-use super::request::{Malformed, Request, parse_binary, parse_text};
+use super::request::{ITEMS_MAX, Malformed, parse_binary, parse_text};
 use crate::close::Close;
 use crate::hub::{Hub, Looking, StopsUnderWay};
 use crate::progress::PROGRESS;
 use crate::session::{SILENCE, send_all};
 use wheeleg_access::rate::Bucket;
+
+/// What is said to a viewer that asks too much.
+const TOO_MUCH: &str = "too many messages: at most 100 per second, and 100 KiB";
 
 /// What a viewer is offered.
 pub(crate) struct Viewing {
@@ -86,20 +89,29 @@ pub(crate) async fn serve(mut socket: WebSocket, hub: Arc<Hub>, viewing: Viewing
         let read = async {
             let mut bucket = Bucket::new(Instant::now());
             while let Ok(Some(Ok(message))) = timeout(SILENCE, input.next()).await {
-                let request = match message {
-                    Message::Text(text) => parse_text(&text),
-                    Message::Binary(bytes) => parse_binary(&bytes),
+                // Between two messages it is others' turn.
+                tokio::task::yield_now().await;
+                let mut may_ask = |bytes| bucket.take_for(bytes, Instant::now());
+                let request = match &message {
+                    // It is not even read: what it costs is its bytes.
+                    Message::Text(text) if !may_ask(text.len()) => None,
+                    Message::Text(text) => Some(parse_text(text)),
+                    Message::Binary(bytes) => match parse_binary(bytes) {
+                        // A stop is never too much.
+                        Ok(request) if !request.is_stop() && !may_ask(bytes.len()) => None,
+                        request => Some(request),
+                    },
                     Message::Ping(_) | Message::Pong(_) => continue,
                     Message::Close(_) => return,
                 };
                 match request {
-                    // A stop is never too much.
-                    Ok(stop @ Request::Call(_)) => hub.look(&looking, stop).await,
-                    Ok(_) if !bucket.take(Instant::now()) => {
-                        outbox.answer(status(1, "too many messages: at most 100 per second"));
+                    None => outbox.answer(status(1, TOO_MUCH)),
+                    Some(Ok(request)) if request.items() > ITEMS_MAX => {
+                        let text = format!("a message may name at most {ITEMS_MAX} items");
+                        outbox.answer(status(2, &text));
                     }
-                    Ok(request) => hub.look(&looking, request).await,
-                    Err(Malformed) => {
+                    Some(Ok(request)) => hub.look(&looking, request).await,
+                    Some(Err(Malformed)) => {
                         outbox.close(Close::BadFrame);
                         // The writer sends the close, and ends the session.
                         std::future::pending::<()>().await;

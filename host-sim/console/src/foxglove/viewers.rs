@@ -27,7 +27,7 @@ struct Viewer {
     /// The viewer's numbers of its subscriptions.
     subscriptions: BTreeMap<Channel, u32>,
     /// Parameters whose changes it is told.
-    parameters: BTreeSet<String>,
+    parameters: BTreeSet<Place>,
 }
 
 /// The newest message of a channel that is kept.
@@ -136,11 +136,9 @@ impl Viewers {
     /// No messages of these subscriptions from now on.
     pub(crate) fn unsubscribe(&mut self, id: ViewerId, subscriptions: &[u32]) {
         if let Some(viewer) = self.all.get_mut(&id) {
-            let ends = |number: &u32| subscriptions.contains(number);
-            viewer.subscriptions.retain(|_, number| !ends(number));
-            for number in subscriptions {
-                viewer.outbox.forget(*number);
-            }
+            let ended: BTreeSet<u32> = subscriptions.iter().copied().collect();
+            viewer.subscriptions.retain(|_, n| !ended.contains(n));
+            viewer.outbox.forget(&ended);
         }
         self.ask_for_contacts();
     }
@@ -259,11 +257,19 @@ impl Viewers {
         let Some(viewer) = self.all.get_mut(&id) else {
             return;
         };
-        for name in self.parameters.names(names) {
-            if follow {
-                viewer.parameters.insert(name.to_owned());
-            } else {
-                viewer.parameters.remove(name);
+        match (names.is_empty(), follow) {
+            // Who follows all of them already causes no work.
+            (true, true) if viewer.parameters.len() == self.parameters.places().len() => {}
+            (true, true) => viewer.parameters.clone_from(self.parameters.places()),
+            (true, false) => viewer.parameters.clear(),
+            (false, _) => {
+                for place in names.iter().filter_map(|name| self.parameters.place(name)) {
+                    if follow {
+                        viewer.parameters.insert(place);
+                    } else {
+                        viewer.parameters.remove(&place);
+                    }
+                }
             }
         }
     }
@@ -276,7 +282,7 @@ impl Viewers {
         let values = self.parameters.list(std::slice::from_ref(&name));
         let message = parameter_values(&values, None);
         for viewer in self.all.values() {
-            if viewer.parameters.contains(&name) {
+            if viewer.parameters.contains(&place) {
                 viewer.outbox.answer(message.clone());
             }
         }

@@ -9,12 +9,13 @@ use super::{Asked, Client, Inner, Pending, Role, TICKET};
 use crate::live::{Answer, Input, Status};
 use crate::messages::{outcome, refused};
 use wheeleg_access::desk::{Asker, ClientId, Denied, Ended};
+use wheeleg_access::host::SPEED_OF_CONTROL;
 use wheeleg_access::reason::Reason;
 use wheeleg_access::request::{HostCommand, Order, Spoken};
 
 const RELEASE: CommandCode = CommandCode::ReleaseControl;
-/// The holder of the control is told of one who asks for it so often at most: who asks without end
-/// fills no queue of theirs.
+/// The holder of the control is told of those who ask for it so often at most: who asks without end, on
+/// however many connections, fills no queue of theirs.
 const ASKED: Duration = Duration::from_secs(1);
 /// Time of the master in which it has answered what it accepted about the control: at its next cycle.
 const CONTROL_US: u64 = 1_000_000;
@@ -28,7 +29,7 @@ impl Inner {
         seen_us: u64,
         valid_us: u64,
     ) {
-        let Some(client) = self.clients.get_mut(&id) else {
+        let Some(client) = self.clients.get(&id) else {
             return;
         };
         if client.role != Role::Control {
@@ -69,11 +70,11 @@ impl Inner {
                         return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
                     }
                     Err(Denied::Held) => {
-                        let told = client.asked.is_some_and(|told| now - told < ASKED);
+                        let told = self.asked.is_some_and(|told| now - told < ASKED);
                         // Nobody is told for a holder who has ended; the next one is.
                         let holder = self.desk.holder().filter(|h| h.ended.is_none());
                         if let Some(holder) = holder.filter(|_| !told) {
-                            client.asked = Some(now);
+                            self.asked = Some(now);
                             let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
                             self.tell(holder.client, &asked);
                         }
@@ -144,6 +145,13 @@ impl Inner {
                 let may_break = breaks && client.is_local;
                 if !self.desk.may_command_host(id) && !may_break {
                     return self.tell(id, &self.held(n, now));
+                }
+                // The robot's thread judges the speed of a lease that was granted, not of one that will be.
+                let speeds =
+                    matches!(command, HostCommand::Speed(speed) if speed > SPEED_OF_CONTROL);
+                let mut pending = self.pending.values();
+                if speeds && pending.any(|p| matches!(p.what, Asked::Take)) {
+                    return self.tell(id, &outcome(n, self.now_us(), &Answer::TooFast));
                 }
                 let what = match &command {
                     HostCommand::Inject(fault) => Asked::Inject(*fault),

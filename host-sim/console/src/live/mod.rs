@@ -257,6 +257,13 @@ pub(crate) struct Status {
     pub(crate) stops: u64,
 }
 
+impl Status {
+    /// Whether any board has answered in the last cycle.
+    pub(crate) fn hears(&self) -> bool {
+        self.boards.iter().any(|board| board.mode.is_some())
+    }
+}
+
 /// One board.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoardStatus {

@@ -332,8 +332,13 @@ pub(crate) fn list(root: &Path, most: usize) -> Vec<(Summary, u64)> {
     names.sort_unstable_by(|a, b| b.cmp(a));
     let read = names.iter().filter_map(|name| {
         let folder = root.join(name);
+        // A link leads to what is no recording of this server.
+        let is_folder = fs::symlink_metadata(&folder).is_ok_and(|about| about.is_dir());
+        let summary = is_folder.then(|| summary(&folder).ok())??;
         let bytes = parts(&folder.join(LOG)).map(|part| fs::metadata(part).map_or(0, |m| m.len()));
-        Some((summary(&folder).ok()?, bytes.sum()))
+        // Whatever the file says.
+        let id = name.clone();
+        Some((Summary { id, ..summary }, bytes.sum()))
     });
     read.take(most).collect()
 }
@@ -371,6 +376,33 @@ mod tests {
             ControlFlow::Continue(())
         });
         (times, texts, end.expect("a log").whole)
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_recording_is_listed_by_the_name_of_its_folder_and_a_link_is_none() {
+        let home = tempfile::tempdir().expect("a folder");
+        let folder = home.path().join("0007");
+        fs::create_dir(&folder).expect("created");
+        let summary = Summary {
+            id: "\u{1b}[31m<img>".to_owned(),
+            program: String::new(),
+            robot: String::new(),
+            scenario: String::new(),
+            seed: 1,
+            begin_us: 0,
+            end_us: None,
+            hash: None,
+            dropped: 0,
+            repeatable: false,
+            failure: None,
+        };
+        let text = serde_json::to_string(&summary).expect("JSON");
+        fs::write(folder.join(SUMMARY), text).expect("written");
+        std::os::unix::fs::symlink(&folder, home.path().join("0008")).expect("a link");
+        let listed = list(home.path(), 10);
+        let ids: Vec<&str> = listed.iter().map(|(summary, _)| &*summary.id).collect();
+        assert_eq!(ids, ["0007"]);
     }
 
     #[test]

@@ -143,6 +143,50 @@ fn a_server_that_hangs_is_noticed_by_the_master() {
     assert!(after_us <= 470_000 + 60_000, "{after_us} us");
 }
 
+/// Whoever asks on a new connection each time is told of no more often.
+#[test]
+fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let begin = Instant::now();
+    let mut told = 0;
+    for number in 0..30 {
+        let mut other = rig.control(&format!("other {number}"));
+        look(&mut other, "state");
+        assert_eq!(
+            refusal(&mut other, "TakeControl", &json!({})),
+            "control_held"
+        );
+        for _ in 0..4 {
+            let asked = |heard| matches!(heard, Incoming::Json(m) if m["op"] == "asked");
+            told += u64::from(driver.read().is_some_and(asked));
+        }
+    }
+    let seconds = begin.elapsed().as_secs();
+    assert!(
+        (1..=seconds + 1).contains(&told),
+        "{told} times in {seconds} s"
+    );
+}
+
+/// Both come in one piece: the speed is judged by the lease that is about to be granted. The clock is
+/// slow, so that the grant takes its time.
+#[test]
+fn nobody_takes_control_and_speeds_up_before_it_is_granted() {
+    let rig = TestRig::paced(Some(0.1));
+    let mut client = rig.control("hurried");
+    while client.seen_us() == 0 {
+        look(&mut client, "state");
+    }
+    let take = client.give("TakeControl", &json!({}), 1_000).expect("sent");
+    let args = json!({ "speed": 5.0 });
+    let refused = refusal(&mut client, "Speed", &args);
+    // The grant may have come in between, and been passed over.
+    assert_eq!(refused, "too_fast", "{take}");
+    let state = rig.until("in control", |state| !state["control"].is_null());
+    assert_eq!(state["pace"]["speed"], 0.1);
+}
+
 #[test]
 fn a_second_client_is_refused_by_name_and_may_stop() {
     let rig = TestRig::new();
@@ -329,6 +373,22 @@ fn a_stop_that_nobody_takes_is_not_confirmed_within_200_ms() {
     };
     assert_eq!(reason, "not_confirmed");
     assert!(text.contains("cut the air"), "{text}");
+}
+
+/// Its bit would be in SYNC, but no SYNC goes out, and no board answers.
+#[test]
+fn a_stop_that_no_board_hears_is_not_confirmed() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    let fault = json!({ "fault": "master-silent" });
+    let outcome = driver.carry_out("Inject", &fault, 500).expect("sent");
+    assert_eq!(outcome, Outcome::Done);
+    rig.until("absent", |state| {
+        let boards = state["boards"].as_array().expect("a list");
+        boards.iter().all(|board| board["mode"].is_null())
+    });
+    let (status, problem) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
+    assert_eq!(status, 504, "{problem}");
 }
 
 #[test]

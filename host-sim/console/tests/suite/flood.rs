@@ -1,4 +1,4 @@
-//! Who has a key and asks without end: it costs others neither time nor memory.
+//! Who asks without end, with a key or without: it costs others neither time nor memory.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use tungstenite::client::ClientRequestBuilder;
 use tungstenite::{Message, WebSocket};
 use wheeleg_console::client::{Outcome, http};
+use wheeleg_console::foxglove::ITEMS_MAX;
 
 use crate::common::{TestRig, look};
 
@@ -28,19 +29,115 @@ fn a_short_request_has_no_endless_answer() {
     let rig = TestRig::new();
     let mut viewer = viewer(&rig);
     // Each would be told with the robot's whole description.
-    let names = vec!["/robot_description"; 1_300];
+    let names = vec!["/robot_description"; ITEMS_MAX];
     let asked = json!({ "op": "getParameters", "parameterNames": names, "id": "\"1\"" });
     viewer.send(Message::text(asked.to_string())).expect("sent");
-    let told = loop {
+    let told = heard(&mut viewer, "parameterValues");
+    assert_eq!(told["id"], "\"1\"");
+    assert_eq!(told["parameters"].as_array().expect("a list").len(), 1);
+}
+
+/// The next message of this kind.
+fn heard(viewer: &mut WebSocket<TcpStream>, op: &str) -> Value {
+    loop {
         match viewer.read().expect("not closed") {
-            Message::Text(text) if text.contains("parameterValues") => break text,
+            Message::Text(text) => {
+                let told: Value = serde_json::from_str(&text).expect("JSON");
+                if told["op"] == op {
+                    return told;
+                }
+            }
             Message::Close(frame) => panic!("closed: {frame:?}"),
             _ => {}
         }
-    };
-    let told: Value = serde_json::from_str(&told).expect("JSON");
-    assert_eq!(told["id"], "\"1\"");
-    assert_eq!(told["parameters"].as_array().expect("a list").len(), 1);
+    }
+}
+
+#[test]
+fn a_viewer_names_so_many_items_at_a_time_and_sends_so_many_bytes() {
+    let rig = TestRig::new();
+    let mut viewer = viewer(&rig);
+    let ids: Vec<usize> = (0..=ITEMS_MAX).collect();
+    for asked in [
+        json!({ "op": "unsubscribe", "subscriptionIds": ids }),
+        json!({ "op": "subscribeParameterUpdates", "parameterNames": vec!["x"; ids.len()] }),
+    ] {
+        viewer.send(Message::text(asked.to_string())).expect("sent");
+        let told = heard(&mut viewer, "status");
+        let text = told["message"].as_str().expect("a text");
+        assert!(text.contains(&ITEMS_MAX.to_string()), "{text}");
+    }
+    // Few messages, and each as long as it may be: 6 at once, and 3 a second.
+    let name = "x".repeat(31_000);
+    let asked = json!({ "op": "getParameters", "parameterNames": [name], "id": "long" });
+    let begin = Instant::now();
+    for _ in 0..40 {
+        viewer.send(Message::text(asked.to_string())).expect("sent");
+    }
+    let mut answers = 0;
+    let mut refused = 0;
+    while answers + refused < 40 {
+        match viewer.read().expect("not closed") {
+            Message::Text(text) if text.contains("parameterValues") => answers += 1,
+            Message::Text(text) if text.contains("too many") => refused += 1,
+            Message::Close(frame) => panic!("closed: {frame:?}"),
+            _ => {}
+        }
+    }
+    let most = 7 + 4 * (begin.elapsed().as_secs() + 1);
+    assert!((4..=most).contains(&answers), "{answers} {refused}");
+}
+
+/// Nothing that others ask for is in front of the stop of who has proved a key: here, all threads
+/// that serve requests and viewers are busy for seconds.
+#[test]
+fn a_stop_does_not_wait_for_what_others_ask() {
+    let rig = TestRig::new();
+    rig.until("ready", |state| state["ready"] == true);
+    let mut client = rig.view();
+    look(&mut client, "state");
+    rig.server.block_requests_for(Duration::from_secs(8));
+    let begin = Instant::now();
+    let n = client.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(client.outcome(n), Outcome::Done);
+    assert!(begin.elapsed() < Duration::from_secs(4), "it waited");
+}
+
+/// Many requests come in one piece; after the first that is refused the connection ends.
+#[test]
+fn who_has_no_key_asks_once_on_a_connection() {
+    let rig = TestRig::new();
+    let address = rig.server.address();
+    for (host, path) in [
+        ("x", "/"),
+        ("x", "/api/v1/state"),
+        (&*address.to_string(), "/api/v1/state"),
+        (&*address.to_string(), "/foxglove?token=00"),
+    ] {
+        let mut stream = TcpStream::connect(address).expect("connected");
+        let wait = stream.set_read_timeout(Some(Duration::from_secs(2)));
+        wait.expect("set");
+        let all = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n").repeat(20);
+        stream.write_all(all.as_bytes()).expect("sent");
+        let mut answers = Vec::new();
+        // What was not read ends the connection with an error.
+        let _ = stream.read_to_end(&mut answers);
+        let answers = String::from_utf8_lossy(&answers);
+        assert_eq!(answers.matches("HTTP/1.1 4").count(), 1, "{answers}");
+    }
+    // Who has one goes on asking.
+    let key = rig.keys.view.to_hex();
+    let mut stream = TcpStream::connect(address).expect("connected");
+    let wait = stream.set_read_timeout(Some(Duration::from_secs(1)));
+    wait.expect("set");
+    let asked = format!(
+        "GET /api/v1/faults HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {key}\r\n\r\n"
+    );
+    stream.write_all(asked.repeat(5).as_bytes()).expect("sent");
+    let mut answers = Vec::new();
+    let _ = stream.read_to_end(&mut answers);
+    let answers = String::from_utf8_lossy(&answers);
+    assert_eq!(answers.matches("HTTP/1.1 200").count(), 5, "{answers}");
 }
 
 /// Hundreds of questions come in one piece, over and over, on several connections.

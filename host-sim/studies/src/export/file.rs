@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::StudyError;
-use wheeleg_report::output::ensure_no_input;
+use wheeleg_report::output::{ensure_no_input, is_there};
 
 /// The first of `FILE.previous`, `FILE.previous-2`, … that does not exist.
 fn free_place(path: &Path) -> PathBuf {
@@ -17,7 +17,7 @@ fn free_place(path: &Path) -> PathBuf {
     std::iter::once(".previous".to_owned())
         .chain(numbered)
         .map(|suffix| named(&suffix))
-        .find(|place| !place.exists())
+        .find(|place| !is_there(place))
         .unwrap_or_else(|| named(".previous"))
 }
 
@@ -71,10 +71,11 @@ fn is_device(path: &Path) -> bool {
 pub fn make_room(path: &Path, reads: &[&Path]) -> Result<(), StudyError> {
     ensure_no_input(path, reads)?;
     let kind = match std::fs::metadata(path) {
-        Err(_) => None,
+        Err(_) if !is_there(path) => None,
         Ok(about) if about.is_dir() => Some(std::io::ErrorKind::IsADirectory.into()),
         Ok(about) if !about.is_file() => Some(std::io::Error::other("it is not a file")),
-        Ok(_) => {
+        // A file, or a link that leads nowhere.
+        Ok(_) | Err(_) => {
             let previous = free_place(path);
             std::fs::rename(path, &previous)
                 .map_err(|e| StudyError::output("set aside", path, e))?;
@@ -126,6 +127,14 @@ mod tests {
             let refused = write_new(&pipe, "x", &[]).expect_err("nobody reads it");
             assert!(refused.to_string().contains("not a file"), "{refused}");
             assert!(Path::new("/dev/full").exists() && !Path::new("/dev/null.previous").exists());
+        }
+        #[cfg(unix)]
+        {
+            let [link, foreign] = ["link", "foreign"].map(|name| temporary.path().join(name));
+            std::os::unix::fs::symlink(&foreign, &link).expect("a link that leads nowhere");
+            write_new(&link, "x", &[]).expect("written");
+            assert!(link.symlink_metadata().expect("a file").is_file());
+            assert!(is_there(&temporary.path().join("link.previous")) && !is_there(&foreign));
         }
         let error = write_new(temporary.path(), "x", &[]).expect_err("a folder");
         assert!(error.to_string().contains("cannot write"), "{error}");

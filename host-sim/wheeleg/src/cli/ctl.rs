@@ -188,14 +188,15 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     if reach.json {
         return Ok(print(&format!("{state:#}\n"))?);
     }
+    // A false server may have written it, and a file keeps it for a terminal.
     let word = |value: &Value| match value {
-        Value::String(text) => text.clone(),
+        Value::String(text) => plain(text),
         Value::Null => "none".to_owned(),
-        other => other.to_string(),
+        other => plain(&other.to_string()),
     };
     let pace = match &state["pace"]["speed"] {
         Value::Null => "max".to_owned(),
-        speed => speed.to_string(),
+        speed => word(speed),
     };
     let mut text = String::new();
     let _ = writeln!(
@@ -203,14 +204,14 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
         "{}, {:.2} s after power-up, boards ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
         word(&state["robot"]),
         state["master_us"].as_f64().unwrap_or(0.0) * 1e-6,
-        state["ready"],
-        state["armed"],
+        word(&state["ready"]),
+        word(&state["armed"]),
         word(&state["phase"]),
-        state["step"],
+        word(&state["step"]),
         word(&state["hold"]),
         holder(&state).unwrap_or_else(|| "none".to_owned()),
         pace,
-        state["pace"]["paused"],
+        word(&state["pace"]["paused"]),
     );
     if let Value::Object(recording) = &state["recording"] {
         let _ = match &recording["failure"] {
@@ -231,7 +232,8 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
         );
     }
     for board in state["boards"].as_array().into_iter().flatten() {
-        let _ = writeln!(text, "board {}  {}", board["address"], word(&board["mode"]));
+        let (address, mode) = (word(&board["address"]), word(&board["mode"]));
+        let _ = writeln!(text, "board {address}  {mode}");
         for fault in board["faults"].as_array().into_iter().flatten() {
             let (cause, remedy) = (word(&fault["cause"]), word(&fault["remedy"]));
             let _ = writeln!(text, "         {cause} {remedy}");
@@ -287,7 +289,7 @@ fn holder(state: &Value) -> Option<String> {
     if let Some(name) = control["holder"].as_str() {
         let ended = control["ended"].as_str();
         let ended = ended.map(|why| format!(" ({why}, lease not over)"));
-        return Some(format!("{}{}", plain(name), ended.unwrap_or_default()));
+        return Some(plain(&format!("{name}{}", ended.unwrap_or_default())));
     }
     let name = state["reserved_for"]["name"].as_str()?;
     Some(format!("reserved for {}", plain(name)))

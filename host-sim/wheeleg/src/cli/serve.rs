@@ -112,12 +112,12 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
     let folder = keys::folder()?;
-    let open = if args.new_key {
-        Keys::renew
+    let keys = if args.new_key {
+        Keys::draw()?
     } else {
-        Keys::open
+        Keys::open(&folder)?
     };
-    let keys = open(&folder)?;
+    let new_keys = args.new_key.then(|| keys.clone());
     let (control, view) = (keys.control.to_hex(), keys.view.to_hex());
     let live = Live {
         speed: match args.speed {
@@ -150,6 +150,10 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     };
     // Until here a signal ends the program at once: a file that is given may be a pipe.
     let prepared = Prepared::new(options)?;
+    // Only now: a server that does not start takes no key from the one that runs.
+    if let Some(keys) = new_keys {
+        keys.replace(&folder)?;
+    }
     stop.begin();
     let server = prepared.start()?;
     let url = server.url();
