@@ -323,7 +323,7 @@ mod tests {
             ..options(&[&path])
         };
         for (options, word) in [
-            (part(5.0, 6.0), "no sample"),
+            (part(5.0, 6.0), "from 5 s to 6 s; the log ends at 1.00 s"),
             (part(2.0, 1.0), "not part"),
             (part(f64::NAN, 1.0), "not part"),
             (
