@@ -85,7 +85,7 @@ def cause(browser, program, folder):
     for report, place in [("log.html", "h1"), ("report.html", "header .verdict")]:
         page = opened(browser, (run / report).resolve(), 1280, 720, "light")
         told = page.inner_text(place)
-        expect(told.rstrip(".") == "joint 3: the position sensor reads outside its range, at 3.00 s", f"{report}: {told!r}")
+        expect(told.rstrip(".") == "Joint 3: the position sensor reads outside its range, at 3.00 s", f"{report}: {told!r}")
         expect("potentiometer wiring" in page.inner_text("header"), f"{report} does not say what to do")
         page.screenshot(path=folder / f"cause-{report}.png")
         readings = lambda: page.inner_text(".readings")

@@ -427,6 +427,13 @@ fn tuning_gives_a_section_that_a_run_accepts() {
     let found = summary["found_t_on_ms"].as_f64().expect("found");
     assert!((found - 3.5).abs() < 0.3, "{found}");
 
+    // Before any table stands what came of it, and the figure that shows it, once.
+    let page = fs::read_to_string(out.join("report.html")).expect("written");
+    let places =
+        ["class=\"verdict\"", "<figure id=\"step-100\"", "<table"].map(|part| page.find(part));
+    assert!(places[0].is_some() && places.is_sorted(), "{places:?}");
+    assert_eq!(page.matches("id=\"step-100\"").count(), 1);
+
     // The section in the place of the robot's own.
     let section = fs::read_to_string(out.join("node-parameters.toml")).expect("written");
     let robot = source("robots/wheeleg-2003.toml");

@@ -324,6 +324,9 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         "PASS",
         "The position sensor reads outside its range",
         "detected 0.9 to 3.1, axis 4.1, all 35, physical ",
+        "in the one row that was run",
+        "wheeleg run three-step --seed ",
+        "wheeleg view again",
     ] {
         assert!(page.contains(words), "{words}");
     }

@@ -29,6 +29,10 @@ fn page_pictures_and_tables_are_written_and_earlier_ones_kept() {
     assert_eq!(kept, "earlier");
 
     let page = fs::read_to_string(out.join("report.html")).expect("page");
+    // The main figure comes before any table, and once.
+    let (figure, table) = (page.find("<figure"), page.find("<table"));
+    assert!(figure.is_some() && figure < table, "{figure:?} {table:?}");
+    assert_eq!(page.matches("id=\"fig5-argument\"").count(), 1);
     let links = page.replace("http://www.w3.org/2000/svg", "");
     for forbidden in ["http:", "https:", "src=", "@import", "url("] {
         assert!(!links.contains(forbidden), "{forbidden}");

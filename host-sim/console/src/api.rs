@@ -22,7 +22,7 @@ use wheeleg_telemetry::channel_index;
 
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Peer, Place};
-use crate::hub::LONGEST_S;
+use crate::hub::{LONGEST_S, StopBy};
 use crate::page::Page;
 use crate::record::folder;
 use crate::session::{self, Context};
@@ -479,7 +479,7 @@ async fn recordings(State(server): State<Arc<Server>>) -> Response {
 }
 
 async fn stop(State(server): State<Arc<Server>>) -> Response {
-    match server.context.hub.stop().await {
+    match server.context.hub.stop(StopBy::Api).await {
         Some(now_us) => json_text(json!({ "stopped": true, "master_us": now_us }).to_string()),
         None => problem(
             StatusCode::GATEWAY_TIMEOUT,

@@ -38,7 +38,10 @@ const LOOK: Duration = Duration::from_millis(10);
 /// [`ConsoleError::Link`] if there is no answer, or if others could read the key on its way.
 pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Value), ConsoleError> {
     if url.is_exposed() {
-        return Err(url.error("over plain HTTP a key could be intercepted: only `ctl watch` and `ctl stop` work without one"));
+        return Err(url.error_with(
+            "over plain HTTP a key could be intercepted: only `ctl watch` and `ctl stop` work without one",
+            "check the address after --url; of another computer give https:// and --fingerprint, as its `wheeleg serve` prints them",
+        ));
     }
     let mut stream = url.stream()?;
     // In this version an answer of unknown length comes in one piece.

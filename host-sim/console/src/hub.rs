@@ -5,6 +5,7 @@ mod control;
 mod history;
 mod samples;
 mod state;
+mod stops;
 mod viewers;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -19,6 +20,7 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
 use self::history::{History, Reader};
+use self::stops::Stopped;
 use crate::catalogue::Catalogue;
 use crate::close::Close;
 use crate::foxglove::Viewers;
@@ -165,6 +167,8 @@ struct Inner {
     /// The newest events, each as it was told.
     events: VecDeque<Utf8Bytes>,
     faults: Vec<(FaultSpec, u64)>,
+    /// The stop that is latched, or has just been asked for.
+    stopped: Option<Stopped>,
     status: Option<Status>,
     failure: Option<String>,
     state_due: Instant,
@@ -179,6 +183,7 @@ struct Channels {
 }
 
 pub(crate) use history::LONGEST_S;
+pub(crate) use stops::StopBy;
 pub(crate) use viewers::Looking;
 
 /// The hub.
@@ -232,6 +237,7 @@ impl Hub {
                 arrived: channels().iter().map(|_| Arrived::default()).collect(),
                 events: VecDeque::with_capacity(EVENTS),
                 faults: Vec::new(),
+                stopped: None,
                 status: None,
                 failure: None,
                 state_due: now,
@@ -314,7 +320,7 @@ impl Hub {
             let under_way = asking.stops.begin().await;
             let hub = Arc::clone(self);
             tokio::spawn(async move {
-                let answer = match hub.stop().await {
+                let answer = match hub.stop(StopBy::Client(id)).await {
                     Some(now_us) => done(n, now_us),
                     None => refused(
                         n,
@@ -363,8 +369,10 @@ impl Hub {
     }
 
     /// Stops the robot; the master time at which it was confirmed, or `None` after 200 ms.
-    pub(crate) async fn stop(&self) -> Option<u64> {
+    pub(crate) async fn stop(&self, by: StopBy) -> Option<u64> {
+        // First the stop, which waits for no lock, and then its name.
         let number = self.signals.stop();
+        self.inner().stopped_by(by, number);
         let mut stops = self.stops.subscribe();
         let confirmed = stops.wait_for(|stops| stops.taken >= number && stops.sent);
         let confirmed = tokio::time::timeout(Duration::from_millis(200), confirmed).await;

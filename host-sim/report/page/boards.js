@@ -3,6 +3,16 @@ import { html, say, sign } from "./dom.js";
 
 export const LINKS = [1, 2, 3, 4, 5, 6, 7, 8].map((board) => `/link/${board}`);
 const NAMES = ["left yaw", "left horizontal", "left vertical", "right yaw", "right horizontal", "right vertical", "left wheel", "right wheel"];
+
+/** What is at a board. @param {number} board */
+export const named = (board) => NAMES[board - 1];
+
+/** Boards at the begin of a sentence: one by its name, more by their numbers. @param {number[]} boards */
+export function titled(boards) {
+  if (boards.length > 1) return `Boards ${boards.join(", ")}`;
+  const name = named(boards[0]);
+  return `${name[0].toUpperCase()}${name.slice(1)} (board ${boards[0]})`;
+}
 /** What makes a frame unsound, each counted by the board. */
 const UNSOUND = ["overflow", "truncated", "short", "version", "length", "address"];
 const HEADS = ["Board", "Mode", "Faults", "Sound frames", "CRC errors", "Other errors", "Unsent", "Drift, ppm", "Parameters"];

@@ -126,7 +126,7 @@ export function driver(command) {
     one.addEventListener("blur", () => DIRECTIONS.forEach((d) => release(d[2])));
     return one;
   });
-  const root = html("section", { class: "panel byhand", "aria-label": "Drive by hand" }, html("h2", {}, "Drive by hand"), html("div", { class: "drive" }, html("label", {}, html("span", {}, "Moves"), means), buttons, speed.row, turn.row), gait, pad);
+  const root = html("section", { class: "panel byhand", "data-live": true, "aria-label": "Drive by hand" }, html("h2", {}, "Drive by hand"), html("div", { class: "drive" }, html("label", {}, html("span", {}, "Moves"), means), buttons, speed.row, turn.row), gait, pad);
   addEventListener("blur", stop);
 
   /** Reads the first gamepad; its stick moves nothing unless a shoulder is held. */

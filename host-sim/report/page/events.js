@@ -2,6 +2,7 @@
 // recorded. What several boards tell of one cause is one line, as on a terminal.
 import { html, say, fixed } from "./dom.js";
 import { save } from "./save.js";
+import { E_STOP, stopper } from "./words.js";
 
 /** Lines that are kept; with them the events that they are of. */
 const KEPT = 500;
@@ -12,12 +13,19 @@ const RECENT = 32;
 /** What the boards write for whoever looks for a cause in them: many lines, left out at first. */
 const LOG = "log";
 const BUT_LOG = "but log";
+/** A foot touches the ground and leaves it, a dozen times in a step: left out at first, too. */
+const CONTACT = "contact";
+/** A board's own account of a stop tells no more than the stop itself. */
+const DIAGNOSIS = "diagnosis";
 const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
 const FIRST_WHEEL = 7;
-const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "revoked_by", "text"];
+const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "revoked_by", "stopped_by", "text"];
 
 /** A board as texts of events name it. @param {number} board */
 const name = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
+
+/** On which side a wheel is; a joint has a name of its own. @param {number} board */
+const side = (board) => (board < FIRST_WHEEL ? "" : board === FIRST_WHEEL ? " (left)" : " (right)");
 
 /** Boards as a person would list them: "joints 1–6, wheel 7". @param {number[]} boards */
 function named(boards) {
@@ -30,7 +38,7 @@ function named(boards) {
       else runs.push([board, board]);
     }
     const text = runs.map(([a, b]) => (a === b ? `${a}` : `${a}–${b}`)).join(", ");
-    return of.length > 0 && `${of.length > 1 ? several : one} ${text}`;
+    return of.length > 0 && `${of.length > 1 ? several : one} ${text}${of.length === 1 ? side(of[0]) : ""}`;
   };
   const sorted = [...boards].sort((a, b) => a - b);
   const split = [listed("joint", "joints", sorted.filter((b) => b < FIRST_WHEEL)), listed("wheel", "wheels", sorted.filter((b) => b >= FIRST_WHEEL))];
@@ -43,11 +51,11 @@ function cell(value) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string, gone?: boolean}} RobotEvent */
+/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string, gone?: boolean, stopped?: import("./words.js").Stopped | null}} RobotEvent */
 /** @typedef {{events: RobotEvent[], boards: number[], before: string, after: string, root: HTMLElement, what: HTMLElement}} Line */
 
-/** List, sieve and table. */
-export function eventsView() {
+/** List, sieve and table. @param {() => string} [own] session of this page */
+export function eventsView(own = () => "") {
   /** The newest first. @type {Line[]} */
   let lines = [];
   /** Events that have come over the line, until those of before are there. @type {RobotEvent[] | null} */
@@ -56,8 +64,8 @@ export function eventsView() {
   let newest = 0;
   const missing = html("p", { class: "effect bad", role: "status", hidden: true });
   const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
-  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_LOG }, "all but logs of boards"), html("option", { value: "" }, "every kind"));
-  const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, name(b))));
+  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_LOG }, "all but logs, contacts"), html("option", { value: "" }, "every kind"));
+  const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, `${name(b)}${side(b)}`)));
   const words = html("input", { type: "search", "aria-label": "Events whose text has", placeholder: "text", size: 8, oninput: sieve });
   const count = html("span", { class: "effect", role: "status" });
   const table = html("button", { class: "btn", type: "button", onclick: () => save("wheeleg-events.csv", "text/csv", csv()) }, "Save events as CSV");
@@ -67,7 +75,7 @@ export function eventsView() {
     const { kind } = line.events[0];
     const wanted = words.value.trim().toLowerCase();
     const of = board.value === "" || (board.value === "0" ? line.events[0].board === 0 : line.events.some((event) => event.board === Number(board.value)));
-    const asked = kinds.value === "" || (kinds.value === BUT_LOG ? kind !== LOG : kind === kinds.value);
+    const asked = kinds.value === "" || (kinds.value === BUT_LOG ? kind !== LOG && kind !== CONTACT : kind === kinds.value);
     return of && asked && line.what.textContent.toLowerCase().includes(wanted);
   }
   function sieve() {
@@ -81,7 +89,7 @@ export function eventsView() {
   /** Every event whose line is shown, each as it was recorded, the oldest first. */
   function csv() {
     const events = lines.filter((line) => !line.root.hidden).flatMap((line) => line.events).sort((a, b) => a.t_ns - b.t_ns);
-    return `${[COLUMNS, ...events.map((event) => COLUMNS.map((column) => event[column]))].map((row) => row.map(cell).join(",")).join("\n")}\n`;
+    return `${[COLUMNS, ...events.map((event) => COLUMNS.map((column) => (column === "stopped_by" ? event.stopped && stopper(event.stopped, own()) : event[column])))].map((row) => row.map(cell).join(",")).join("\n")}\n`;
   }
   /** @param {RobotEvent} event */
   function add(event) {
@@ -96,7 +104,8 @@ export function eventsView() {
     /** @param {Line} line */
     const alike = (line) => {
       const [other] = line.events;
-      return line.before === before && line.after === after && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
+      const same = line.after === after || (event.code === DIAGNOSIS && event.fault === E_STOP);
+      return line.before === before && same && line.boards.length > 0 && !line.boards.includes(event.board) && ["kind", "code", "detail", "fault"].every((name) => other[name] === event[name]);
     };
     const known = at < 0 ? undefined : lines.find((line, i) => i < RECENT && Math.abs(event.t_ns - line.events[0].t_ns) <= ALIKE_NS && alike(line));
     if (known) {
@@ -106,8 +115,8 @@ export function eventsView() {
       known.root.hidden = !fits(known);
       return tell();
     }
-    const who = [event.holder, event.revoked_by && `revoked by ${event.revoked_by}`].filter(Boolean).join(", ");
-    const line = { events: [event], boards: at < 0 ? [] : [event.board], before, after: who ? `${after} (${who})` : after, what: html("span"), root: html("li", { class: event.kind === "fault" ? "bad" : "" }) };
+    const who = [event.holder, event.revoked_by && `revoked by ${event.revoked_by}`, event.stopped && `by ${stopper(event.stopped, own())}`].filter(Boolean).join(", ");
+    const line = { events: [event], boards: at < 0 ? [] : [event.board], before, after: who ? `${after} (${who})` : after, what: html("span"), root: html("li", { class: event.kind === "fault" && event.code !== "faults_cleared" ? "bad" : "" }) };
     say(line.what, shown(line));
     line.root.append(html("time", {}, fixed(event.t_ns * 1e-9, 2)), line.what);
     line.root.hidden = !fits(line);
@@ -117,7 +126,7 @@ export function eventsView() {
     tell();
   }
   return {
-    root: html("section", { class: "panel eventlist", "aria-label": "Events of the robot" }, html("h2", {}, "Events"), html("div", { class: "row" }, kinds, board, words), html("div", { class: "row" }, table, count), missing, list),
+    root: html("section", { class: "panel eventlist", "aria-label": "Events of the robot" }, html("h2", {}, "Events"), html("div", { class: "row sieve" }, kinds, board, words), html("div", { class: "row" }, table, count), missing, list),
     /** @param {RobotEvent} event */
     add(event) {
       first?.push(event);

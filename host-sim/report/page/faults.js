@@ -1,17 +1,25 @@
 // Faults on the console's page: what is wrong with the robot, and what to do about it; and faults that
 // somebody tries on a simulated one.
 import { html, say, sign, fixed } from "./dom.js";
+import { named, titled } from "./boards.js";
+import { E_STOP, filled, stopper } from "./words.js";
 
 /** Boards by their address from 1 on, as the target of a fault names them. */
 const BOARDS = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8"];
+const GO_ON = "press Clear fault and Ready";
 /** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
 const HOLDS = {
   operator_lost: ["Operator lost: the robot holds.", "Press Take control, Clear fault and Ready."],
+  supply_lost: ["Supply pressure lost", `Check compressor, hose and regulator; with the air back ${GO_ON}.`],
+  board_lost: ["A board does not answer: the robot holds.", `Check its cable and its power, then ${GO_ON}.`],
+  board_disarmed: ["A board has restarted: the robot holds.", `Check its power, then ${GO_ON}.`],
+  layer_one_stalled: ["The gait gave nothing for 0.1 s: the robot holds.", `To go on ${GO_ON}.`],
+  layer_one_gone: ["The gait has stopped by itself: the robot holds.", `To go on ${GO_ON}.`],
 };
-const LOST = "The operator saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
-/** The boards' fault EmergencyStop, and how it is ended on this page. */
-const E_STOP = 39;
-const AFTER_STOP = "Remove the cause, then press Clear fault, and Ready once the reservoir is full.";
+const LOST = "You saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
+/** Who loses control again so soon has a computer that is too slow for it. */
+const TOO_SLOW = "Close other programs, or drive from another computer.";
+const WATCHING = "With the view key you can only watch, and stop.";
 /** A pause of the page, or of the line, that is shorter does not lose an operator, ms. */
 const PAUSE_MS = 250;
 /** What was longer ago is not why an operator is lost now, ms. */
@@ -49,6 +57,12 @@ export class Pauses {
   }
 }
 
+/** A target by the name that the page has for it. @param {string} place */
+function placed(place) {
+  const board = BOARDS.indexOf(place) + 1;
+  return board === 0 ? place : `${place}: ${named(board)}`;
+}
+
 /** Injected faults that act on one of these boards, or on no board of its own. @param {string[]} faults @param {number[]} boards */
 const acting = (faults, boards) =>
   faults.filter((fault) => {
@@ -63,50 +77,78 @@ function told({ holder, revoked_by, gone }) {
   return gone ? `The connection of ${holder} has ended: its page was closed or reloaded, or its program has ended.` : "";
 }
 
-/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault
- * @param {() => boolean} looks whether who sees it may only look */
-export function faultsView(ours, looks) {
+/** How this page has lost its control: when, how long it had had it, and how often within a minute.
+ * @typedef {{at_ms: number, kept_ms: number, times: number, why: string}} Loss */
+/** @typedef {{session: string, looks: boolean, air_bar: number, full_bar: number, lost: Loss | null}} Here of this page, and what it knows of the air */
+
+/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault */
+export function faultsView(ours) {
   const list = html("ul", { class: "faults" });
-  /** Why the operator was lost, as found when that was seen. */
-  let why = "";
   /** The newest loss of an operator. @type {import("./events.js").RobotEvent | null} */
   let loss = null;
   let shown = "";
-  const inTheWay = (faults) => faults.map((fault) => html("p", {}, `Injected${ours(fault) ? " by you" : ""}: `, html("code", {}, fault), ". Press End under Faults to try, then Clear fault."));
-  const card = (title, remedy, injected, number) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${title}`), html("p", {}, remedy), inTheWay(injected), number && html("small", {}, number));
+  /** Whether who sees it may only look, as it was told last. */
+  let looks = false;
+  const inTheWay = (faults) => faults.map((fault) => html("p", {}, `Injected${ours(fault) ? " by you" : ""}: `, html("code", {}, fault), looks ? "." : ". Press End under Faults to try, then Clear fault."));
+  const card = (title, remedy, injected = [], number = "") => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${title}`), remedy && html("p", {}, remedy), inTheWay(injected), number && html("small", {}, number));
+  const again = ({ times, kept_ms }) => (times > 1 ? ` That was ${fixed(kept_ms / 1000)} s after you had taken it, and ${times} times within a minute. ${TOO_SLOW}` : "");
+  /** Why nobody drives any more. @param {Here} here */
+  function whyLost({ lost }) {
+    if (lost) return `${(loss && told(loss)) || lost.why}${again(lost)}`;
+    if (loss && told(loss)) return told(loss);
+    return `${loss?.holder ? `“${loss.holder}”, in control until then,` : "Whoever was in control"} saw nothing new for 0.4 s.`;
+  }
+  /** A robot that holds, and no board says why. @param {any} state @param {Here} here @param {boolean} alone nothing else is told */
+  function held(state, here, alone) {
+    const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold.replaceAll("_", " ")}.`, `Fix what the boards and events report, then ${GO_ON}.`];
+    const lost = state.hold === "operator_lost";
+    const missing = state.boards.filter((b) => !b.present).map((b) => b.address);
+    let title = cause;
+    if (state.hold === "supply_lost") title = `${cause}${filled(here) && `: ${filled(here)}`}. The robot holds.`;
+    if (state.hold === "board_lost" && missing.length > 0) title = `${titled(missing)}: no answer. The robot holds.`;
+    const next = here.looks ? `Whoever has the control key must go on. ${WATCHING}` : remedy;
+    return card(title, lost ? `${whyLost(here)} ${next}` : next, alone && !lost ? state.faults : []);
+  }
+  /** A stop that somebody pressed. @param {any} state @param {Here} here @param {number[]} boards */
+  function stopCard(state, here, boards) {
+    const { stopped } = state;
+    const by = stopped && stopper(stopped, here.session);
+    const title = stopped ? `Stopped by ${by}, at ${fixed(stopped.at_us * 1e-6)} s.` : "Stopped.";
+    const next = here.looks ? WATCHING : `${by && by !== "you" ? "Make sure that nobody needs the robot to stand still, then press" : "To go on press"} Clear fault, then Ready, which waits for the air.`;
+    return card(title, next, [], `${boards.length > 0 ? `${titled(boards)}: ` : ""}EmergencyStop, number ${E_STOP}`);
+  }
   return {
     root: html("section", { class: "panel faultlist", "data-live": true }, html("h2", {}, "Faults"), list),
     /** @param {import("./events.js").RobotEvent} event */
     event(event) {
       if (event.code !== "hold" || event.detail !== "operator_lost" || event.number <= (loss?.number ?? 0)) return;
       loss = event;
-      why = told(event);
       shown = "";
     },
-    /** One line for what many boards have. @param {any} state @param {boolean} drove whether this page was in control @param {Pauses} pauses */
-    state(state, drove, pauses) {
-      const key = JSON.stringify([state.hold, state.faults, state.boards.map((b) => b.faults)]);
+    /** One line for what many boards have. @param {any} state @param {Here} here */
+    state(state, here) {
+      const air = state.hold === "supply_lost" ? filled(here) : "";
+      const key = JSON.stringify([state.hold, state.stopped, state.faults, state.boards.map((b) => [b.present, b.faults]), here.lost, air]);
       if (key === shown) return;
       shown = key;
-      if (state.hold !== "operator_lost") why = "";
-      // The event of it may come a moment later, and then counts.
-      else if (why === "") why = (loss && told(loss)) || (drove ? pauses.reason() : LOST);
+      ({ looks } = here);
       const rows = new Map();
       for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
-      const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold?.replaceAll("_", " ")}.`, "Fix what the boards and events report, then clear the fault and press Ready."];
-      // A stop is told by the boards.
-      const held = state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault";
-      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${of.length > 1 ? "Boards" : "Board"} ${of.join(", ")}: ${f.cause}`, f.number === E_STOP && !looks() ? AFTER_STOP : f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));
-      // Who holds on to a fault of their own is told once.
-      if (held) cards.unshift(card(cause, `${why} ${looks() ? "" : remedy}`.trim(), cards.length > 0 || state.hold === "operator_lost" ? [] : state.faults, ""));
+      const stop = rows.get(E_STOP);
+      rows.delete(E_STOP);
+      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${titled(of)}: ${f.cause}`, f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));
+      // A stop and a board's fault are told by the boards.
+      if (state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault") cards.unshift(held(state, here, cards.length === 0));
+      if (here.lost && state.hold !== "operator_lost") cards.unshift(card(`You lost control${here.lost.times > 1 ? " again" : ""}.`, `${here.lost.why}${again(here.lost)} Press Take control.`));
+      if (stop || state.emergency_stop) cards.unshift(stopCard(state, here, stop?.boards ?? []));
       list.replaceChildren(...(cards.length > 0 ? cards : [html("li", { class: "none" }, sign("met"), " No board has a fault.")]));
     },
   };
 }
 
-/** Faults to try. `command` gives one to the robot and shows its answer here, too.
- * @param {(name: string, args: Object<string, any>, beside: HTMLElement) => Promise<boolean>} command */
-export function faultsToTry(command) {
+/** Faults to try. `command` gives one to the robot and shows its answer here, too; `next` is what is pressed after the last one has ended.
+ * @param {(name: string, args: Object<string, any>, beside: HTMLElement) => Promise<boolean>} command @param {() => HTMLElement} next */
+export function faultsToTry(command, next) {
   /** Those that this page has injected. @type {Set<string>} */
   const ours = new Set();
   /** @type {any[]} */
@@ -122,7 +164,7 @@ export function faultsToTry(command) {
   function choose() {
     const { places, value: number, effect: what } = chosen();
     const before = target.value;
-    target.replaceChildren(...places.map((place) => html("option", { selected: place === before }, place)));
+    target.replaceChildren(...places.map((place) => html("option", { value: place, selected: place === before }, placed(place))));
     target.hidden = places.length === 0;
     value.hidden = !number;
     value.value = "";
@@ -151,7 +193,10 @@ export function faultsToTry(command) {
     state(faults) {
       if (active.dataset.active === faults.join()) return;
       active.dataset.active = faults.join();
+      const focused = active.contains(document.activeElement);
       active.replaceChildren(...faults.map((fault) => html("li", {}, fault, html("button", { class: "btn", type: "button", onclick: () => command("EndFault", { fault }, answer) }, "End"))));
+      // Whoever pressed one with the keyboard goes on from here, not from the page's begin.
+      if (focused) (active.querySelector("button") ?? next()).focus();
     },
   };
 }

@@ -62,7 +62,7 @@ export function jointCard(name, board, ask) {
       const shade = (bar) => (Number.isNaN(bar) ? 0 : Math.min(1, Math.max(0, (bar - 1) / 6)).toFixed(2));
       // Of real boards neither pressures nor valves are known, but what their law asks for.
       const simulated = !Number.isNaN(s.pressure_a_bar);
-      const air = simulated ? `A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar (simulated)` : `drive ${fixed(100 * s.drive, 0)} %`;
+      const air = simulated ? `A ${fixed(s.pressure_a_bar)}, B ${fixed(s.pressure_b_bar)} bar absolute (simulated)` : `drive ${fixed(100 * s.drive, 0)} %`;
       set(chamber.a, { width: at - 14, "fill-opacity": shade(s.pressure_a_bar) });
       set(chamber.b, { x: at + 7, width: 214 - at - 7, "fill-opacity": shade(s.pressure_b_bar) });
       for (const v of valves) v.toggleAttribute("hidden", !simulated);

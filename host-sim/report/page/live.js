@@ -10,17 +10,30 @@ import { driver } from "./drive.js";
 import { isBlind, jointCard } from "./joint.js";
 import { eventsView } from "./events.js";
 import { parametersView } from "./parameters.js";
-import { refusal } from "./words.js";
+import { BROWSER, filled, refusal } from "./words.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
 const BEAT_MS = 50;
+/** The page is drawn so often at most, and on a slow computer at least, ms. */
+const FRAME_MS = 25;
+const LONGEST_APART_MS = 100;
+/** Frames are a little early or late, ms. */
+const BEFORE_MS = 5;
+/** A computer that takes longer to draw is slow, ms: it draws the lesser parts once in so many drawings. */
+const SLOW_MS = 45;
+const LESSER = 4;
 /** Who asked for the control longer ago may not wait for it any more. */
 const ASKED_MS = 20000;
 /** How often the line is measured. */
 const ECHO_MS = 100;
-/** Who was in control so shortly ago may be who was lost, ms. */
-const DROVE_MS = 5000;
+/** Losses of the control are counted within so long, ms. */
+const LOSSES_MS = 60000;
+/** Ready waits for the air so long, and asks again so often where nobody measures it, ms. */
+const AIR_MS = 90000;
+const ASK_AIR_MS = 2000;
+/** In a list of plain questions and answers: how often it is looked at. */
+const LOOK_MS = 100;
 const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
 const WHEELS = ["/wheel/7", "/wheel/8"];
 const AIR = "/supply";
@@ -36,7 +49,7 @@ function identity() {
   }
   const key = sessionStorage.getItem("key");
   const role = sessionStorage.getItem("role") === "control" ? "control" : "view";
-  return key ? { key, role, name: "browser" } : null;
+  return key ? { key, role, name: BROWSER } : null;
 }
 
 /** Newest values by channel, and when the newest sample came.
@@ -59,34 +72,71 @@ const button = (name, hint, act) => html("button", { class: "btn", type: "button
 /** Code and layer of each command, by its name. @type {Map<string, string>} */
 const codes = new Map();
 const answer = html("p", { class: "answer", role: "status" }, "No command sent yet.");
+/** What the robot is like, for words. */
+const around = () => ({ air_bar: air_bar(), full_bar, injected: now.state?.faults ?? [], lost_s: loss ? (performance.now() - loss.at_ms) / 1000 : null });
 /** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
 function tell(what, given, places = [answer]) {
   const { status, reason, holder } = given;
   const held = holder ? ` (${holder} is in control)` : "";
   // A command that ran for long and was ended was not refused.
   const verdict = reason === "interrupted" ? "ended early" : "refused";
-  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${refusal(what, given, { air_bar: air_bar(), injected: now.state?.faults ?? [] })}${held}`;
+  const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${refusal(what, given, around())}${held}`;
   const code = codes.get(what);
   for (const place of places) {
-    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`, code ? html("small", {}, ` ${code}`) : "");
+    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
+    place.title = code ? `${what} ${code}` : "";
     place.classList.toggle("bad", status !== "done");
   }
 }
+/** How many commands this page has given. */
+let commanded = 0;
 /** @param {string} name @param {Object<string, any>} [args] @param {() => void} [taken] @param {HTMLElement[]} [beside] shows the answer, too */
 async function command(name, args, taken, beside = []) {
+  commanded += 1;
+  const places = [answer, ...beside];
+  const given = await ask(name, args, taken, places);
+  if (given) tell(name, given, places);
+  return given?.status === "done";
+}
+/** The same without a word about its end. @param {string} name @param {Object<string, any>} [args] @param {() => void} [taken] @param {HTMLElement[]} [places] */
+async function ask(name, args, taken, places = []) {
   if (!link) {
     say(answer, `${name}: not sent, there is no connection.`);
-    return false;
+    return null;
   }
-  const places = [answer, ...beside];
   for (const place of places) say(place, `${name} …`);
+  // Who gives the control away does not lose it.
+  if (GIVE_AWAY.has(name)) gave = true;
   const given = await link.command(name, args, taken);
-  tell(name, given, places);
-  return given.status === "done";
+  if (GIVE_AWAY.has(name) && given.status !== "done") gave = false;
+  return given;
 }
-/** One after the other; ends at the first refusal. @param {string[]} names */
-async function inTurn(...names) {
-  for (const name of names) if (!(await command(name))) return;
+/** Arms; where the reservoir is not full it waits for the air, until another command is given. */
+async function arm() {
+  if (!link) return command("Arm");
+  commanded += 1;
+  const [turn, end_ms] = [commanded, performance.now() + AIR_MS];
+  say(answer, "Arm …");
+  for (;;) {
+    const given = await ask("Arm");
+    if (!given || turn !== commanded) return false;
+    if (given.reason !== "no_air" || performance.now() > end_ms) {
+      tell("Arm", given);
+      return given.status === "done";
+    }
+    const asked_ms = performance.now();
+    answer.classList.remove("bad");
+    // A full reservoir whose switch is open has lost its source: that is asked about seldom, too.
+    while (performance.now() < asked_ms + LOOK_MS || (performance.now() < asked_ms + ASK_AIR_MS && !(air_bar() >= full_bar))) {
+      say(answer, `Ready waits for air${filled(around()) && `: ${filled(around())}`}. Any other button ends the wait.`);
+      await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+      if (turn !== commanded || !link) return false;
+    }
+  }
+}
+async function getReady() {
+  if (!mine() && !(await command("TakeControl"))) return;
+  if (await arm()) await command("Stand");
 }
 
 // ---- stop ----
@@ -95,6 +145,7 @@ const UNCONFIRMED_MS = 200;
 const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", { class: "key" }, "Esc"));
 async function stop() {
   byHand.letGo();
+  commanded += 1;
   if (!link) return unconfirmed();
   const timer = setTimeout(unconfirmed, UNCONFIRMED_MS);
   const given = await link.stop();
@@ -106,10 +157,13 @@ async function stop() {
 const alarm = html("p", { class: "banner alarm", role: "alert", hidden: true }, sign("alarm"), " STOP NOT CONFIRMED: CUT THE AIR");
 function unconfirmed() {
   alarm.hidden = false;
+  // No stop of before is taken for this one.
+  answer.replaceChildren(sign("warn"), " STOP: not confirmed");
+  answer.classList.add("bad");
 }
 
 // ---- head ----
-const head = { robot: cell("Robot", true), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time"), speed: cell("Clock", true), control: cell("Control"), you: cell("You"), air: cell("Air", true) };
+const head = { robot: cell("Robot", true), mode: cell("State"), gait: cell("Gait"), link: cell("Link"), time: cell("Time", true), speed: cell("Clock", true), control: cell("Control"), you: cell("You"), air: cell("Air, absolute") };
 const banner = html("p", { class: "banner", role: "alert", hidden: true });
 
 // ---- views ----
@@ -145,6 +199,8 @@ function spacePose(robot) {
 }
 /** Pressure in the reservoir, bar; no number of real boards, none of which measures it. */
 const air_bar = () => now.of.get(AIR)?.pressure_bar ?? NaN;
+/** That at which it is full. */
+let full_bar = NaN;
 /** Sizes of the robot, and the ground if it is not level; from the server. @type {any} */
 let drawing = null;
 /** @type {any} */
@@ -183,15 +239,41 @@ async function toggleSpace() {
 const joints = JOINTS.map((name, i) => jointCard(name, i + 1, (stroke) => command("JointReference", { joint: i + 1, stroke })));
 
 // ---- faults, boards, events ----
-const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]));
-const faults = faultsView(toTry.ours, () => link?.identity.role === "view");
+const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]), () => clear);
+const faults = faultsView(toTry.ours);
 const pauses = new Pauses();
-/** When this page was last in control. */
-let drove_ms = -Infinity;
+/** Since when this page is in control. @type {number | null} */
+let took_ms = null;
+/** Commands that give the control away, and whether one was given. */
+const GIVE_AWAY = new Set(["ReleaseControl", "HandOver"]);
+let gave = false;
+/** Who has taken it away. */
+let revoker = "";
+/** How this page has lost its control, until it has it again; and when, of late. @type {import("./faults.js").Loss | null} */
+let loss = null;
+/** @type {number[]} */
+let losses = [];
+/** Sees whether this page has still its control. */
+function watchControl() {
+  const at_ms = performance.now();
+  if (mine()) {
+    took_ms ??= at_ms;
+    loss = null;
+    revoker = "";
+  } else if (took_ms !== null) {
+    if (!gave) {
+      losses = [...losses.filter((ms) => at_ms - ms < LOSSES_MS), at_ms];
+      const why = revoker ? `${revoker}, at the robot's computer, has revoked it.` : pauses.reason();
+      loss = { at_ms, kept_ms: at_ms - took_ms, times: losses.length, why };
+    }
+    took_ms = null;
+  }
+  if (took_ms === null) gave = false;
+}
 const boards = boardsView();
 /** @type {Scope | null} */
 let scope = null;
-const events = eventsView();
+const events = eventsView(() => link?.session ?? "");
 // ---- recording ----
 const record = button("Record", "", () => command(recording() ? "RecordStop" : "RecordStart"));
 const recorded = html("p", { class: "effect", role: "status" }, "Not recording.");
@@ -246,7 +328,7 @@ form.addEventListener("submit", (submit) => {
 
 // ---- what the operator does ----
 const take = button("Take control", "", () => command(mine() ? "ReleaseControl" : "TakeControl"));
-const ready = button("Ready", "take, arm, stand", () => inTurn(...(mine() ? [] : ["TakeControl"]), "Arm", "Stand"));
+const ready = button("Ready", "take, arm, stand", getReady);
 const walk = button("Walk", "straight", () => {
   if (!stepping()) return byHand.walk();
   byHand.letGo();
@@ -315,6 +397,7 @@ addEventListener("beforeunload", (event) => mine() && stepping() && event.preven
 // ---- the page ----
 function build({ robot, commands: list, faults: injectable }) {
   ({ drawing, relief } = robot);
+  full_bar = robot.full_bar ?? NaN;
   views = { side: sideView(pictures.side, robot.drawing, relief ? reliefHeights(relief) : undefined), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
   say(head.robot.value, robot.name);
   commands = list;
@@ -335,7 +418,7 @@ function build({ robot, commands: list, faults: injectable }) {
         "div",
         { class: "bar" },
         html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
-        html("div", { class: "cells", "data-live": true }, head.mode.root, head.gait.root, head.control.root, link?.identity.role === "view" && head.you.root, head.link.root, head.time.root, head.air.root, head.speed.root, head.robot.root),
+        html("div", { class: "cells", "data-live": true }, head.mode.root, head.gait.root, head.control.root, link?.identity.role === "view" && head.you.root, head.air.root, head.link.root, head.time.root, head.speed.root, head.robot.root),
         html("div", { class: "stopbox" }, stopButton),
       ),
       alarm,
@@ -345,18 +428,10 @@ function build({ robot, commands: list, faults: injectable }) {
     html(
       "main",
       {},
+      // After STOP the keyboard comes to what is done, and only then to what is seen.
       html(
         "div",
-        { class: "col" },
-        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"), !robot.simulated && html("span", {}, "attitude and forces: not measured"))), plan, html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
-        html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
-        scope?.root,
-        events.root,
-        parameters.root,
-      ),
-      html(
-        "div",
-        { class: "col" },
+        { class: "col does" },
         controls,
         faults.root,
         boards.root,
@@ -365,6 +440,15 @@ function build({ robot, commands: list, faults: injectable }) {
         html("section", { class: "panel" }, html("h2", {}, "Any command"), form),
         robot.simulated && toTry.root,
         keys,
+      ),
+      html(
+        "div",
+        { class: "col sees" },
+        html("section", { class: "panel views", "data-live": true, "aria-label": "Robot" }, html("div", { class: "side" }, pictures.side, html("p", { class: "keys" }, html("span", { class: "asked-key" }, "asked"), html("span", { class: "sensed-key" }, "sensed"), !robot.simulated && html("span", {}, "attitude and forces: not measured"))), plan, html("div", { class: "feet" }, html("figure", {}, pictures.left, html("figcaption", {}, "left foot")), html("figure", {}, pictures.right, html("figcaption", {}, "right foot")))),
+        html("section", { class: "joints", "aria-label": "Joints" }, joints.map((j) => j.root)),
+        scope?.root,
+        events.root,
+        parameters.root,
       ),
     ),
   );
@@ -393,11 +477,11 @@ function showState(state) {
   say(walk.lastElementChild, state.stepping ? "feet down" : byHand.about());
   boards.state(state);
   showRecording(state);
-  if (mine()) drove_ms = performance.now();
+  watchControl();
   const late = !mine() || !heir || performance.now() > heir.until_ms;
   if (late && !handOver.hidden && answer.textContent === asking) say(answer, "");
   handOver.hidden ||= late;
-  faults.state(state, performance.now() - drove_ms < DROVE_MS, pauses);
+  faults.state(state, { session: link?.session ?? "", looks: link?.identity.role === "view", air_bar: air_bar(), full_bar, lost: loss });
   toTry.state(state.faults);
 }
 
@@ -411,11 +495,23 @@ function permit() {
   for (const joint of joints) joint.allow(drives);
 }
 
-/** Draws the newest state, and only then counts it as seen. */
-function paint() {
+/** When the page was drawn last; the longest wait for the browser since, which is how long it takes to draw; when it was free last; how
+ * often the lesser parts were left out. Times in ms. */
+const drawing_ms = { at: -Infinity, took: 0, free: performance.now() };
+let leftOut = 0;
+/** Draws the newest state, and only then counts it as seen. What a computer takes long to draw is drawn less often, so that there is time
+ * for beats and stops; the head and the robot come first, so that the operator is not lost over the rest. @param {number} at_ms */
+function paint(at_ms) {
   requestAnimationFrame(paint);
   pauses.run(link?.late_ms() ?? 0);
-  if (!views) return;
+  drawing_ms.took = Math.max(drawing_ms.took, at_ms - drawing_ms.free);
+  drawing_ms.free = at_ms;
+  // At 60 frames a second: every other one.
+  const least_ms = Math.min(LONGEST_APART_MS, Math.max(FRAME_MS, 2 * drawing_ms.took - BEFORE_MS));
+  if (!views || at_ms - drawing_ms.at < least_ms) return;
+  const slow = drawing_ms.took > SLOW_MS;
+  drawing_ms.at = at_ms;
+  drawing_ms.took = 0;
   const silent = performance.now() - now.heard_ms;
   const age = Math.max(silent, link?.late_ms() ?? 0);
   const stale = lost !== "" || age > STALE_MS;
@@ -429,15 +525,24 @@ function paint() {
   }
   const robot = pose();
   views.side.update(robot);
-  views.top.update(robot);
-  if (space && plan.classList.contains("in-space")) space.update(spacePose(robot));
-  robot.legs.forEach((state, i) => views.feet[i].update(state));
-  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
-  scope?.paint(now.t_us * 1e-6);
+  leftOut += 1;
+  if (!slow || leftOut >= LESSER) {
+    leftOut = 0;
+    paintLesser(robot);
+  }
   if (now.state) showState(now.state);
   if (!stale) say(head.link.value, link ? `${fixed(link.delay_ms, 0)} ms` : "–");
   say(head.time.value, `${fixed(now.t_us * 1e-6, 2)} s`);
   if (link) link.seen_us = Math.floor(now.t_us);
+}
+
+/** @param {ReturnType<typeof pose>} robot */
+function paintLesser(robot) {
+  if (space && plan.classList.contains("in-space")) space.update(spacePose(robot));
+  else views.top.update(robot);
+  robot.legs.forEach((state, i) => views.feet[i].update(state));
+  joints.forEach((joint, i) => joint.update(now.of.get(`/joint/${i + 1}`), now.state?.boards[i]));
+  scope?.paint(now.t_us * 1e-6);
 }
 
 const listener = {
@@ -469,6 +574,7 @@ const listener = {
     say(answer, `${by} hands the control over to you: press Take control within 2 s. Then it is free for everybody.`);
   },
   revoked(by) {
+    revoker = by;
     say(answer, `${by}, at the robot's computer, has revoked your control. Check the robot, then take control again.`);
   },
   closed(why) {
@@ -497,6 +603,10 @@ async function connect(who) {
 
 async function begin() {
   const who = identity();
+  if (!who && /^#[kv]=/.test(location.hash)) {
+    page.replaceChildren(html("p", { class: "alone", role: "alert" }, "What stands in the address after #k= or #v= is no key: a key has 64 digits, 0 to 9 and a to f. Open the address that `wheeleg serve` prints."));
+    return;
+  }
   if (!who) {
     page.replaceChildren(html("p", { class: "alone" }, isSecureContext ? "This page needs a key. Open an address that `wheeleg serve` prints on its terminal. Without a terminal, add #k= and the digits of a key file to this address: control.key to drive, view.key to watch and stop. `wheeleg serve` prints the paths of both." : "This page needs a key. Add #k= and the digits of the file view.key to this address; `wheeleg serve` prints its path."));
     return;
@@ -537,4 +647,4 @@ async function begin() {
   }
 }
 begin();
-paint();
+requestAnimationFrame(paint);

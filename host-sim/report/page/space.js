@@ -162,6 +162,7 @@ function painter(canvas, geometry, relief) {
   const uniform = Object.fromEntries(["world", "seen", "colour", "line", "gridded", "plain"].map((name) => [name, gl.getUniformLocation(made, name)]));
   const parts = { box: boxMesh(), cylinder: roundMesh(0.5), cone: roundMesh(0), ground: groundMesh(relief) };
   const meshes = Object.fromEntries(Object.entries(parts).map(([name, mesh]) => [name, { faces: uploaded(gl, mesh.numbers), edges: uploaded(gl, mesh.lines) }]));
+  const pixel = new Uint8Array(4);
   gl.enable(gl.DEPTH_TEST);
   // Faces lie a little behind their own edges.
   gl.enable(gl.POLYGON_OFFSET_FILL);
@@ -200,6 +201,8 @@ function painter(canvas, geometry, relief) {
     draw("ground", relief ? moved([0, 0, 0]) : moved([floor(pose.x_mm), floor(pose.y_mm), 0]), colours.ground);
     gl.uniform1i(uniform.gridded, 0);
     for (const solid of solids(geometry, pose)) draw(solid.mesh, solid.at, colours[solid.colour], solid.colour === "force" ? null : colours.edge);
+    // What is asked for is drawn later; a pixel that is read waits until it is.
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   };
 }
 
@@ -210,6 +213,22 @@ let canvas = null;
 /** @type {ReturnType<typeof painter> | null} */
 let paint = null;
 let waiting = false;
+/** A drawing is followed by so many times its time without one: what is drawn in software leaves the page its turn. */
+const REST = 2;
+/** From when on the next one may begin, ms. */
+let rested_ms = 0;
+
+function draw() {
+  waiting = false;
+  const begin_ms = performance.now();
+  try {
+    paint?.(told);
+    rested_ms = performance.now() + REST * (performance.now() - begin_ms);
+    self.postMessage({ drawn: told.number });
+  } catch (error) {
+    fail(error);
+  }
+}
 
 const fail = (error) => self.postMessage({ failed: error instanceof Error ? error.message : String(error) });
 self.addEventListener("message", ({ data }) => {
@@ -224,15 +243,7 @@ self.addEventListener("message", ({ data }) => {
     for (const name of ["pose", "number", "colours", "camera"]) if (data[name]) told[name] = data[name];
     if (waiting || !paint || !told.pose || !told.colours || !told.camera) return;
     waiting = true;
-    requestAnimationFrame(() => {
-      waiting = false;
-      try {
-        paint?.(told);
-        self.postMessage({ drawn: told.number });
-      } catch (error) {
-        fail(error);
-      }
-    });
+    setTimeout(() => requestAnimationFrame(draw), Math.max(0, rested_ms - performance.now()));
   } catch (error) {
     fail(error);
   }

@@ -1,16 +1,36 @@
-// Why a command was refused, in the words of the console's buttons. What is not here is told as the server tells it.
+// Who did what, and why a command was refused, in the words of the console's buttons. What is not here is told as the server tells it.
+import { fixed } from "./dom.js";
 
-/** @typedef {{air_bar: number, injected: string[]}} Around what the robot is like just now */
+/** Absolute pressure in the reservoir, and where it is full, bar; no numbers of real boards. How long ago this page lost its control, if it did, s.
+ * @typedef {{air_bar: number, full_bar: number, injected: string[], lost_s: number | null}} Around what the robot is like just now */
+/** Who has asked for the stop that is latched. @typedef {{via: string, name?: string, session?: string, role?: string, at_us: number}} Stopped */
+
+/** The boards' fault EmergencyStop. */
+export const E_STOP = 39;
+/** As every page calls itself. */
+export const BROWSER = "browser";
+
+/** Who has stopped the robot, for the page of this session. @param {Stopped} stopped @param {string} own */
+export function stopper({ via, name, session, role }, own) {
+  if (via === "api") return "a program, over the HTTP API";
+  if (via === "foxglove") return "a Foxglove viewer";
+  if (session === own) return "you";
+  const who = name === BROWSER ? "another browser" : `“${name}”`;
+  return role === "view" ? `${who}, with the view key` : who;
+}
+
+/** How full the reservoir is, as far as that is known. @param {{air_bar: number, full_bar: number}} around */
+export const filled = ({ air_bar, full_bar }) => (Number.isFinite(air_bar) && Number.isFinite(full_bar) ? `${fixed(air_bar)} of ${fixed(full_bar)} bar absolute` : "");
 
 /** By the reason of the answer. @type {Object<string, (around: Around) => string>} */
 const WORDS = {
-  not_in_control: () => "press Take control first",
+  not_in_control: ({ lost_s }) => (lost_s === null ? "press Take control first" : `you lost control ${fixed(lost_s)} s ago: press Take control again`),
   not_armed: () => "the robot is not armed: press Ready; after a stop or a hold press Clear fault before",
   not_disarmed: () => "the robot is armed: press Disarm first",
   moving: () => "the robot is moving: wait for the end of the motion, or press Hold, or in a walk Stop walking",
   not_moving: () => "the robot does not walk; Hold ends any other motion",
   latched: () => "a stop or a hold is latched: press Clear fault, and Ready once the reservoir is full",
-  no_air: ({ air_bar }) => `the reservoir is not full yet${Number.isFinite(air_bar) ? `, at ${air_bar.toFixed(1)} bar` : ""}: wait, then press Ready again; if it stays so, check compressor, hose and regulator`,
+  no_air: (around) => `the reservoir does not fill${filled(around) && `: ${filled(around)}`}. Check compressor, hose and regulator, then press Ready again`,
   interrupted: () => "a stop, a hold or another command came between: Faults and Events tell which",
 };
 

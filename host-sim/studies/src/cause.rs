@@ -3,7 +3,7 @@
 use wheeleg_master::event::HoldReason;
 use wheeleg_protocol::{Address, Fault};
 use wheeleg_telemetry::event::hold_name;
-use wheeleg_telemetry::{Event, EventCode, EventKind, finding_of_name};
+use wheeleg_telemetry::{Event, EventCode, EventKind, Row, finding_of_name};
 
 /// What comes so soon after a fault may follow from it, ns.
 const FOLLOWS_NS: u64 = 1_000_000_000;
@@ -14,7 +14,36 @@ const HOLDS_THAT_FOLLOW: [&str; 3] = [
     hold_name(&HoldReason::NodeDisarmed(0)),
 ];
 
-/// An event of the kind [`EventKind::Fault`].
+/// Why all axes hold although no board has a fault: what happened, and what to do about it.
+const HOLDS: [(&str, &str, &str); 5] = [
+    (
+        hold_name(&HoldReason::SupplyLost),
+        "Supply pressure lost: all axes hold",
+        "Check compressor, hose and regulator, then clear and arm.",
+    ),
+    (
+        hold_name(&HoldReason::OperatorLost),
+        "Operator lost: all axes hold",
+        "Reconnect, take the control, then clear and arm.",
+    ),
+    (
+        hold_name(&HoldReason::EmergencyStop),
+        "E-stop: all axes hold",
+        "Remove the cause, then clear and arm.",
+    ),
+    (
+        hold_name(&HoldReason::LayerOneStalled),
+        "Layer 1 gave nothing for 100 ms: all axes hold",
+        "Clear and arm.",
+    ),
+    (
+        hold_name(&HoldReason::LayerOneGone),
+        "Layer 1 does not come back: all axes hold",
+        "Clear and arm.",
+    ),
+];
+
+/// An event that somebody has to know of: of the kind [`EventKind::Fault`], or a robot that has given up.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FaultEvent {
     pub(crate) t_ns: u64,
@@ -31,8 +60,8 @@ pub(crate) struct FaultEvent {
 impl FaultEvent {
     /// That of an event of a run, if it is a fault after the start-up.
     pub(crate) fn of(t_ns: u64, event: &Event) -> Option<Self> {
-        let is_fault = event.cause.kind() == EventKind::Fault && event.start_up_us.is_none();
-        is_fault.then(|| Self {
+        let is_fault = is_fault(Some(event.cause.kind()), Some(event.cause.code()));
+        (is_fault && event.start_up_us.is_none()).then(|| Self {
             t_ns,
             code: Some(event.cause.code()),
             detail: event.cause.detail(),
@@ -52,6 +81,11 @@ impl FaultEvent {
                 code => code.is_some() && code == cause.code && self.fault == cause.fault,
             }
     }
+}
+
+/// Whether an event is a fault, or tells that the robot has given up: it walks no more.
+pub(crate) fn is_fault(kind: Option<EventKind>, code: Option<EventCode>) -> bool {
+    kind == Some(EventKind::Fault) || code == Some(EventCode::Stuck)
 }
 
 /// Names of boards in a row.
@@ -78,6 +112,15 @@ impl Cause {
             Some(EventCode::Finding) => {
                 finding_of_name(&event.detail).map(|finding| (finding.sentence(), finding.remedy()))
             }
+            Some(EventCode::Hold) => {
+                let mut holds = HOLDS.into_iter();
+                let found = holds.find(|(name, ..)| *name == event.detail);
+                found.map(|(_, sentence, remedy)| (sentence, remedy))
+            }
+            Some(EventCode::Stuck) => Some((
+                "The robot got no further in three tries, and stands",
+                "Turn it, or lead it another way.",
+            )),
             _ => None,
         };
         let stem = |sentence: &str| sentence.trim_end_matches('.').to_owned();
@@ -94,6 +137,13 @@ impl Cause {
             remedy: row.map(|(_, remedy)| remedy),
         }
     }
+}
+
+/// A sentence at its begin.
+fn capital(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    let first = letters.next().map(char::to_uppercase);
+    first.into_iter().flatten().chain(letters).collect()
 }
 
 /// A sentence as it stands behind a colon; what is all in capitals stays so.
@@ -121,17 +171,27 @@ pub(crate) fn first(events: impl Iterator<Item = FaultEvent>) -> Option<(Cause, 
     Some((cause, causes.len()))
 }
 
+/// What went wrong first in a run, in a sentence without its end, and what to do about it.
+pub(crate) fn of_run(events: &[Row<Event>]) -> Option<(String, Option<&'static str>)> {
+    let faults = events
+        .iter()
+        .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
+    let (cause, count) = first(faults)?;
+    Some((sentence(&cause, count), cause.remedy))
+}
+
 /// What went wrong, in a sentence without its end.
 pub(crate) fn sentence(cause: &Cause, count: usize) -> String {
     let Cause { t_s, headline, .. } = cause;
     match count {
-        1 => format!("{headline}, at {t_s:.2} s"),
+        1 => format!("{}, at {t_s:.2} s", capital(headline)),
         _ => format!("{count} faults, the first: {headline}, at {t_s:.2} s"),
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use wheeleg_master::behaviour::Act;
     use wheeleg_master::event::Event as MasterEvent;
     use wheeleg_master::finding::Finding;
 
@@ -190,7 +250,7 @@ mod tests {
         let told = sentence(&cause, count);
         assert_eq!(
             told,
-            "joint 3: the position sensor reads outside its range, at 3.00 s"
+            "Joint 3: the position sensor reads outside its range, at 3.00 s"
         );
         // The operator is lost for a reason of their own; what comes later, too.
         for (another, expected) in [
@@ -209,8 +269,28 @@ mod tests {
         }
         let lost = hold(10, HoldReason::OperatorLost);
         let (cause, _) = first([lost].into_iter()).expect("a cause");
-        assert_eq!(sentence(&cause, 1), "master: all axes hold: so, at 0.01 s");
+        assert_eq!(
+            sentence(&cause, 1),
+            "Operator lost: all axes hold, at 0.01 s"
+        );
+        assert!(
+            cause
+                .remedy
+                .is_some_and(|remedy| remedy.contains("clear and arm"))
+        );
         assert_eq!(first(std::iter::empty()), None);
+    }
+
+    /// Nobody has a fault, and yet the robot does not do what it was asked for.
+    #[test]
+    fn a_robot_that_gives_up_is_a_cause() {
+        let stuck = wheeleg_telemetry::Cause::Master(MasterEvent::Behaviour(Act::Stuck));
+        let event = FaultEvent::of(26_340_000_000, &stuck.into()).expect("a cause");
+        let (cause, count) = first([event].into_iter()).expect("a cause");
+        let told = "The robot got no further in three tries, and stands, at 26.34 s";
+        assert_eq!((sentence(&cause, count).as_str(), count), (told, 1));
+        let homed = wheeleg_telemetry::Cause::Master(MasterEvent::Homed);
+        assert_eq!(FaultEvent::of(0, &homed.into()), None);
     }
 
     #[test]

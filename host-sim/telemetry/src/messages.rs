@@ -5,6 +5,7 @@ mod refusal;
 
 use std::fmt;
 
+use wheeleg_config::faults::FaultSpec;
 use wheeleg_interface::{Side, first_difference};
 use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::config::UniqueId;
@@ -59,8 +60,8 @@ impl fmt::Display for Cause {
             Self::Scenario(act) => match act {
                 Act::KillMaster => f.write_str("the master dies and stays silent"),
                 Act::EStop => f.write_str("E-stop pressed"),
-                Act::FaultBegins(fault) => write!(f, "fault {fault} begins"),
-                Act::FaultEnds(fault) => write!(f, "fault {fault} ends"),
+                Act::FaultBegins(fault) => write!(f, "fault {} begins", injected(fault)),
+                Act::FaultEnds(fault) => write!(f, "fault {} ends", injected(fault)),
             },
             Self::Service {
                 board,
@@ -85,6 +86,15 @@ impl fmt::Display for BoardChange {
             Self::FaultLatched(fault) => fault.fmt(f),
             Self::FaultsCleared => f.write_str("faults cleared"),
         }
+    }
+}
+
+/// A fault that somebody injects in a run begins when it does: its time is that of the event.
+fn injected(fault: &FaultSpec) -> String {
+    if fault.from_s <= 0.0 && fault.until_s.is_none() {
+        fault.untimed()
+    } else {
+        fault.to_string()
     }
 }
 
@@ -499,6 +509,18 @@ mod tests {
             text.contains("joint 4") && text.contains("fbfbfb") && text.contains("will not arm")
         );
         assert!(text.contains(Fault::DuplicateAddress.remedy()), "{text}");
+    }
+
+    #[test]
+    fn a_fault_that_is_injected_in_a_run_is_told_without_a_time_of_its_own() {
+        let told = |fault: &str| {
+            let fault = fault.parse().expect("a fault");
+            Cause::Scenario(Act::FaultBegins(fault)).to_string()
+        };
+        assert_eq!(told("pot-open:joint3@0s"), "fault pot-open:joint3 begins");
+        for fault in ["pot-open:joint3@3s", "bit-errors=0.0001@0s..60s"] {
+            assert_eq!(told(fault), format!("fault {fault} begins"));
+        }
     }
 
     #[test]

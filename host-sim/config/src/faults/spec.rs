@@ -46,6 +46,16 @@ impl FaultSpec {
         self.until_s.unwrap_or(self.from_s + lasts_s)
     }
 
+    /// What and where, without the time.
+    #[must_use]
+    pub fn untimed(&self) -> String {
+        let mut text = format!("{}{}", self.kind.name(), self.target);
+        if self.kind.info().value.is_some() {
+            text.push_str(&format!("={}", self.value));
+        }
+        text
+    }
+
     /// A fault that begins at once, from a text without a time.
     ///
     /// # Errors
@@ -352,11 +362,7 @@ impl fmt::Display for FaultTarget {
 
 impl fmt::Display for FaultSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}", self.kind.name(), self.target)?;
-        if self.kind.info().value.is_some() {
-            write!(f, "={}", self.value)?;
-        }
-        write!(f, "@{}s", self.from_s)?;
+        write!(f, "{}@{}s", self.untimed(), self.from_s)?;
         self.until_s.map_or(Ok(()), |until| write!(f, "..{until}s"))
     }
 }

@@ -300,6 +300,7 @@ impl Inner {
         self.desk
             .look(status.now_us, status.lease_seen_us.is_some());
         self.desk.free(Instant::now());
+        self.look_at_stops(&status);
         self.status = Some(status);
         self.faults.retain(|(_, over_us)| *over_us > status.now_us);
     }

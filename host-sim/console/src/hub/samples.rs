@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use axum::body::Bytes;
 use axum::extract::ws::Utf8Bytes;
-use serde_json::Value;
+use serde_json::{Value, json};
 use wheeleg_master::event::HoldReason;
 use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::{EventCode, OwnedSample};
@@ -55,7 +55,14 @@ impl Inner {
             if let OwnedSample::Event(event) = &moving.sample {
                 let lost = event.code == EventCode::Hold
                     && event.detail == hold_name(&HoldReason::OperatorLost);
+                let stopped = self
+                    .stopped
+                    .as_mut()
+                    .and_then(|one| one.is(event).then(|| json!(one)));
                 let mut event = event_json(moving.number, moving.t_ns, event);
+                if let Some(stopped) = stopped {
+                    event["stopped"] = stopped;
+                }
                 if lost {
                     event["holder"] = self.last_holder.as_str().into();
                     event["gone"] = self.last_is_gone.into();

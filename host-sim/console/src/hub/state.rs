@@ -7,13 +7,12 @@ use wheeleg_telemetry::phase;
 
 use super::Inner;
 use crate::messages::rounded;
-use crate::record::inputs::fault_name;
 use wheeleg_access::desk::Ended;
 
 impl Inner {
     pub(super) fn active_faults(&self) -> Vec<String> {
         let faults = self.faults.iter();
-        faults.map(|(fault, _)| fault_name(fault)).collect()
+        faults.map(|(fault, _)| fault.untimed()).collect()
     }
 
     pub(super) fn tell_state(&self, text: String) {
@@ -60,6 +59,7 @@ impl Inner {
             "armed": status.armed,
             "hold": status.hold.as_ref().map(hold_name),
             "emergency_stop": status.emergency_stop,
+            "stopped": self.stopped,
             "phase": phase::name(status.phase),
             "stepping": status.phase.is_stepping(),
             "step": status.step,

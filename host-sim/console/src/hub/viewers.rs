@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::extract::ws::Message;
 use serde_json::{Value, json};
 
-use super::{CLIENTS, Hub, StopsUnderWay};
+use super::{CLIENTS, Hub, StopBy, StopsUnderWay};
 use crate::foxglove::{self, Call, Outbox, Request, Setting, ViewerId, status};
 use crate::foxglove::{STOP_SERVICE, URDF};
 
@@ -111,7 +111,7 @@ impl Hub {
         let under_way = looking.stops.begin().await;
         let hub = Arc::clone(self);
         tokio::spawn(async move {
-            let message = match hub.stop().await {
+            let message = match hub.stop(StopBy::Foxglove).await {
                 Some(now_us) => stopped(&call, now_us),
                 None => failure(&call, "NOT CONFIRMED within 200 ms: cut the air"),
             };

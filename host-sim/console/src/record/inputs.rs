@@ -4,7 +4,6 @@
 //! the same `ms` are in the order in which it took them.
 
 use serde::{Deserialize, Serialize};
-use wheeleg_config::faults::FaultSpec;
 
 use super::Given;
 use wheeleg_access::request::Spoken;
@@ -77,12 +76,6 @@ pub(crate) struct RevokedInput {
     pub(crate) by: String,
 }
 
-/// A fault without its time: it begins now, and ends where it is ended.
-pub(crate) fn fault_name(fault: &FaultSpec) -> String {
-    let text = fault.to_string();
-    text.split('@').next().unwrap_or_default().to_owned()
-}
-
 impl Line {
     pub(super) fn new(ms: u64, given: Given) -> Self {
         let input = match given {
@@ -99,8 +92,8 @@ impl Line {
                 spoken,
                 by,
             }),
-            Given::Fault(fault, true) => Input::FaultBegins(fault_name(&fault)),
-            Given::Fault(fault, false) => Input::FaultEnds(fault_name(&fault)),
+            Given::Fault(fault, true) => Input::FaultBegins(fault.untimed()),
+            Given::Fault(fault, false) => Input::FaultEnds(fault.untimed()),
             Given::Pace { speed, paused } => Input::Pace(PaceInput { speed, paused }),
             Given::Revoked { holder, by } => Input::Revoked(RevokedInput { holder, by }),
             Given::Hash(hash) => Input::Hash(hash),

@@ -7,7 +7,6 @@ use wheeleg_master::command::CommandCode;
 use wheeleg_telemetry::SessionSample;
 
 use super::Given;
-use super::inputs::fault_name;
 use crate::live::PaceStatus;
 
 impl Given {
@@ -35,7 +34,7 @@ impl Given {
                 ("command", text)
             }
             Self::Fault(fault, begins) => {
-                sample.fault = fault_name(fault);
+                sample.fault = fault.untimed();
                 let (kind, what) = match begins {
                     true => ("fault_begins", "begins"),
                     false => ("fault_ends", "ends"),

@@ -73,6 +73,7 @@ fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
     let hold = u32::from(NodeMode::Hold.code());
     let held_ns = first(&mut viewer, |fields| fields[84..88] == hold.to_le_bytes());
     let given = rig.event("hold");
+    assert_eq!(given["stopped"]["via"], "api", "{given}");
     let took_ns = held_ns - given["t_ns"].as_u64().expect("a time");
     assert!(took_ns <= 13_000_000, "{took_ns} ns");
 }
@@ -231,6 +232,42 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     let state = rig.state();
     assert_eq!(state["emergency_stop"], true, "{state}");
     assert!(state["control"].is_null(), "{state}");
+}
+
+/// Everybody is told who has stopped the robot, and is told no more once it is over.
+#[test]
+fn a_stop_has_a_name() {
+    let rig = TestRig::new();
+    let mut driver = rig.driver("driver");
+    assert!(rig.state()["stopped"].is_null());
+    let mut watcher = rig.view();
+    let n = watcher.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(watcher.outcome(n), Outcome::Done);
+    let is_stopped = |state: &Value| state["emergency_stop"] == true;
+    let stopped = rig.until("stopped", is_stopped)["stopped"].clone();
+    assert_eq!(
+        (&stopped["via"], &stopped["name"], &stopped["role"]),
+        (&json!("console"), &json!("viewer"), &json!("view")),
+        "{stopped}"
+    );
+    assert_eq!(rig.event("hold")["stopped"], stopped);
+    let stops = |event: &Value| event["command"] == 0x0123;
+    // Who stops a robot that is stopped has not stopped it.
+    let n = driver.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(driver.outcome(n), Outcome::Done);
+    assert_eq!(rig.state()["stopped"], stopped);
+    let told = rig.events("command_accepted");
+    let told: Vec<&Value> = told.iter().filter(|event| stops(event)).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert_eq!(told[0]["stopped"], stopped);
+    assert!(told[1]["stopped"].is_null(), "{}", told[1]);
+    done(&mut driver, "ClearFault");
+    rig.until("cleared", |state| !is_stopped(state));
+    assert!(rig.state()["stopped"].is_null(), "{}", rig.state());
+    let n = driver.send(json!({ "op": "stop" })).expect("sent");
+    assert_eq!(driver.outcome(n), Outcome::Done);
+    let state = rig.until("stopped", is_stopped);
+    assert_eq!(state["stopped"]["name"], "driver", "{state}");
 }
 
 #[test]

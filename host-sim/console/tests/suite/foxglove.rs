@@ -475,6 +475,7 @@ fn a_viewer_may_stop_and_give_nothing_else() {
     });
     assert_eq!(answer["stopped"], true);
     assert_eq!(rig.state()["emergency_stop"], true);
+    assert_eq!(rig.state()["stopped"]["via"], "foxglove");
     look(&mut driver, "state");
 }
 

@@ -39,8 +39,7 @@ impl ActiveFaults {
     pub(crate) fn end(&mut self, fault: &FaultSpec) -> Result<(), SimError> {
         let Some(at) = self.0.iter().position(|(active, _)| active == fault) else {
             // It was given without a time.
-            let fault = fault.to_string();
-            let fault = fault.split('@').next().unwrap_or_default();
+            let fault = fault.untimed();
             return Err(SimError::simulation(
                 format!("the fault `{fault}` cannot be ended: it is not active"),
                 "end a fault that has begun",

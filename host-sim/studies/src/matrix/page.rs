@@ -8,6 +8,7 @@ use super::measure::Measured;
 use super::row::{Expect, Row, Since};
 use crate::StudyError;
 use crate::study::Stopped;
+use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_report::number::minus;
 use wheeleg_report::page;
 
@@ -109,6 +110,8 @@ struct Page<'a> {
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
+    /// That of the rows in which the robot walks.
+    scenario: &'static str,
     seed: u64,
     rows: Vec<Shown<'a>>,
     passed: usize,
@@ -176,7 +179,11 @@ pub(super) fn render(
     let values = Page {
         stopped: stopped.map(ToString::to_string),
         version: env!("CARGO_PKG_VERSION"),
+        scenario: DEFAULT_SCENARIO,
         verdict: match failed {
+            0 if passed == 1 => {
+                "Passed: the robot reacts as it must in the one row that was run.".to_owned()
+            }
             0 => format!("Passed: the robot reacts as it must in all {passed} rows that were run."),
             _ => format!(
                 "Failed: the robot does not react as it must in {failed} of {} rows.",

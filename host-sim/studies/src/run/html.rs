@@ -9,7 +9,7 @@ use super::figures::Source;
 use super::motion::motion;
 use crate::StudyError;
 use crate::analysis::{Judgement, StartDelay, Target};
-use crate::cause::{self, FaultEvent};
+use crate::cause;
 use wheeleg_protocol::NODE_NAMES;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{Picture, json, page, pictures};
@@ -211,17 +211,12 @@ pub(super) fn render(
     });
     let required = summary.targets.iter().filter(|t| t.required);
     let met = required.clone().filter(|t| t.pass).count();
-    let faults = all
-        .iter()
-        .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
-    let cause = cause::first(faults);
+    let (cause, remedy) = cause::of_run(all).unzip();
     let values = Page {
         summary,
         verdict: verdict(summary),
-        cause: cause
-            .as_ref()
-            .map(|(first, count)| cause::sentence(first, *count)),
-        remedy: cause.and_then(|(first, _)| first.remedy),
+        cause,
+        remedy: remedy.flatten(),
         scenario_text: &source.scenario.description,
         robot_text: &source.robot.description,
         pil: summary.pil.as_ref().map(Boards::new),

@@ -44,6 +44,7 @@ mod tests {
             summary: summary.clone(),
             failure: None,
             down_times: wheeleg_sim::DownTimes::default(),
+            cause: None,
         };
         let source = Source {
             scenario,

@@ -159,6 +159,8 @@ struct Page<'a> {
     parameters: Vec<Described<'a>>,
     toml: &'a str,
     figures: Vec<Picture<'a>>,
+    /// Which of them comes first.
+    main: &'static str,
 }
 
 #[derive(Serialize)]
@@ -257,6 +259,7 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         parameters: parameters.collect(),
         toml: &tuned.toml,
         figures: pictures(figures),
+        main: Move::Step100.name(),
     };
     Ok(page(TEMPLATE, values)?)
 }

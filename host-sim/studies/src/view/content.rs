@@ -101,6 +101,8 @@ pub(super) struct Content {
     /// Time of the first and the last sample, ns.
     pub(super) first_ns: Option<u64>,
     pub(super) last_ns: u64,
+    /// End of the log, whatever part of it is looked at, ns.
+    pub(super) end_ns: u64,
     pub(super) end: Read,
     /// Every stroke, for a comparison.
     pub(super) strokes: [Vec<(u64, f32)>; 6],
@@ -197,6 +199,7 @@ impl Content {
             head: Vec::new(),
             first_ns: None,
             last_ns: 0,
+            end_ns: 0,
             end: Read {
                 messages: 0,
                 others: 0,
@@ -215,6 +218,7 @@ impl Content {
                 content.provenance(&logged);
                 return ControlFlow::Continue(());
             }
+            content.end_ns = content.end_ns.max(logged.t_ns);
             if !(span.from_ns..=span.to_ns).contains(&logged.t_ns) {
                 return ControlFlow::Continue(());
             }
@@ -343,7 +347,7 @@ impl Content {
     pub(super) fn faults(&self) -> impl Iterator<Item = &LoggedEvent> {
         self.events
             .iter()
-            .filter(|event| event.kind == Some(EventKind::Fault))
+            .filter(|event| cause::is_fault(event.kind, event.code))
     }
 
     /// The first cause of its faults, and how many there are.

@@ -91,10 +91,13 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         if content.first_ns.is_none() {
             return Err(StudyError::refused(
                 format!(
-                    "{}: no sample is in the part that was asked for",
-                    path.display()
+                    "{}: nothing is in the part from {} s to {}; the log ends at {:.2} s",
+                    path.display(),
+                    options.from_s,
+                    end_of(options.to_s),
+                    content.end_ns as f64 * 1e-9
                 ),
-                "leave out --from and --to to see where the log begins and ends",
+                "give --from and --to before its end, or leave them out",
             ));
         }
         let name = plain(&path.display().to_string());
@@ -131,14 +134,19 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
     }))
 }
 
+/// The end of a part, in words.
+fn end_of(to_s: f64) -> String {
+    match to_s {
+        f64::INFINITY => "the end".to_owned(),
+        to_s => format!("{to_s} s"),
+    }
+}
+
 /// The part that is looked at.
 fn span(options: &Options) -> Result<Span, StudyError> {
     let Options { from_s, to_s, .. } = *options;
     if !(from_s >= 0.0 && to_s > from_s) {
-        let to = match to_s {
-            f64::INFINITY => "the end".to_owned(),
-            to_s => format!("{to_s} s"),
-        };
+        let to = end_of(to_s);
         return Err(StudyError::refused(
             format!("from {from_s} s to {to} is not part of a log"),
             "give --from from 0 on, and --to after it",
@@ -297,7 +305,7 @@ mod tests {
         let told = viewed(&options(&[&sound, &broken]))
             .expect("a page")
             .verdict;
-        let fault = "Second log: joint 3: the position sensor reads outside its range, at 0.60 s";
+        let fault = "Second log: Joint 3: the position sensor reads outside its range, at 0.60 s";
         assert!(
             told.contains(fault) && told.contains("part at 0.60 s"),
             "{told}"
@@ -315,7 +323,7 @@ mod tests {
             ..options(&[&path])
         };
         for (options, word) in [
-            (part(5.0, 6.0), "no sample"),
+            (part(5.0, 6.0), "from 5 s to 6 s; the log ends at 1.00 s"),
             (part(2.0, 1.0), "not part"),
             (part(f64::NAN, 1.0), "not part"),
             (

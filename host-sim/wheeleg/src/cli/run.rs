@@ -217,6 +217,13 @@ fn messages_text(messages: &[String]) -> String {
 fn run_text(finished: &Finished<Run>) -> String {
     let s = &finished.result.summary;
     let mut out = String::new();
+    if let Some((cause, remedy)) = &finished.result.cause {
+        let _ = writeln!(out, "{cause}.");
+        if let Some(remedy) = remedy {
+            let _ = writeln!(out, "{remedy}");
+        }
+        out.push('\n');
+    }
     // A part of a run meets or misses nothing.
     if s.complete && !s.targets.is_empty() {
         out.push_str(&target_table(&s.targets));

@@ -15,7 +15,7 @@ use super::{print, stop_on_signals, tell};
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
     /// A log, or the folder of its run or recording; two are overlaid.
-    #[arg(required = true, num_args = 1..=2, value_name = "LOG")]
+    #[arg(required = true, num_args = 1.., value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Start of the part to show, in seconds of the log.
     #[arg(
@@ -54,6 +54,12 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Makes the page and says where it is.
 pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
+    if args.logs.len() > 2 {
+        return Err(StudyError::refused(
+            format!("{} logs are too many for one page", args.logs.len()),
+            "give one log, or two to compare",
+        ));
+    }
     let stop = stop_on_signals()?;
     let progress = Progress::new("view", stop.clone());
     let options = Options {
