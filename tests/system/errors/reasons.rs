@@ -93,7 +93,7 @@ fn plant(all: &mut Vec<Reason>) {
         place_m: [0.05, -0.02],
         into_m: 0.03,
     };
-    let words = &["start place", "0.03 m into", "x = 0.05", "y = -0.02"];
+    let words = vec!["start place", "0.03 m into", "x = 0.05", "y = -0.02"];
     add("PlantError::InChassis", inside, words);
     let mechanics = PlantError::Mechanics("a leg cannot close".to_owned());
     let words = vec!["a leg cannot close"];
