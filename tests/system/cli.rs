@@ -635,6 +635,7 @@ fn texts_of_a_file_are_quoted_wherever_they_go() {
     let page = fs::read_to_string(out.join("report.html")).expect("a page");
     assert!(!page.contains("<b onload") && !page.contains("</script><b"));
     assert!(page.contains("&lt;b onload"), "it is shown");
+    assert!(!page.contains('\u{202e}'), "the text runs as it is read");
     // A log page, a listing as JSON and an export read the same texts.
     wheeleg()
         .arg("view")
@@ -657,4 +658,62 @@ fn texts_of_a_file_are_quoted_wherever_they_go() {
         .success();
     let urdf = String::from_utf8_lossy(&urdf.get_output().stdout).into_owned();
     assert!(!urdf.contains("<b onload"));
+}
+
+/// What no page and no other file can show is refused where it is read: in a text, a source or a name.
+#[test]
+fn control_characters_in_a_file_are_refused_with_their_place() {
+    let dir = folder();
+    let axis = source("axes/bench-vq110u.toml");
+    let robot = source("robots/wheeleg-2003.toml");
+    let hostile = "\"a\\u0000b\\u001b[31mc\"";
+    let described =
+        |text: &str| with_line(text, "description", &format!("description = {hostile}"));
+    let axis_file = write(dir.path(), "axis.toml", &described(&axis));
+    let robot_file = write(dir.path(), "robot.toml", &described(&robot));
+    let sourced = axis.replace("\"ASSUMED: equal valves\"", hostile);
+    assert_ne!(sourced, axis);
+    let sourced = write(dir.path(), "sourced.toml", &sourced);
+    let named = write(
+        dir.path(),
+        "named.toml",
+        &format!("\"a\\u0007b\" = 1\n{axis}"),
+    );
+    let scenario = fs::read_to_string(scenario_file(dir.path(), 0.2)).expect("written");
+    let scenario = write(dir.path(), "hostile.toml", &described(&scenario));
+    let out = dir.path().join("out");
+    for (arguments, file, place, character) in [
+        (
+            &["export", "fmu"][..],
+            &axis_file,
+            "`description`",
+            "U+0000",
+        ),
+        (
+            &["tune"],
+            &sourced,
+            "`cylinder.timing_spread.source`",
+            "U+0000",
+        ),
+        (&["plant", "check"], &named, "`ab`", "U+0007"),
+        (&["params"], &robot_file, "`description`", "U+0000"),
+        (&["run"], &scenario, "`description`", "U+0000"),
+    ] {
+        let mut command = wheeleg();
+        command.current_dir(dir.path()).args(arguments).arg(file);
+        let said = command
+            .assert()
+            .code(2)
+            .stdout("")
+            .get_output()
+            .stderr
+            .clone();
+        let said = String::from_utf8(said).expect("UTF-8");
+        assert!(!said.contains(['\u{0}', '\u{1b}', '\u{7}']), "{said:?}");
+        let said = said.replace("\n  │ ", " ");
+        for part in [place, character, "allowed are", &file.to_string_lossy()] {
+            assert!(said.contains(part), "{arguments:?}, {part}: {said}");
+        }
+    }
+    assert!(!out.exists() && !dir.path().join("runs").exists());
 }

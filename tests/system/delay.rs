@@ -11,7 +11,9 @@ use wheeleg_plant::testing::wheeleg_2003_axis;
 use wheeleg_studies::delay::trial::{Law, Start};
 use wheeleg_studies::delay::{
     EARLY_LIMIT_MM, Options, PAPER_BAND_S, PAPER_DELAY_S, PREVIEW_LIMIT_S, Study, axis_of, study,
+    write,
 };
+use wheeleg_studies::study::Settings;
 
 /// One study for all tests: few seeds, the shipped robot.
 fn measured() -> &'static Study {
@@ -283,4 +285,92 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
         let text = fs::read_to_string(out.join(format!("csv/{table}.csv"))).expect("CSV");
         assert!(text.lines().count() > 2, "{table}");
     }
+}
+
+/// What the command line puts in the place of the file's values is judged beforehand: the option is
+/// named, with what is allowed.
+#[test]
+fn a_mass_or_load_that_cannot_be_simulated_is_refused_by_its_option() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let out = dir.path().join("out");
+    let refused = |arguments: &[&str]| {
+        let mut command = Command::new(program::path());
+        command
+            .env("NO_COLOR", "1")
+            .args(["delay", "--seeds", "1", "--out"])
+            .arg(&out);
+        let assert = command.args(arguments).assert().code(2).stdout("");
+        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(!out.exists(), "{arguments:?}: {said}");
+        said.replace("\n  │ ", " ")
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    for mass in ["0.1", "0.15", "0.2"] {
+        let said = refused(&["--mass", mass]);
+        for part in [
+            &format!("`--mass` = {mass} kg"),
+            "allowed are ",
+            "`numerics.step`",
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
+    let said = refused(&["--mass", "0.1"]);
+    let (_, allowed) = said.split_once("allowed are ").expect("a range");
+    let least: f64 = allowed
+        .split(' ')
+        .next()
+        .expect("a word")
+        .parse()
+        .expect("a mass");
+    let robot = builtin::robot("wheeleg-2003").expect("built in");
+    // The least mass is that of the largest bore, whose friction grows with its area.
+    let robot_least = wheeleg_config::least_mass_kg(&axis_of(&robot, 0.1, 0.0));
+    assert!(
+        robot_least.is_some_and(|kg| kg < least),
+        "{robot_least:?}, {least}"
+    );
+    let said = refused(&["--load", "90"]);
+    assert!(
+        said.contains("`--load` = 90 N") && said.contains("allowed are up to"),
+        "{said}"
+    );
+}
+
+/// A part that fails costs none of those before it: they are in the summary, and the failure is told.
+#[test]
+fn a_part_that_fails_costs_no_part_before_it() {
+    let mut robot = builtin::robot("wheeleg-2003").expect("built in");
+    // The ablation adds the own weight of the leg, which nothing carries any more.
+    robot.reference.m6_kg = 1e12;
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let options = Options {
+        seeds: 1,
+        ..Options::default()
+    };
+    let settings = Settings::new(dir.path().join("out"));
+    let finished = write(&robot, &options, &settings).expect("the starts are measured");
+    assert!(finished.result.is_none());
+    let [failure] = &finished.unwritten[..] else {
+        panic!("{:?}", finished.unwritten);
+    };
+    let said = wheeleg_config::plain_text(failure);
+    assert!(
+        said.contains("`--mass`") && said.contains("cannot be simulated"),
+        "{said}"
+    );
+    let json: serde_json::Value = serde_json::from_str(&finished.summary).expect("JSON");
+    crate::schema::assert_valid(&json, "delay");
+    assert_eq!(json["starts"]["list"].as_array().map(Vec::len), Some(14));
+    assert!(
+        json["ablation"].is_null() && json["failure"].is_string(),
+        "{json}"
+    );
+    let page = fs::read_to_string(&finished.report).expect("a page");
+    assert!(
+        page.contains("ended by an error after 14 parts"),
+        "the page says so"
+    );
 }

@@ -316,6 +316,31 @@ fn a_run_with_very_many_events_has_a_page_that_opens() {
     }
 }
 
+/// Of eight times as many events a run takes less than twenty-four times as long, up to a hundred thousand.
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+fn a_hundred_thousand_events_take_no_longer_than_their_number() {
+    let place = Place::new();
+    let took = [12_500, 100_000].map(|count: u32| {
+        let mut scenario = String::from(
+            "name = \"many\"\ndescription = \"\"\nrobot = \"wheeleg-2003\"\nduration = \"2 s\"\nseed = 1\n\
+             targets = \"none\"\n[motion]\nkind = \"stand\"\n",
+        );
+        for k in 0..count {
+            let at = 0.5 + f64::from(k) / f64::from(count);
+            scenario += &format!("[[events]]\nat = \"{at:.6} s\"\naction = \"e-stop\"\n");
+        }
+        let file = format!("{count}.toml");
+        place.write(&file, &scenario);
+        let begun = std::time::Instant::now();
+        let (code, text) = place.said(&["run", &file, "--out", &count.to_string()]);
+        assert_eq!(code, Some(0), "{text}");
+        begun.elapsed().as_secs_f64()
+    });
+    println!("{took:?} s");
+    assert!(took[1] < 24.0 * took[0].max(0.5), "{took:?} s");
+}
+
 /// Of very many injected faults the first twenty are listed, and how many more.
 #[test]
 fn a_run_with_very_many_faults_lists_a_few() {
@@ -389,6 +414,46 @@ fn a_full_standard_output_is_told_by_every_list() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
         assert!(said.is_empty(), "{arguments:?}: {said}");
+    }
+}
+
+/// So does what computes: the study is in its folder all the same.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_standard_output_costs_no_study() {
+    let place = Place::new();
+    for (arguments, study) in [
+        (&["run", "stand"][..], true),
+        (&["tune", "bench-vq110u"], true),
+        (
+            &[
+                "compare",
+                "--case",
+                "bench-vq110u/predictive/step-20/nominal/1",
+            ],
+            true,
+        ),
+        (&["plant", "check", "bench-vq110u"], false),
+    ] {
+        let out = place.path(arguments[0]);
+        let full = fs::OpenOptions::new().write(true).open("/dev/full");
+        let mut command = Command::new(program::path());
+        command.args(arguments).env("NO_COLOR", "1");
+        if study {
+            command.arg("--out").arg(&out);
+        }
+        let output = command
+            .stdout(full.expect("a device"))
+            .output()
+            .expect("start");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains("standard output"), "{arguments:?}: {said}");
+        assert_eq!(
+            out.join("summary.json").exists(),
+            study,
+            "{arguments:?}: {said}"
+        );
     }
 }
 

@@ -31,6 +31,13 @@ fn four_times_the_supply_is_too_much() {
         .tick(&mut state, &Inputs::default())
         .expect_err("too much");
     assert!(error.to_string().contains("pressure_a_pa[2]"), "{error}");
+    // The reservoir has no other limit.
+    let mut state = plant.initial_state(1).expect("it stands");
+    state.core.supply.mass_kg *= 1.01 * most_pa / robot.plant.supply.initial_pressure_pa;
+    let error = plant
+        .tick(&mut state, &Inputs::default())
+        .expect_err("too much");
+    assert!(error.to_string().contains("supply_pressure_pa"), "{error}");
 }
 
 /// When the robot is told to drive, s.

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use mcap::read::Options;
 use serde_json::Value;
+use wheeleg_studies::run::{log_bytes, table_bytes};
 use wheeleg_telemetry::{channels, read};
 
 /// Longest wait for a file or a number.
@@ -74,11 +75,66 @@ fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
     }
     let output = child.wait_with_output().expect("output");
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(stderr.contains("GB of log"), "the disk is told: {stderr}");
+    ensure_disk_is_told(&stderr, out);
     let summary = json(&output);
     let code = i32::from(!missed(&summary).is_empty());
     assert_eq!(output.status.code(), Some(code), "{stderr}");
     (peak, summary)
+}
+
+/// Bytes of the files of a folder.
+#[cfg(target_os = "linux")]
+fn size(folder: &Path) -> f64 {
+    let files = crate::stop::files_below(folder);
+    let sizes = files.iter().map(|file| fs::metadata(folder.join(file)));
+    sizes.map(|file| file.expect("a file").len() as f64).sum()
+}
+
+/// The disk that is told is what the files take, or up to three times as much: a robot that stands has
+/// less to say than one that walks.
+#[cfg(target_os = "linux")]
+fn ensure_disk_is_told(stderr: &str, out: &Path) {
+    let before = |what: &str| -> f64 {
+        let (before, _) = stderr.split_once(what).expect("the disk is told");
+        let word = before.rsplit(' ').next().expect("a word");
+        1e9 * word.parse::<f64>().expect("a number")
+    };
+    let log = fs::metadata(out.join("log.mcap")).expect("a log").len() as f64;
+    for (told, is) in [
+        (before(" GB of log"), log),
+        (before(" GB of tables"), size(&out.join("csv"))),
+    ] {
+        assert!(
+            (is..3.0 * is).contains(&told),
+            "{told} for {is} bytes: {stderr}"
+        );
+    }
+}
+
+/// The scenario with the most to say takes no more disk than is told of it.
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+#[cfg(target_os = "linux")]
+fn no_built_in_scenario_takes_more_disk_than_is_told() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    for scenario in ["rocks-20", "walk", "three-step"] {
+        let out = dir.path().join(scenario);
+        let output = begin(Path::new(scenario), &out);
+        let summary = json(&output.wait_with_output().expect("ended"));
+        let recorded_s = summary["recorded_s"].as_f64().expect("a number");
+        let log = fs::metadata(out.join("log.mcap")).expect("a log").len() as f64;
+        let tables = size(&out.join("csv"));
+        println!(
+            "{scenario}: {:.0} and {:.0} kB/s",
+            1e-3 * log / recorded_s,
+            1e-3 * tables / recorded_s
+        );
+        let told = [log_bytes(recorded_s), table_bytes(recorded_s)];
+        assert!(
+            log < told[0] && tables < told[1],
+            "{scenario}: {log}, {tables}, {told:?}"
+        );
+    }
 }
 
 /// Each channel of a log goes on in time to the end of the run, whatever counter has begun anew by then.

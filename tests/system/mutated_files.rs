@@ -215,6 +215,7 @@ fn played(options: &Options, text: &str, stop: &Stop) -> Result<Fate, StudyError
             // Four times the highest source that a file may have.
             ("pressure_a_bar", 0.0, 100.1),
             ("pressure_b_bar", 0.0, 100.1),
+            ("pressure_bar", 0.0, 100.1),
             ("velocity_mm_s", -1e5, 1e5),
             ("speed_mm_s", -1e5, 1e5),
         ] {

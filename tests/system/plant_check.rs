@@ -16,7 +16,7 @@ const BENCH: &str = include_str!("../../host-sim/axes/bench-vq110u.toml");
 const AXES: u64 = 300;
 
 /// A sane axis: bore, stroke, mass, valves, tubes and friction of catalogue sizes, at random.
-fn text(seed: u64) -> String {
+pub(crate) fn text(seed: u64) -> String {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut log = |low: f64, high: f64| low * (high / low).powf(rng.random::<f64>());
     let bore_mm: f64 = log(8.0, 63.0);

@@ -86,6 +86,55 @@ fn rodless(stroke_mm: f64) -> Changes {
     all
 }
 
+/// Figures of a tuning that are worse after than before, as this test judges them: by more than a tenth, and
+/// beyond what is good enough, mm.
+fn found_worse(summary: &Value) -> Vec<String> {
+    let tests = summary["tests"].as_array().expect("a list");
+    assert!(tests.len() >= 5, "{summary}");
+    let mut worse = Vec::new();
+    for test in tests {
+        let motion = test["move"].as_str().expect("a name");
+        let [before, after] = ["before", "after"].map(|when| &test[when]);
+        let is_set = |figures: &Value, name: &str| figures[name] == true;
+        let follows = ["s-curve", "sine"].contains(&motion);
+        let rests = motion.starts_with("step") || motion == "hold";
+        for (name, enough, counts) in [
+            ("steady_error_mm", 0.5, true),
+            ("contact_error_mm", 2.0, true),
+            (
+                "overshoot_mm",
+                3.0,
+                !motion.starts_with("contact") && !is_set(before, "stopped"),
+            ),
+            ("worst_mm", 5.0, follows && !is_set(before, "stopped")),
+        ] {
+            let [was, is] =
+                [before, after].map(|figures| figures[name].as_f64().unwrap_or(0.0).abs());
+            if counts && is > f64::max(enough, 1.1 * was) {
+                worse.push(format!("{motion}: {name} {was} to {is}"));
+            }
+        }
+        for (name, counts) in [("stopped", true), ("limit_cycle", rests)] {
+            if counts && is_set(after, name) && !is_set(before, name) {
+                worse.push(format!("{motion}: {name}"));
+            }
+        }
+        if after["settle_s"].is_null() && !before["settle_s"].is_null() {
+            worse.push(format!("{motion}: never settles"));
+        }
+        let [was, is] = [before, after].map(|figures| figures["settle_s"].as_f64());
+        let comparable = !is_set(before, "stopped") && !is_set(before, "limit_cycle");
+        if let (Some(was), Some(is)) = (was, is)
+            && motion.starts_with("step")
+            && comparable
+            && is > f64::max(0.25, 1.1 * was)
+        {
+            worse.push(format!("{motion}: settles in {was} to {is} s"));
+        }
+    }
+    worse
+}
+
 /// Tunes an axis. Either it is at least as good as before and its parameters are written, or it is
 /// refused with what became worse, without them. The exit code.
 fn tuned(base: &str, changes: &Changes) -> i32 {
@@ -98,6 +147,8 @@ fn tuned(base: &str, changes: &Changes) -> i32 {
         serde_json::from_slice(&told.stdout).unwrap_or_else(|_| panic!("{stderr}"));
     let written = out.join("node-parameters.toml").exists();
     let worse = summary["worse"].as_array().expect("a list").len();
+    let own = found_worse(&summary);
+    assert_eq!(own.is_empty(), worse == 0, "{own:?}: {}", summary["worse"]);
     let code = told.status.code().expect("a code");
     assert_eq!((written, worse == 0), (code == 0, code == 0), "{summary}");
     assert_eq!(summary["accepted"], code == 0);
@@ -130,6 +181,28 @@ fn tuning_never_makes_an_axis_worse() {
     tuned(
         BENCH,
         &vec![("moving.mass", 0.08, "kg"), ("numerics.step", 50.0, "us")],
+    );
+}
+
+/// Nor does it make one of the random axes of the plant's calibration worse.
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+fn tuning_makes_no_random_axis_worse() {
+    let [mut accepted, mut refused] = [0, 0];
+    for seed in 0..30 {
+        let text = crate::plant_check::text(seed);
+        if wheeleg_config::AxisConfig::parse("random.toml", &text).is_err() {
+            continue;
+        }
+        match tuned(&text, &Vec::new()) {
+            0 => accepted += 1,
+            _ => refused += 1,
+        }
+    }
+    println!("{accepted} tuned, {refused} refused");
+    assert!(
+        accepted >= 5 && accepted + refused >= 20,
+        "{accepted} and {refused}"
     );
 }
 

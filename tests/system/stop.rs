@@ -32,14 +32,6 @@ pub(crate) fn start(out: &Path, arguments: &[&str], outputs: fn() -> Stdio) -> C
         .expect("start")
 }
 
-/// Runs a robot that stands, in a folder below `dir`; path of its log.
-pub(crate) fn log_of_a_run(dir: &Path) -> String {
-    let out = dir.join("run");
-    let run = start(&out, &["run", "stand"], Stdio::null);
-    assert!(end(run).status.success());
-    out.join("log.mcap").to_string_lossy().into_owned()
-}
-
 /// Waits until something is there, while the program runs.
 fn wait_until(child: &mut Child, what: &str, there: impl Fn() -> bool) {
     let begin = Instant::now();
@@ -299,6 +291,53 @@ fn every_long_command_can_be_stopped_at_any_time() {
     assert!(3 * stopped >= started, "{stopped} of {started}");
 }
 
+/// Every study and campaign is caught at its work by one of some instants after it has taken its folder:
+/// it ends with the code of the signal, and says which it was and how far it came.
+#[test]
+fn every_study_that_is_caught_at_its_work_names_the_signal() {
+    let inputs = Inputs::new();
+    let signals = [
+        ("TERM", 143, "terminated"),
+        ("HUP", 129, "hung up"),
+        ("INT", 130, "interrupted"),
+    ];
+    let mut caught = 0;
+    let mut missed = Vec::new();
+    let tried = inputs.commands(false).into_iter();
+    let tried = tried.filter(|t| matches!(t.leaves, Leaves::Study(_) | Leaves::Parts));
+    for (number, tried) in tried.enumerate() {
+        let (name, code, word) = signals[number % signals.len()];
+        let again = tried.leaves == Leaves::Parts && name != "INT";
+        let code = if again { 75 } else { code };
+        let mut told = String::new();
+        let found = (0..12).any(|attempt| {
+            let folder = tempfile::tempdir().expect("temporary folder");
+            let out = folder.path().join("out");
+            let mut command = inputs.start(&tried, &out);
+            command.stdin(Stdio::null()).stdout(Stdio::piped());
+            let mut child = command.stderr(Stdio::piped()).spawn().expect("start");
+            let begun = || out.join(".lock").exists() || out.join("plan.json").exists();
+            while !begun() && child.try_wait().expect("status").is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(Duration::from_millis(20 * attempt));
+            if child.try_wait().expect("status").is_none() {
+                signal(&child, name);
+            }
+            let output = end(child);
+            told = String::from_utf8_lossy(&output.stderr).into_owned();
+            output.status.code() == Some(code) && told.contains(word) && told.contains(" of ")
+        });
+        if found {
+            caught += 1;
+        } else {
+            missed.push(format!("{:?} {name}: {told}", tried.arguments));
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+    assert!(caught >= 9, "{caught}");
+}
+
 /// Bytes of the finished parts of a campaign.
 fn parts(out: &Path) -> Vec<(String, Vec<u8>)> {
     let names = files_below(out).into_iter().filter(|name| {
@@ -393,9 +432,55 @@ fn a_folder_that_vanishes_costs_no_verdict() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(told.contains("required targets met"), "{told}");
     assert!(
-        said.contains("summary.json") && !said.contains("panicked"),
+        said.contains("log.mcap") && said.contains("csv") && !said.contains("panicked"),
         "{said}"
     );
+    // What can be made anew is.
+    assert_valid(&summary(&out), "run");
+}
+
+/// The folder of any study goes while it is under way: what is made anew has its summary, or nothing
+/// is there. A report alone would pass for a whole study.
+#[test]
+fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
+    let inputs = Inputs::new();
+    let mut remade = 0;
+    for tried in inputs.commands(true) {
+        let Leaves::Study(study) = tried.leaves else {
+            continue;
+        };
+        for delay_ms in [0, 150] {
+            let folder = tempfile::tempdir().expect("temporary folder");
+            let out = folder.path().join("out");
+            let mut command = inputs.start(&tried, &out);
+            command.stdin(Stdio::null()).stdout(Stdio::piped());
+            let mut child = command.stderr(Stdio::piped()).spawn().expect("start");
+            wait_until(&mut child, "the folder", || out.join(".lock").exists());
+            std::thread::sleep(Duration::from_millis(delay_ms));
+            while out.exists() && fs::remove_dir_all(&out).is_err() {}
+            let output = end(child);
+            let said = String::from_utf8_lossy(&output.stderr);
+            let told = format!("{:?}, {delay_ms} ms: {said}", tried.arguments);
+            assert!(!said.contains("panicked"), "{told}");
+            let left = files_below(&out);
+            assert_eq!(
+                out.join("summary.json").exists(),
+                out.join("report.html").exists(),
+                "{left:?}, {told}"
+            );
+            if out.join("summary.json").exists() {
+                assert_valid(&summary(&out), study);
+                remade += 1;
+            }
+            if study == "tune" && output.status.success() {
+                assert!(
+                    left.iter().any(|file| file == "node-parameters.toml"),
+                    "{told}"
+                );
+            }
+        }
+    }
+    assert!(remade >= 8, "{remade} folders were made anew");
 }
 
 /// It goes as soon as it is there: whatever of it is made anew, the verdict is told, and that the

@@ -49,6 +49,7 @@ mod schema;
 mod service;
 mod session;
 #[cfg(unix)]
+mod start_up;
 mod stop;
 #[cfg(unix)]
 mod terminal;

@@ -16,7 +16,7 @@ use crate::reason::Reason;
 /// Largest frame of a client, MAC included.
 pub const FRAME_MAX: usize = 4096;
 /// Fastest subscription, Hz.
-const HZ_MAX: u64 = 50;
+pub const HZ_MAX: u64 = 50;
 /// Longest life of a command, ms.
 const VALID_MAX_MS: u64 = 1_000;
 /// Longest life of a command about parameters, ms.

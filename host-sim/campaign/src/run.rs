@@ -118,11 +118,18 @@ pub fn run(
     let result = work.run(blocks, options.threads);
     live.tell(true);
     progress.clear();
-    result?;
     let (found, computed) = (
         live.found.load(Ordering::Relaxed),
         live.computed.load(Ordering::Relaxed),
     );
+    result.inspect_err(|_| {
+        // Standard error may be closed or full.
+        let done = found + computed;
+        let _ = writeln!(
+            std::io::stderr(),
+            "{done} of {of} cases had a result when a file could not be written"
+        );
+    })?;
     Ok(Ran {
         found,
         computed,

@@ -412,7 +412,7 @@ impl Store {
 /// Writes a file whole: under another name, synced, renamed, and the folder synced.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let temporary = temporary(path);
-    let result = fill(&temporary, bytes).and_then(|()| {
+    let result = fill(&temporary, path, bytes).and_then(|()| {
         fs::rename(&temporary, path)
             .and_then(|()| sync_folder(path))
             .map_err(|e| CampaignError::output("write", path, e))
@@ -426,12 +426,15 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CampaignError
 /// Creates a file whole, unless it is there by now.
 fn create_new(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let temporary = temporary(path);
-    let result = fill(&temporary, bytes).and_then(|()| match fs::hard_link(&temporary, path) {
-        Ok(()) => sync_folder(path).map_err(|e| CampaignError::output("write", path, e)),
-        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(()),
-        // A file system without links: whoever comes second writes the same.
-        Err(_) => fs::rename(&temporary, path).map_err(|e| CampaignError::output("write", path, e)),
-    });
+    let result =
+        fill(&temporary, path, bytes).and_then(|()| match fs::hard_link(&temporary, path) {
+            Ok(()) => sync_folder(path).map_err(|e| CampaignError::output("write", path, e)),
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(()),
+            // A file system without links: whoever comes second writes the same.
+            Err(_) => {
+                fs::rename(&temporary, path).map_err(|e| CampaignError::output("write", path, e))
+            }
+        });
     let _ = fs::remove_file(&temporary);
     result
 }
@@ -441,14 +444,15 @@ fn temporary(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}.tmp", host::unique()))
 }
 
-fn fill(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+/// Writes the file that will be at `path`, which is the one that the user knows.
+fn fill(temporary: &Path, path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let write = || -> std::io::Result<()> {
-        let mut file = File::create(path)?;
+        let mut file = File::create(temporary)?;
         file.write_all(bytes)?;
         file.sync_all()
     };
     write().map_err(|e| {
-        let _ = fs::remove_file(path);
+        let _ = fs::remove_file(temporary);
         CampaignError::output("write", path, e)
     })
 }

@@ -213,8 +213,22 @@ impl AxisConfig {
     /// [`ConfigError`] with every problem found: file, line, field, value,
     /// accepted units or range.
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
-        let what = format!("the axis file {file} is not usable");
-        let mut r = Reader::parse(&what, file, text, true)?;
+        Self::parse_as(&format!("the axis file {file} is not usable"), file, text)
+    }
+
+    /// The same axis with other values, which are judged as the file's own are; `what` says what cannot
+    /// be done where one of them is wrong.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with every field that is out of its range or does not fit the others.
+    pub fn with(&self, what: &str, changes: &[Change]) -> Result<Self, ConfigError> {
+        let builtin::Source { file, text } = &self.source;
+        let text = Self::rewritten(file, text, changes)?;
+        Self::parse_as(what, file, &text)
+    }
+
+    fn parse_as(what: &str, file: &str, text: &str) -> Result<Self, ConfigError> {
+        let mut r = Reader::parse(what, file, text, true)?;
         let Parts {
             name,
             description,
@@ -238,7 +252,7 @@ impl AxisConfig {
                 },
             })
         })();
-        let (mut config, parameters) = r.finish(&what, config)?;
+        let (mut config, parameters) = r.finish(what, config)?;
         config.parameters = parameters;
         Ok(config)
     }
@@ -270,7 +284,7 @@ impl Parts {
 
 fn facts(axis: Option<&AxisParams>) -> relations::Read<'_> {
     relations::Read {
-        moved: axis.map(moved),
+        moved: axis.map(Moved::of),
         axis,
         robot: None,
     }
@@ -318,17 +332,6 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
         step_ns: sensing.step_ns,
     };
     Some(axis)
-}
-
-fn moved(axis: &AxisParams) -> Moved<'_> {
-    Moved {
-        cylinder: &axis.cylinder,
-        gas: &axis.gas,
-        supply: &axis.supply,
-        mass_kg: axis.moving_mass_kg,
-        load_n: axis.load_n.abs(),
-        step_s: axis.step_ns as f64 * 1e-9,
-    }
 }
 
 #[cfg(test)]

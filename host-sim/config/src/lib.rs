@@ -57,7 +57,7 @@ pub use params::{FieldSpec, ParamValue, ParameterInfo, Params};
 pub use plant::sections::MASS as MASSES_KG;
 pub use quantity::Dimension;
 pub use quantity::{brief, pretty};
-pub use relations::{Advised, RELATIONS, Relation, SEAT_MM, SENSOR_TRACK};
+pub use relations::{Advised, RELATIONS, Relation, SEAT_MM, SENSOR_TRACK, least_mass_kg};
 pub use relief::Relief;
 pub use robot::{
     BusParams, HomingParams, ReferenceParams, RobotConfig, SpatialParams, StartUpParams,

@@ -108,6 +108,7 @@ const QUICK_PUSH: &[Set] = &[
     ("gait.stroke", "1.0", "mm"),
     ("gait.push_speed", "0.4", "m/s"),
     ("gait.push_acceleration", "5.0", "m/s2"),
+    ("motor.reduction", "100.0", "1"),
 ];
 /// Boards that press a piston against its stop.
 const PRESSING: &[Set] = &[
@@ -133,6 +134,7 @@ const EXAMPLES: &[Example] = &[
     example("trapped air B, horizontal", ROBOT, &[], ("start.horizontal.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.horizontal.pressure_b", "supply.set_pressure"]),
     example("trapped air A, vertical", ROBOT, &[], ("start.vertical.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_a", "supply.set_pressure"]),
     example("trapped air B, vertical", ROBOT, &[], ("start.vertical.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_b", "supply.set_pressure"]),
+    example("density of the gas", AXIS, &[], ("gas.reference_density", "{}", "kg/m3"), [0.3, 1.185], &["gas.reference_density", "gas.gas_constant"]),
     example("rod", AXIS, &[], ("cylinder.rod", "{}", "mm"), [18.001, 18.0], &["cylinder.rod", "cylinder.bore"]),
     example("cushion", AXIS, &[("cylinder.stroke", "45.0", "mm")], ("end_stop.cushion_length", "{}", "mm"), [45.001, 45.0], &["end_stop.cushion_length", "cylinder.stroke"]),
     example("break-away", AXIS, &[], ("friction.static", "{}", "N"), [9.999, 10.0], &["friction.static", "friction.coulomb"]),
@@ -166,6 +168,9 @@ const EXAMPLES: &[Example] = &[
     example("push before the end", ROBOT, QUICK_PUSH, ("gait.push", "{}", "s"), [30.0, 29.971], &["gait.period", "gait.push"]),
     example("time to touch down", ROBOT, &[], ("gait.touchdown_speed", "{}", "mm/s"), [15.0, 15.02], &["gait.touchdown_speed", "gait.touchdown_speed", "gait.push", "gait.lower"]),
     example("time to push", ROBOT, &[], ("gait.push_speed", "{}", "m/s"), [0.1, 0.18], &["gait.period", "gait.push", "gait.push_speed"]),
+    example("current of a motor", ROBOT, &[], ("motor.resistance", "{}", "ohm"), [0.01, 1.2], &["motor.resistance"]),
+    example("friction of a motor", ROBOT, &[], ("motor.friction", "{}", "mN m"), [300.0, 1.0], &["motor.friction", "motor.supply", "motor.torque_constant", "motor.resistance"]),
+    example("speed of the wheels", ROBOT, &[], ("motor.reduction", "{}", "1"), [2000.0, 260.0], &["motor.supply", "motor.torque_constant", "motor.reduction"]),
     example("inertias of the chassis", ROBOT, &[], ("spatial.chassis_roll_inertia", "{}", "kg m2"), [0.1, 0.2], &[]),
     example("inertias of a wheel", ROBOT, &[], ("spatial.wheel_transverse_inertia", "{}", "kg m2"), [0.008, 0.0081], &[]),
     example("inertias of the yaw barrel", ROBOT, &[], ("link.yaw_barrel.inertia", "[{}, 1e-3, 1e-3]", "kg m2"), [2.001e-3, 2e-3], &[]),
@@ -683,6 +688,9 @@ fn what_the_plant_cannot_follow_is_told_in_the_unit_of_the_file() {
         &said,
         &[
             "`contact.stiffness` = 1000000 N/mm (line ",
+            "`numerics.step` = ",
+            "`link.vertical_rod.mass` = ",
+            "is too much",
             "step of this file: 0.001 to ",
         ],
     );

@@ -22,7 +22,7 @@ use wheeleg_telemetry::channel_index;
 
 use crate::foxglove::{self, Viewing};
 use crate::guard::{Hosts, Peer, Place};
-use crate::hub::{LONGEST_S, StopBy};
+use crate::hub::{EVENTS, LONGEST_S, StopBy};
 use crate::page::Page;
 use crate::record::folder;
 use crate::session::{self, Context};
@@ -440,17 +440,17 @@ async fn events(
     query: Result<Query<Last>, axum::extract::rejection::QueryRejection>,
 ) -> Response {
     let last = match query {
-        Ok(Query(Last { last })) => last.unwrap_or(256),
+        Ok(Query(Last { last })) => last.map_or(EVENTS, usize::from),
         Err(_) => 0,
     };
-    if !(1..=256).contains(&last) {
+    if !(1..=EVENTS).contains(&last) {
         return problem(
             StatusCode::BAD_REQUEST,
-            "`last`: allowed are 1 to 256",
+            &format!("`last`: allowed are 1 to {EVENTS}"),
             "leave it out",
         );
     }
-    json_text(server.context.hub.events(last.into()))
+    json_text(server.context.hub.events(last))
 }
 
 async fn faults(State(server): State<Arc<Server>>) -> Response {

@@ -41,7 +41,7 @@ const BATCH_PERIOD: Duration = Duration::from_millis(20);
 /// Time in which a command must have its ticket.
 const TICKET: Duration = Duration::from_secs(2);
 /// Events that are kept for who asks later.
-const EVENTS: usize = 256;
+pub const EVENTS: usize = 256;
 /// Stops of one connection whose answers are waited for.
 const STOPS: usize = 16;
 /// Clients at a time; the last place is for a role that may control.

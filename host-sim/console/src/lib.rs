@@ -40,6 +40,7 @@ pub mod unpack;
 pub use api::SUBPROTOCOL;
 pub use catalogue::{command_list, usual};
 pub use error::ConsoleError;
+pub use hub::EVENTS;
 pub use live::{Live, Port, SlowAdapter};
 pub use record::{FOLDER, Summary};
 pub use server::{ADDRESS, Options, Prepared, Protection, Server};

@@ -40,6 +40,13 @@ impl From<DynamicsError> for PlantError {
     }
 }
 
+/// Most current of a motor \[A\].
+pub const MOTOR_CURRENT_A: f64 = 1e3;
+/// How far from its start a robot may be \[m\]: further than it drives in the longest run.
+const PLACE_M: f64 = 1e7;
+/// How far its wheels may have turned by then \[rad\].
+const TURNED_RAD: f64 = 1e9;
+
 /// Motion of the whole robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BodyMotion {
@@ -255,10 +262,10 @@ impl Mechanics<6> for BodyMechanics {
 
     fn check(&self, state: &BodyMotion) -> Result<(), PlantError> {
         for (i, value) in state.state.position_m.iter().enumerate() {
-            check_state("position_m", i, *value, -1e5, 1e5)?;
+            check_state("position_m", i, *value, -PLACE_M, PLACE_M)?;
         }
         for (i, value) in state.state.wheel_rad.iter().enumerate() {
-            check_state("wheel_rad", i, *value, -1e6, 1e6)?;
+            check_state("wheel_rad", i, *value, -TURNED_RAD, TURNED_RAD)?;
         }
         for (i, value) in state.state.velocity.iter().enumerate() {
             check_state("velocity", i, *value, -100.0, 100.0)?;
@@ -267,7 +274,13 @@ impl Mechanics<6> for BodyMechanics {
             check_state("acceleration", i, *value, -1e5, 1e5)?;
         }
         for (i, motor) in state.motors.iter().enumerate() {
-            check_state("motor_current_a", i, motor.current_a, -1e3, 1e3)?;
+            check_state(
+                "motor_current_a",
+                i,
+                motor.current_a,
+                -MOTOR_CURRENT_A,
+                MOTOR_CURRENT_A,
+            )?;
         }
         Ok(())
     }

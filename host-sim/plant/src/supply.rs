@@ -23,8 +23,8 @@ use crate::valve::{ValveParams, ValveState, ValveTiming};
 /// A heavy piston that runs against trapped air raises it above its supply: of sound axes the most
 /// was 2.1 times the source (the combinations of the control bars). Beyond this the numbers are wrong.
 const COMPRESSION: f64 = 4.0;
-/// The same for any supply \[Pa\].
-const MOST_PA: f64 = 1e7;
+/// The pressures that a chamber or a reservoir can have with any supply \[Pa\].
+pub const PRESSURES_PA: [f64; 2] = [1e3, 1e7];
 
 /// The supply.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -250,13 +250,13 @@ impl SupplyModel {
         ];
     }
 
-    /// The largest pressure that a chamber can have \[Pa\]: [`COMPRESSION`] times the highest of the
-    /// supply, and [`MOST_PA`].
+    /// The largest pressure that a chamber or the reservoir can have \[Pa\]: [`COMPRESSION`] times the highest of the
+    /// supply, and the end of [`PRESSURES_PA`].
     #[must_use]
     pub fn most_pa(&self) -> f64 {
         let p = &self.params;
         let highest_pa = p.source_pressure_pa.max(p.set_pressure_pa);
-        (COMPRESSION * highest_pa.max(p.initial_pressure_pa)).min(MOST_PA)
+        (COMPRESSION * highest_pa.max(p.initial_pressure_pa)).min(PRESSURES_PA[1])
     }
 
     /// Refuses a state that is not finite or has left the model's range.
@@ -268,8 +268,8 @@ impl SupplyModel {
             "supply_pressure_pa",
             0,
             self.pressure_pa(state.mass_kg),
-            1e3,
-            1e8,
+            PRESSURES_PA[0],
+            self.most_pa(),
         )
     }
 }

@@ -23,7 +23,7 @@ use crate::error::{PlantError, check};
 use crate::hash::StateHasher;
 use crate::soil::Soil;
 pub use ellipsoid::Ellipsoid;
-pub use height_map::{HeightMap, HeightMapError, STEEPEST_DEG};
+pub use height_map::{HeightMap, HeightMapError, MOST as MOST_VALUES, STEEPEST_DEG};
 pub use index::Index;
 pub use overlap::{Heap, MOST_OVER_A_PLACE, heap};
 pub use plane::Plane;

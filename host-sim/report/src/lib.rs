@@ -11,6 +11,7 @@ mod error;
 pub mod number;
 pub mod output;
 mod page;
+pub mod plain;
 pub mod plot;
 pub mod results;
 mod script;

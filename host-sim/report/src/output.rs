@@ -146,11 +146,8 @@ impl Drop for Folder {
             return;
         }
         if let Some(previous) = &self.previous {
-            for name in results(self.also) {
-                // What is not there does not come back.
-                let _ = std::fs::rename(previous.join(name), self.path.join(name));
-            }
-            let _ = std::fs::remove_dir(previous);
+            let all: Vec<&str> = results(self.also).collect();
+            bring_back(&self.path, previous, &all);
         } else if !self.made.is_empty() {
             // It is still locked; who has opened it meanwhile finds another file in its place.
             let _ = std::fs::remove_file(self.path.join(LOCK));
@@ -273,6 +270,14 @@ fn take(_: &File) -> std::io::Result<bool> {
     Ok(true)
 }
 
+/// Moves results back to where they were set aside from; what is not there does not come back.
+fn bring_back(folder: &Path, previous: &Path, names: &[&str]) {
+    for name in names {
+        let _ = std::fs::rename(previous.join(name), folder.join(name));
+    }
+    let _ = std::fs::remove_dir(previous);
+}
+
 /// Moves the results in a folder to the next free `previous`, if there are any; where they are.
 fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<PathBuf>, ReportError> {
     let old: Vec<&str> = results(also)
@@ -284,10 +289,13 @@ fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<Path
     let previous = free_place(folder);
     std::fs::create_dir_all(&previous)
         .map_err(|e| ReportError::output("create the folder", &previous, e))?;
-    for name in old {
+    for (moved, name) in old.iter().enumerate() {
         let path = folder.join(name);
-        std::fs::rename(&path, previous.join(name))
-            .map_err(|e| ReportError::output("set aside", &path, e))?;
+        if let Err(e) = std::fs::rename(&path, previous.join(name)) {
+            // Results of one run stay in one folder.
+            bring_back(folder, &previous, &old[..moved]);
+            return Err(ReportError::output("set aside", &path, e));
+        }
     }
     // Standard error may be closed or full.
     let _ = writeln!(
@@ -401,6 +409,26 @@ mod tests {
         fs::write(folder.join("log.mcap"), "new").expect("written");
         drop(held);
         assert!(folder.join("previous/summary.json").exists());
+    }
+
+    /// One that cannot be moved: there is no folder for it in `previous`.
+    #[test]
+    fn results_that_cannot_all_be_set_aside_stay_together() {
+        let temporary = tempfile::tempdir().expect("temporary folder");
+        let folder = temporary.path();
+        fs::write(folder.join("log.mcap"), "first").expect("written");
+        fs::create_dir(folder.join("deep")).expect("created");
+        fs::write(folder.join("deep/result"), "first").expect("written");
+        let refused = Folder::prepare(folder, &["deep/result"], &[]).expect_err("not moved");
+        assert!(refused.to_string().contains("deep/result"), "{refused}");
+        for file in ["log.mcap", "deep/result"] {
+            assert_eq!(
+                fs::read(folder.join(file)).expect("there"),
+                b"first",
+                "{file}"
+            );
+        }
+        assert!(!folder.join("previous").exists());
     }
 
     #[test]

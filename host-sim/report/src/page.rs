@@ -4,13 +4,15 @@ use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior, Value};
 use serde::Serialize;
 
+use crate::plain::acts;
 use crate::plot::{Figure, PanelData};
 use crate::{ReportError, number, script};
 
 /// A page of the program from its own template, which extends `base.html`: frame,
 /// style sheet and figures are the same on all of them, and numbers are formatted there
 /// by the filters of [`number`]. A value that a template prints or goes through and
-/// nobody gives is an error, not an empty place; `if` may ask.
+/// nobody gives is an error, not an empty place; `if` may ask. What a text of somebody else's would
+/// tell a reader to do is taken out ([`acts`]).
 ///
 /// # Errors
 /// [`ReportError::Template`] if the template does not fit its values.
@@ -26,7 +28,12 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     env.add_template("base.html", include_str!("base.html"))?;
     env.add_template("page.html", template)?;
     let values = Value::from(Serde(values));
-    Ok(env.get_template("page.html")?.render(values)?)
+    let text = env.get_template("page.html")?.render(values)?;
+    let shown = |c: char| match acts(c) && !matches!(c, '\n' | '\t') {
+        true => char::REPLACEMENT_CHARACTER,
+        false => c,
+    };
+    Ok(text.chars().map(shown).collect())
 }
 
 /// A figure for a template.
@@ -74,4 +81,19 @@ pub fn pictures(figures: &[(Figure, String)]) -> Vec<Picture<'_>> {
 pub fn json(value: &impl Serialize) -> String {
     let text = serde_json::to_string(value).expect("plain data is JSON");
     text.replace('<', "\\u003c")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_text_would_tell_a_reader_to_do_is_taken_out_of_a_page() {
+        let template = "{% extends \"base.html\" %}{% block main %}{{ text }}{% endblock %}";
+        let text = "a\u{0}b\u{1b}[31mc\u{202e}d\u{2066}e\tf\ng";
+        let made = page(template, minijinja::context! { text => text }).expect("a page");
+        let shown = "a\u{fffd}b\u{fffd}[31mc\u{fffd}d\u{fffd}e\tf\ng";
+        assert!(made.contains(shown), "it is shown");
+        assert!(!made.contains(|c: char| acts(c) && !"\n\t".contains(c)));
+    }
 }

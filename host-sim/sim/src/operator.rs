@@ -39,6 +39,30 @@ fn remedy(robot: &RobotConfig) -> String {
     )
 }
 
+/// What each joint is asked for before a run, with the fields that say so: one leg is drawn back, the
+/// other held.
+fn moves(robot: &RobotConfig) -> [String; 6] {
+    let gait = &robot.gait;
+    let asked = [
+        ("yaw", "`gait.yaw_s2`", gait.yaw_s2_m),
+        ("horizontal", "0", 0.0),
+        ("vertical", "`gait.stroke`", gait.stroke_m),
+        ("yaw", "`gait.yaw_s2`", gait.yaw_s2_m),
+        ("horizontal", "`gait.held_leg_s5`", gait.held_leg_s5_m),
+        ("vertical", "`gait.held_leg_s6`", gait.held_leg_s6_m),
+    ];
+    std::array::from_fn(|joint| {
+        let (start, field, to_m) = asked[joint];
+        let from_mm = robot.plant.initial_stroke_m[joint] * 1e3;
+        format!(
+            "joint {} goes from `start.{start}.stroke` = {from_mm:.1} mm to {field} = {:.1} mm, where \
+             the robot has to come to rest; ",
+            joint + 1,
+            to_m * 1e3
+        )
+    })
+}
+
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
@@ -73,6 +97,10 @@ pub(super) struct Operator {
     flood_refused: bool,
     /// What to do where it does not get ready.
     remedy: String,
+    /// What each joint is asked for.
+    moves: [String; 6],
+    /// What to do where the time is not enough.
+    late_remedy: String,
     /// The same where a board refuses to be armed.
     arming_remedy: String,
 }
@@ -99,6 +127,12 @@ impl Operator {
             next_event: 0,
             flood_refused: false,
             remedy: remedy(robot),
+            moves: moves(robot),
+            late_remedy: format!(
+                "`start_up.limit` = {:.2} s of the robot {} is over, of which its rest, `start_up.rest`, \
+                 takes {:.2} s: allow more time",
+                robot.start_up.limit_s, robot.file, robot.start_up.rest_s
+            ),
             arming_remedy: format!(
                 "correct the robot {}: a board that reports a fault cannot be armed; its sensor \
                  (`[sensor.*]`, `cylinder.stroke`) and its parameters (`[node.*]`) must agree",
@@ -132,7 +166,7 @@ impl Operator {
                     return Err(self.not_ready(now_ns, &self.arming_remedy));
                 }
                 Event::HomingFailed { .. } | Event::Hold(_) | Event::Refused { .. } => {
-                    return Err(self.not_ready(now_ns, &self.remedy));
+                    return Err(self.not_ready(now_ns, &self.remedy_of_pose()));
                 }
                 Event::SchemaMismatch { .. } => {
                     let help = "build and flash this board from the sources of this program; \
@@ -159,8 +193,10 @@ impl Operator {
                 }
                 (Command::Stand, Stage::Homing)
             }
-            Stage::Settling { until_ns } => return Ok(now_ns >= until_ns),
-            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, &self.remedy)),
+            Stage::Settling { until_ns } if now_ns >= until_ns && now_ns <= self.limit_ns => {
+                return Ok(true);
+            }
+            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, &self.late_remedy)),
             _ => return Ok(false),
         };
         world
@@ -169,6 +205,17 @@ impl Operator {
             .map_err(|why| refused(&command, &why))?;
         self.stage = next;
         Ok(false)
+    }
+
+    /// The remedy, with what the joint is asked for that reported last.
+    fn remedy_of_pose(&self) -> String {
+        let mut boards = self.start_up.iter().rev().map(|(_, cause)| cause.board());
+        let joint = boards.find_map(|board| {
+            let joint = board.filter(|board| board.is_joint())?;
+            self.moves.get(usize::from(joint.raw()) - 1)
+        });
+        let moves = joint.map_or("", String::as_str);
+        format!("{moves}{}", self.remedy)
     }
 
     fn not_ready(&self, now_ns: u64, help: &str) -> SimError {

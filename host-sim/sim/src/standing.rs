@@ -14,32 +14,60 @@ use crate::SimError;
 /// Beyond this slope nobody looks, degrees.
 const STEEPEST_DEG: u32 = 60;
 
-/// Whether the robot stands in its start pose on a rough plane, nose uphill.
-fn stands(params: &PlantParams, slope_deg: u32) -> bool {
-    let mut params = params.clone();
-    params.terrain.parts = vec![Part {
-        shape: Shape::Plane(Plane::sloping(f64::from(slope_deg).to_radians(), 0.0)),
-        material: Material::ROUGH,
-    }];
-    Plant::new(&params).is_ok_and(|plant| plant.initial_state(0).is_ok())
+/// Whether the robot stands in its start pose where it starts.
+fn stands(params: &PlantParams) -> bool {
+    Plant::new(params).is_ok_and(|plant| plant.initial_state(0).is_ok())
+}
+
+/// The steepest plane of a material on which the robot stands in its start pose, nose uphill, degrees.
+fn steepest_deg(params: &PlantParams, material: &Material) -> Option<u32> {
+    let on_slope = |slope_deg: &u32| {
+        let mut params = params.clone();
+        params.terrain.parts = vec![Part {
+            shape: Shape::Plane(Plane::sloping(f64::from(*slope_deg).to_radians(), 0.0)),
+            material: *material,
+        }];
+        stands(&params)
+    };
+    (0..=STEEPEST_DEG).take_while(on_slope).last()
+}
+
+/// What is wrong with a part of the ground on which the robot would stand if it were rough, and what is
+/// allowed with its friction.
+fn slips(params: &PlantParams, parts: Range<usize>) -> Option<[String; 2]> {
+    let material = params.terrain.parts.get(parts.start)?.material;
+    let mut rough = params.clone();
+    for part in rough.terrain.parts.get_mut(parts)? {
+        part.material = Material::ROUGH;
+    }
+    if !stands(&rough) {
+        return None;
+    }
+    let allowed = match steepest_deg(params, &material) {
+        Some(deg) => format!("allowed on this `material` is a slope up to {deg}°, nose uphill"),
+        None => "on this `material` it does not stand even on level ground".to_owned(),
+    };
+    Some([
+        "it slips: with a rough `material` of the same shape it stands".to_owned(),
+        format!("{allowed}; or take a `material` with more friction (`mu_static`)"),
+    ])
 }
 
 /// Sections of the ground that are tried, nearest to the begin of the file first.
 const MOST_TRIED: usize = 200;
 
 /// The section of the scenario's ground without which the robot stands.
-fn culprit(ground: &Ground, params: &PlantParams) -> Option<usize> {
+fn culprit(ground: &Ground, params: &PlantParams) -> Option<(usize, Range<usize>)> {
     let is_culprit = |parts: &Range<usize>| {
         let mut without = params.clone();
         without.terrain.parts.drain(parts.clone());
         if without.terrain.parts.is_empty() {
             without.terrain = Terrain::default();
         }
-        Plant::new(&without).is_ok_and(|plant| plant.initial_state(0).is_ok())
+        stands(&without)
     };
     let mut sections = ground.sections().take(MOST_TRIED);
-    let found = sections.find(|(_, parts)| is_culprit(parts));
-    found.map(|(section, _)| section)
+    sections.find(|(_, parts)| is_culprit(parts))
 }
 
 /// Where wheels and soles are in the start pose, in words.
@@ -75,8 +103,7 @@ pub(crate) fn refused(
     params: &PlantParams,
     error: &dyn std::fmt::Display,
 ) -> SimError {
-    let stood = (0..=STEEPEST_DEG).take_while(|deg| stands(params, *deg));
-    let Some(deg) = stood.last() else {
+    let Some(deg) = steepest_deg(params, &Material::ROUGH) else {
         let help = format!(
             "correct the robot {robot}: in its start pose it cannot stand even on level ground"
         );
@@ -85,10 +112,14 @@ pub(crate) fn refused(
     let allowed = format!(
         "allowed is ground without rock, edge or hole below wheels and soles, nose uphill up to {deg}°"
     );
-    let Some(section) = culprit(&scenario.ground, params) else {
+    let Some((section, parts)) = culprit(&scenario.ground, params) else {
         let help = format!("correct the scenario's [[terrain]]: {allowed}");
         return SimError::simulation(error.to_string(), help);
     };
+    if let Some([why, allowed]) = slips(params, parts) {
+        let refusal = scenario.refuse_ground(section, &format!("{error}; {why}"), &allowed);
+        return SimError::Config(Box::new(refusal));
+    }
     let places = places(params).map_or(String::new(), |places| format!("; {places}"));
     let why = format!("{error}; without this part of the ground it does");
     let refusal = scenario.refuse_ground(section, &why, &format!("{allowed}{places}"));
@@ -151,5 +182,45 @@ mod tests {
         assert!(said.contains("height = \"1 m\""), "{said}");
         let help = problem.help_text().expect("what is allowed");
         assert!(help.contains("wheels are at x = 0 and y = ±0.2"), "{help}");
+    }
+
+    /// What slips is told of its friction, and of the slope that this friction holds.
+    #[test]
+    fn ground_that_is_too_smooth_is_named_by_its_material() {
+        let robot = builtin::robot("wheeleg").expect("built in");
+        for (material, slope, allowed) in [
+            ("\"ice\"", "9 deg", "a slope up to 5°"),
+            (
+                "{ mu_static = 0.0, mu_kinetic = 0.0 }",
+                "0.5 deg",
+                "a slope up to 0°",
+            ),
+        ] {
+            let text = format!(
+                "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\nseed = 1\n\
+                 targets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\nkind = \"plane\"\n\
+                 slope = \"{slope}\"\nmaterial = {material}\n"
+            );
+            let scenario = Scenario::parse("my.toml", &text).expect("sound");
+            let mut plant = robot.plant.clone();
+            plant.terrain = scenario.ground.terrain.clone();
+            let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
+            else {
+                panic!("an error of the scenario");
+            };
+            let [problem] = refusal.problems() else {
+                panic!("{:?}", refusal.problems());
+            };
+            let help = problem.help_text().expect("what is allowed");
+            assert!(
+                problem.summary().contains("it slips"),
+                "{}",
+                problem.summary()
+            );
+            assert!(
+                help.contains(allowed) && help.contains("`material`"),
+                "{help}"
+            );
+        }
     }
 }

@@ -166,4 +166,51 @@ mod tests {
         assert_eq!(part(LEG + 5), Part::Joint(5));
         assert_eq!(part(WHEEL + 1), Part::Wheel(1));
     }
+
+    /// Names of the plant's state variables, from the lines that check them.
+    fn state_names() -> Vec<&'static str> {
+        let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../plant/src/");
+        let files = ["cylinder/model.rs", "supply.rs", "body.rs"];
+        let texts = files.map(|file| std::fs::read_to_string(format!("{plant}{file}")));
+        let mut names = Vec::new();
+        for text in texts {
+            let text: &'static str = text.expect("a source").leak();
+            let calls = text.split("check_state(").skip(1);
+            names.extend(
+                calls.filter_map(|call| call.trim_start().strip_prefix('"')?.split('"').next()),
+            );
+        }
+        names
+    }
+
+    /// Whatever leaves its range is told by fields that a robot's file has.
+    #[test]
+    fn every_state_of_the_plant_has_fields_of_the_file_to_blame() {
+        let robot = wheeleg_config::builtin::robot("wheeleg").expect("built in");
+        let plant = wheeleg_plant::Plant::new(&robot.plant).expect("a plant");
+        let last = plant.outputs(&plant.initial_state(1).expect("it stands"));
+        let names = state_names();
+        assert!(names.len() >= 11, "{names:?}");
+        let mut fields = 0;
+        for name in names {
+            for index in [0, LEG, WHEEL] {
+                let error = PlantError::NonFinite {
+                    name,
+                    index,
+                    value: f64::NAN,
+                };
+                let SimError::Unphysical { help, what } = failed(1_000_000, &error, &last) else {
+                    panic!("another error");
+                };
+                assert!(name == "acceleration" || what.contains(name), "{what}");
+                let own = help.split('`').skip(1).step_by(2);
+                for path in own {
+                    let known = robot.parameters.iter().any(|p| p.path == path);
+                    assert!(known, "{name}: no field `{path}`");
+                    fields += 1;
+                }
+            }
+        }
+        assert!(fields >= 60, "{fields}");
+    }
 }

@@ -527,6 +527,12 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
             with(7, "0.005,40,0,0,0,1000,101325,1"),
             "column `pressure_a_bar`: 101325 is outside",
         ),
+        // What the plant itself can have is a pressure.
+        (with(7, "0.005,40,0,0,0,1000,44.1,0.011"), ""),
+        (
+            with(7, "0.005,40,0,0,0,1000,100.1,1"),
+            "column `pressure_a_bar`: 100.1 is outside 0.01 to 100",
+        ),
         (
             with(7, "0.005,many,0,0,0,1000,1,1"),
             "\"many\" is not a number",

@@ -163,15 +163,22 @@ fn robots(folder: &Path, all: &mut Vec<Driven>) {
     let stand = builtin::scenario("stand").expect("built in");
     let mut late = robot();
     late.start_up.limit_s = 0.05;
+    late.file = "copy-of-it.toml".to_owned();
     let late = failure(&stand, &late, &folder.join("late"));
-    let words = vec!["did not get ready in 0.0", "(stage: arming)"];
+    // A copy is named by its own file.
+    let words = vec![
+        "did not get ready in 0.0",
+        "(stage: arming)",
+        "copy-of-it.toml",
+    ];
     all.push(("SimError::NotReady", Box::new(late), words));
     let fallen = || {
         let mut robot = robot();
         robot.plant.body.chassis_com_m[0] = -0.5;
+        robot.file = "copy-of-it.toml".to_owned();
         failure(&stand, &robot, &folder.join("fallen"))
     };
-    let words = || vec!["does not stand", "wheels and feet"];
+    let words = || vec!["does not stand", "wheels and feet", "copy-of-it.toml"];
     all.push(("SimError::Simulation", Box::new(fallen()), words()));
     all.push((
         "StudyError::Sim",

@@ -89,12 +89,12 @@ fn plant(all: &mut Vec<Reason>) {
     };
     let words = vec!["lies on its chassis", "61.5 N", "20.25 N"];
     add("PlantError::OnChassis", lying, words);
-    let inside = PlantError::InChassis {
-        place_m: [0.05, -0.02],
-        into_m: 0.03,
+    let within = PlantError::InChassis {
+        place_m: [0.125, -0.25],
+        into_m: 0.0625,
     };
-    let words = vec!["start place", "0.03 m into", "x = 0.05", "y = -0.02"];
-    add("PlantError::InChassis", inside, words);
+    let words = vec!["chassis", "0.0625 m", "x = 0.125", "y = -0.25 m"];
+    add("PlantError::InChassis", within, words);
     let mechanics = PlantError::Mechanics("a leg cannot close".to_owned());
     let words = vec!["a leg cannot close"];
     add("PlantError::Mechanics", mechanics, words);

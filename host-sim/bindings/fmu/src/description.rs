@@ -7,6 +7,8 @@ use std::io;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
+use wheeleg_studies::view::plain;
+
 use crate::kind::Kind;
 use crate::model::{IDENTIFIER, Model};
 use crate::units::exponents;
@@ -37,6 +39,8 @@ pub fn write(model: &Model, fmi: Fmi) -> io::Result<Vec<u8>> {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let name = format!("wheeleg {}", model.config.name);
+    // XML has no way to write most control characters.
+    let description = plain(&model.config.description);
     let tool = format!("wheeleg {}", env!("CARGO_PKG_VERSION"));
     let (version, token) = match fmi {
         Fmi::Two => ("2.0", "guid"),
@@ -46,7 +50,7 @@ pub fn write(model: &Model, fmi: Fmi) -> io::Result<Vec<u8>> {
         ("fmiVersion", version),
         ("modelName", &name),
         (token, &model.token),
-        ("description", &model.config.description),
+        ("description", &description),
         ("generationTool", &tool),
         ("license", env!("CARGO_PKG_LICENSE")),
         ("variableNamingConvention", "structured"),
@@ -252,4 +256,38 @@ fn structure(xml: &mut Xml, model: &Model, fmi: Fmi) -> io::Result<()> {
             Ok(())
         })?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::AxisConfig;
+    use wheeleg_studies::axis_sim;
+
+    /// XML 1.0, production `Char`, of what is not beyond the first plane.
+    fn is_xml(c: char) -> bool {
+        matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
+    }
+
+    #[test]
+    fn a_description_with_control_characters_is_well_formed_all_the_same() {
+        let source = AxisConfig::source("bench-vq110u").expect("built in");
+        let kinds = [Kind::Plant, Kind::Controlled];
+        for (kind, fmi) in kinds.into_iter().zip([Fmi::Two, Fmi::Three]) {
+            let law = axis_sim::Kind::Predictive;
+            let model = Model::new(kind, law, &source.file, &source.text);
+            let mut model = model.expect("a model");
+            model.config.description = "</x><b a='\"&\u{0}\u{1}\u{1b}\u{202e}\tend".to_owned();
+            let xml = write(&model, fmi).expect("written");
+            let xml = String::from_utf8(xml).expect("UTF-8");
+            assert!(xml.chars().all(is_xml), "{fmi:?}");
+            assert!(
+                !xml.contains(['\u{202e}', '\u{1b}']) && !xml.contains("<b a="),
+                "{fmi:?}"
+            );
+            let shown =
+                "&lt;/x&gt;&lt;b a=&apos;&quot;&amp;\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}end";
+            assert!(xml.contains(shown), "{fmi:?}");
+        }
+    }
 }

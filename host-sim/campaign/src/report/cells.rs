@@ -1,5 +1,7 @@
 //! Rows by the cell of the grid that they are in.
 
+use std::collections::HashMap;
+
 use wheeleg_config::plan::{Factor, Plan, Value, Values};
 
 use crate::table::{Data, Table};
@@ -46,20 +48,23 @@ pub(super) fn value(table: &Table, factor: &str, row: usize) -> Option<Value> {
 pub(super) fn cells(table: &Table, plan: &Plan) -> Vec<Cell> {
     let grid = grid(plan);
     let mut cells: Vec<Cell> = Vec::new();
+    // Where each is: a plan may have very many.
+    let mut places: HashMap<String, usize> = HashMap::new();
     for row in 0..table.rows() {
         let values = grid.iter().filter_map(|factor| value(table, factor, row));
         let values: Vec<Value> = values.collect();
-        if let Some(cell) = cells.iter_mut().find(|cell| cell.values == values) {
-            cell.rows.push(row);
-            continue;
-        }
         let named = grid.iter().zip(&values);
         let named = named.map(|(name, value)| format!("{name} {value}"));
-        cells.push(Cell {
-            name: named.collect::<Vec<_>>().join(", "),
-            values,
-            rows: vec![row],
-        });
+        let name = named.collect::<Vec<_>>().join(", ");
+        let place = *places.entry(name.clone()).or_insert(cells.len());
+        match cells.get_mut(place) {
+            Some(cell) => cell.rows.push(row),
+            None => cells.push(Cell {
+                name,
+                values,
+                rows: vec![row],
+            }),
+        }
     }
     cells
 }

@@ -23,7 +23,7 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 const BOOTSTRAP: usize = 500;
 
 /// How often something held.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Rate {
     /// How often.
     pub met: u64,
@@ -91,7 +91,7 @@ pub struct OfScenario {
 }
 
 /// What a table says.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
     /// Rows.
     pub rows: u64,

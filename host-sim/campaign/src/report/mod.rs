@@ -18,7 +18,7 @@ use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
-pub use findings::{Findings, OfScenario};
+pub use findings::{Findings, OfScenario, Rate};
 pub use pairs::{Paired, Pairs};
 pub use worst::Worst;
 

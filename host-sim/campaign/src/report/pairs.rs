@@ -13,7 +13,7 @@ use crate::CampaignError;
 use crate::columns::Column;
 
 /// A yes or no of pairs, before and after.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Split {
     /// Yes before, no after.
     pub lost: u64,
@@ -39,7 +39,7 @@ pub struct TargetSplit {
 }
 
 /// Pairs of two values of a paired factor.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Paired {
     /// The two, in words.
     pub what: String,

@@ -1,5 +1,6 @@
 //! Reads a TOML file with positions, and collects everything that is wrong.
 
+mod control;
 mod entry;
 mod plain;
 mod quantities;
@@ -58,15 +59,33 @@ impl Reader {
         let shared: Arc<str> = Arc::from(text);
         let lines = Lines::of(text);
         match Document::parse(text.to_owned()) {
-            Ok(document) => Ok(Self {
-                file: file.to_owned(),
-                text: shared,
-                lines,
-                document,
-                problems: Vec::new(),
-                parameters: Vec::new(),
-                source_required,
-            }),
+            Ok(document) => {
+                let mut found = Vec::new();
+                control::find("", document.as_item(), &mut found);
+                let problems = found.into_iter().map(|(path, c, span)| {
+                    let place = (file, &shared, &lines);
+                    let message = format!(
+                        "`{path}` has the control character U+{:04X}; allowed are letters, signs, tabs \
+                         and line breaks",
+                        u32::from(c)
+                    );
+                    let help = "take it out: pages and other files show this text".to_owned();
+                    Problem::at(place, span.unwrap_or(0..0), message, "in this text", Some(help))
+                });
+                let problems: Vec<Problem> = problems.collect();
+                if !problems.is_empty() {
+                    return Err(ConfigError::new(what, problems));
+                }
+                Ok(Self {
+                    file: file.to_owned(),
+                    text: shared,
+                    lines,
+                    document,
+                    problems,
+                    parameters: Vec::new(),
+                    source_required,
+                })
+            }
             Err(e) => {
                 let span = e.span().unwrap_or(0..0);
                 let message = format!("not valid TOML: {}", e.message());

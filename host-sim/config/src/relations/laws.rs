@@ -3,6 +3,7 @@
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{GaitParams as MasterGait, ParamError, Pattern};
 use wheeleg_master::layer1::square::GUARD_MM;
+use wheeleg_plant::body::MOTOR_CURRENT_A;
 
 use super::{Bound, Broken, Facts, Offer, ROUNDING, Relation};
 use crate::derived::STEPS_AT_REST;
@@ -48,6 +49,119 @@ pub(super) fn droop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
                 .which_is(&format!("`{set}` − `{ambient}`")),
             Offer::new(f, set, Bound::Above, droop_pa + ambient_pa)
                 .which_is(&format!("`{droop}` + `{ambient}`")),
+        ],
+    )
+}
+
+/// How far the density of a gas may be from that of an ideal one, share: tables are rounded.
+const DENSITY: f64 = 0.05;
+
+/// Density, pressure, gas constant and temperature of the reference are those of one gas.
+pub(super) fn density(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [density, pressure, constant, temperature] = [0, 1, 2, 3].map(|i| f.si(it.fields[i]));
+    let (density, pressure, constant, temperature) = (density?, pressure?, constant?, temperature?);
+    let ideal = pressure / (constant * temperature);
+    let share = density / ideal;
+    let (low, high) = (1.0 - DENSITY, 1.0 + DENSITY);
+    if (low - ROUNDING..=high + ROUNDING).contains(&share) {
+        return None;
+    }
+    // Each field alone, up to where the share is allowed.
+    let (near, bounds) = match share < low {
+        true => (low, [Bound::From, Bound::UpTo, Bound::From, Bound::From]),
+        false => (high, [Bound::UpTo, Bound::From, Bound::UpTo, Bound::UpTo]),
+    };
+    let more = near / share;
+    let limits = [
+        density * more,
+        pressure / more,
+        constant * more,
+        temperature * more,
+    ];
+    let offers = it.fields.iter().zip(bounds).zip(limits);
+    offered(
+        format!(
+            "pressure / (constant × temperature) is {} kg/m3, of which {} to {} times are allowed",
+            brief(ideal),
+            brief(low),
+            brief(high)
+        ),
+        offers
+            .map(|((path, bound), si)| Offer::new(f, path, bound, si))
+            .collect(),
+    )
+}
+
+/// A motor draws no more than its model means, driven against its supply at full speed.
+pub(super) fn current(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [resistance, supply] = [0, 1].map(|i| f.si(it.fields[i]));
+    let (resistance_ohm, supply_v) = (resistance?, supply?);
+    let current_a = 2.0 * supply_v / resistance_ohm;
+    if current_a <= MOTOR_CURRENT_A {
+        return None;
+    }
+    let [resistance, supply] = [0, 1].map(|i| it.fields[i]);
+    offered(
+        format!(
+            "driven against its supply at full speed it draws {} A, and {} are allowed",
+            brief(current_a),
+            brief(MOTOR_CURRENT_A)
+        ),
+        vec![
+            Offer::new(f, resistance, Bound::From, 2.0 * supply_v / MOTOR_CURRENT_A),
+            Offer::new(
+                f,
+                supply,
+                Bound::UpTo,
+                0.5 * MOTOR_CURRENT_A * resistance_ohm,
+            ),
+        ],
+    )
+}
+
+/// The friction of a motor is below the torque with which it stalls.
+pub(super) fn stall(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [friction, supply, constant, resistance] = [0, 1, 2, 3].map(|i| f.si(it.fields[i]));
+    let (friction, supply, constant, resistance) = (friction?, supply?, constant?, resistance?);
+    let stall_n_m = constant * supply / resistance;
+    if friction < stall_n_m {
+        return None;
+    }
+    let [friction_at, supply_at, constant_at, resistance_at] = [0, 1, 2, 3].map(|i| it.fields[i]);
+    offered(
+        format!("it stalls with {}", f.format(friction_at, stall_n_m)),
+        vec![
+            Offer::new(f, friction_at, Bound::Below, stall_n_m),
+            Offer::new(f, supply_at, Bound::Above, friction * resistance / constant),
+            Offer::new(f, constant_at, Bound::Above, friction * resistance / supply),
+            Offer::new(f, resistance_at, Bound::Below, constant * supply / friction),
+        ],
+    )
+}
+
+/// The wheels can roll as fast as the gait pushes, without load.
+pub(super) fn rolling(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [speed, supply, constant, reduction, radius] = [0, 1, 2, 3, 4].map(|i| f.si(it.fields[i]));
+    let (speed, supply, constant) = (speed?, supply?, constant?);
+    let (reduction, radius) = (reduction?, radius?);
+    let most = supply * radius / (constant * reduction);
+    if speed <= most * (1.0 + ROUNDING) {
+        return None;
+    }
+    let more = speed / most;
+    let [speed_at, supply_at, constant_at, reduction_at, radius_at] =
+        [0, 1, 2, 3, 4].map(|i| it.fields[i]);
+    offered(
+        format!(
+            "without load they roll at {} at most",
+            f.format(speed_at, most)
+        ),
+        vec![
+            Offer::new(f, speed_at, Bound::UpTo, most),
+            Offer::new(f, supply_at, Bound::From, supply * more),
+            Offer::new(f, constant_at, Bound::UpTo, constant / more),
+            Offer::new(f, reduction_at, Bound::UpTo, reduction / more),
+            Offer::new(f, radius_at, Bound::From, radius * more),
         ],
     )
 }

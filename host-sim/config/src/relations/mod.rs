@@ -25,6 +25,7 @@ use advice::{Bound, Offer, Search};
 pub(crate) use advice::{Tried, Try};
 pub use laws::{SEAT_MM, SENSOR_TRACK};
 pub(crate) use moved::Moved;
+pub use moved::least_mass_kg;
 use standing::AtRest;
 pub use table::RELATIONS;
 
@@ -324,14 +325,22 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
             let field = r.listed(name).unwrap_or_else(|| name.to_owned());
             // In the unit of the file, where the field is one of it.
             let (factor, unit) = r.unit_of(&field).unwrap_or((1.0, "in SI units".to_owned()));
+            let what = if value > max { "much" } else { "little" };
+            // What the step must follow hangs on what moves with it.
+            let moves = match field.split('.').next() {
+                Some("contact") => "link.vertical_rod.mass",
+                Some("wheel_contact") => "body.wheel_mass",
+                Some("chassis_contact") => "body.chassis_mass",
+                _ => "",
+            };
+            let mut fields = vec![field.as_str(), "numerics.step", moves];
+            fields
+                .retain(|path| *path == field || (!moves.is_empty() && r.span_of(path).is_some()));
             r.contradiction(
-                &[&field],
+                &fields,
+                &format!("with the other values {} is too {what}", brief(value / factor)),
                 &format!(
-                    "with the other values of this file {} is too much or too little",
-                    brief(value / factor)
-                ),
-                &format!(
-                    "allowed with the masses, sizes and step of this file: {} to {} {unit}",
+                    "allowed for `{field}` with the masses, sizes and step of this file: {} to {} {unit}",
                     pretty(min / factor),
                     pretty(max / factor)
                 ),

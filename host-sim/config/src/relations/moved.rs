@@ -9,6 +9,7 @@
 //!
 //! Air is advanced by Heun's method, which on p' = −rate · p is stable while step × rate < 2.
 
+use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
 use wheeleg_plant::flow::GasParams;
 use wheeleg_plant::supply::SupplyParams;
@@ -41,6 +42,30 @@ pub(crate) struct Moved<'a> {
     pub load_n: f64,
     /// Step of the integration, s.
     pub step_s: f64,
+}
+
+/// The least mass that the step of an axis can follow \[kg\]; `None` where it follows the axis's own.
+#[must_use]
+pub fn least_mass_kg(axis: &AxisParams) -> Option<f64> {
+    let moved = Moved::of(axis);
+    let both = [moved.of_friction(), moved.in_end_stop()];
+    let follows = both.iter().all(|it| it.number() < STEP_LIMIT);
+    let least_kg = both.iter().map(Oscillator::least_mass_kg);
+    (!follows).then(|| least_kg.fold(0.0, f64::max))
+}
+
+impl<'a> Moved<'a> {
+    /// That of an axis.
+    pub(crate) fn of(axis: &'a AxisParams) -> Self {
+        Self {
+            cylinder: &axis.cylinder,
+            gas: &axis.gas,
+            supply: &axis.supply,
+            mass_kg: axis.moving_mass_kg,
+            load_n: axis.load_n.abs(),
+            step_s: axis.step_ns as f64 * 1e-9,
+        }
+    }
 }
 
 impl Moved<'_> {

@@ -85,6 +85,7 @@ pub const RELATIONS: &[Relation] = &[
     at_most("trapped air B, horizontal", &["start.horizontal.pressure_b", "supply.set_pressure"], PRESSURE),
     at_most("trapped air A, vertical", &["start.vertical.pressure_a", "supply.set_pressure"], PRESSURE),
     at_most("trapped air B, vertical", &["start.vertical.pressure_b", "supply.set_pressure"], PRESSURE),
+    law("density of the gas", &["gas.reference_density", "gas.reference_pressure", "gas.gas_constant", "gas.reference_temperature"], "no gas has this density at this pressure and temperature", laws::density),
     // A cylinder and its sensor.
     relation("rod", &["cylinder.rod", "cylinder.bore"], "the air of chamber B acts on what the rod leaves of the piston", Rule::AtMost(ROD_MOST)),
     at_most("cushion", &["end_stop.cushion_length", "cylinder.stroke"], "a piston that begins in both cushions is braked everywhere"),
@@ -121,6 +122,10 @@ pub const RELATIONS: &[Relation] = &[
     above("push before the end", &["gait.period", "gait.push"], IN_ORDER),
     law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push", "gait.stroke"], "a foot would still be coming down slowly when the push begins", laws::touchdown),
     law("time to push", &["gait.period", "gait.push", "gait.stroke", "gait.push_speed", "gait.push_acceleration"], "the push does not end within its step", laws::push),
+    // Motors and wheels.
+    law("current of a motor", &["motor.resistance", "motor.supply"], "a winding would carry more than its model means", laws::current),
+    law("friction of a motor", &["motor.friction", "motor.supply", "motor.torque_constant", "motor.resistance"], "a motor would never turn", laws::stall),
+    law("speed of the wheels", &["gait.push_speed", "motor.supply", "motor.torque_constant", "motor.reduction", "body.wheel_radius"], "the wheels would not roll as fast as the gait pushes", laws::rolling),
     // Bodies and what they touch.
     law("inertias of the chassis", &["spatial.chassis_roll_inertia", "body.chassis_pitch_inertia", "spatial.chassis_yaw_inertia"], NO_BODY, laws::chassis_inertias),
     law("inertias of a wheel", &["body.wheel_inertia", "spatial.wheel_transverse_inertia"], NO_BODY, laws::wheel_inertias),

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::sync::Arc;
 
-use wheeleg_plant::terrain::{HeightMap, HeightMapError, STEEPEST_DEG, Shape};
+use wheeleg_plant::terrain::{HeightMap, HeightMapError, MOST_VALUES as MOST, STEEPEST_DEG, Shape};
 
 use super::fields::{Fields, length};
 use super::files::Files;
@@ -11,8 +11,6 @@ use crate::params::FieldSpec;
 use crate::quantity::pretty;
 use crate::reader::Reader;
 
-/// Values along a side; the plant says so, too.
-const MOST: usize = 4096;
 /// Wrong cells of a file that are listed.
 const LISTED: usize = 5;
 /// Highest and lowest, m.

@@ -5,6 +5,7 @@ use crate::chamber::{ChamberRates, ChamberState, Content, GasModel};
 use crate::error::{PlantError, check_state};
 use crate::flow::{GasParams, Restrictor, leak_kg_s};
 use crate::friction::FrictionParams;
+use crate::supply::PRESSURES_PA;
 use crate::valve::{NEVER_NS, ValveParams, ValveState, ValveTiming};
 
 /// Net forces on one piston, all positive extending \[N\].
@@ -390,8 +391,8 @@ impl CylinderModel {
             self.params.stroke_m + margin,
         )?;
         let [a, b] = self.pressures_pa(state, stroke_m);
-        check_state("pressure_a_pa", index, a, 1e3, most_pa)?;
-        check_state("pressure_b_pa", index, b, 1e3, most_pa)?;
+        check_state("pressure_a_pa", index, a, PRESSURES_PA[0], most_pa)?;
+        check_state("pressure_b_pa", index, b, PRESSURES_PA[0], most_pa)?;
         // The polytropic law has one temperature and an exponent of its own, so
         // its pV is not m R T: the mass is a sum of flows, which many cycles of
         // filling and venting carry away from pV and may take below zero.

@@ -18,7 +18,7 @@ pub const STEEPEST_DEG: f64 = 75.0;
 /// Its tangent.
 const STEEPEST: f64 = 3.732_050_807_568_877;
 /// Most values along a side.
-const MOST: usize = 4096;
+pub const MOST: usize = 4096;
 
 /// Why there is no such map. Rows and columns count from 1.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -57,3 +57,34 @@ fn likely(name: &str) -> &'static str {
         _ => "`friction.bristle_damping`, `end_stop.stiffness`, `moving.mass`",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::AxisConfig;
+
+    /// Whatever leaves its range is told by fields that an axis file has.
+    #[test]
+    fn every_state_of_an_axis_has_fields_of_the_file_to_blame() {
+        let axis = AxisConfig::load("bench-vq110u").expect("built in");
+        let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../plant/src/");
+        let mut names = 0;
+        for file in ["cylinder/model.rs", "supply.rs", "axis.rs"] {
+            let text = std::fs::read_to_string(format!("{plant}{file}")).expect("a source");
+            for call in text.split("check_state(").skip(1) {
+                let Some(call) = call.trim_start().strip_prefix('"') else {
+                    continue;
+                };
+                let name = call.split('"').next().expect("a name");
+                let told = likely(name);
+                for path in told.split('`').skip(1).step_by(2) {
+                    let known = axis.parameters.iter().any(|p| p.path == path);
+                    assert!(known, "{name}: no field `{path}`");
+                }
+                assert!(told.contains('`'), "{name}: {told}");
+                names += 1;
+            }
+        }
+        assert!(names >= 8, "{names}");
+    }
+}

@@ -18,14 +18,14 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::axis::{Axis, AxisParams};
 
 pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
 pub(crate) use charts::panel;
 pub use judged::{Before, ERROR_MM, Judged, OVERSHOOT_MM, Paired, Quantile, judging_root};
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
 pub use single::{Single, play};
-pub use variation::{KNOWN as VARIATIONS, UnknownVariation, Variation};
+pub use variation::{UnknownVariation, Variation};
 
 use crate::StudyError;
 use crate::axis_sim::suite::{AxisSimError, TestRig};
@@ -162,6 +162,15 @@ fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
             ));
         }
         configs.push(config);
+    }
+    // Before the first case: one that no plant can be would cost all the others.
+    for (axis, variation, _) in plan(options, &configs) {
+        let config = &configs[axis];
+        let plant = variation.factors(&config.axis).plant(&config.axis);
+        if let Err(e) = Axis::new(&plant) {
+            variation.ensure_possible(config)?;
+            return Err(axis_error(&config.name, &e.into()));
+        }
     }
     Ok(configs)
 }

@@ -33,6 +33,7 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
     for file in axes {
         let config = load(file, &[id.kind])?;
         if config.name == id.axis {
+            id.variation.ensure_possible(&config)?;
             let failed = |e| axis_error(file, &e);
             let case =
                 Case::new(&config.name, &config.axis, id.variation, id.seed).map_err(failed)?;

@@ -4,6 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
+use wheeleg_config::axis::Change;
+use wheeleg_config::{AxisConfig, ConfigError, MASSES_KG};
 use wheeleg_plant::axis::AxisParams;
 
 use crate::axis_sim::suite::{Factors, StartUp};
@@ -35,15 +37,33 @@ pub enum Variation {
 
 /// A word that is no variation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is not a variation: {KNOWN}")]
+#[error("`{word}` is not a variation: {known}", known = known())]
 pub struct UnknownVariation {
     word: String,
 }
 
+/// A variation by a number: its name, what the number is, its smallest and largest value, and how it
+/// is made. An axis may allow less.
+type Numbered = (&'static str, &'static str, [f64; 2], fn(f64) -> Variation);
+
+/// Every variation by a number.
+const NUMBERED: [Numbered; 7] = [
+    ("load", "SHARE", [-0.95, 0.95], Variation::Load),
+    ("mass", "KG", MASSES_KG, Variation::Mass),
+    ("supply", "BAR gauge", [1.0, 16.0], Variation::Supply),
+    ("friction", "FACTOR", [0.1, 10.0], Variation::Friction),
+    ("delay", "FACTOR", [0.1, 10.0], Variation::Delay),
+    ("spread", "SHARE", [0.0, 0.8], Variation::Spread),
+    ("noise", "FACTOR", [0.0, 100.0], Variation::Noise),
+];
+
 /// What may be typed.
-pub const KNOWN: &str = "nominal, load=SHARE (-0.95 to 0.95), mass=KG (0.01 to 1000), \
-supply=BAR (1 to 16, gauge), friction=FACTOR (0.1 to 10), delay=FACTOR (0.1 to 10), \
-spread=SHARE (0 to 0.9), noise=FACTOR (0 to 100), combination=NUMBER, drawn=NUMBER";
+fn known() -> String {
+    let numbered =
+        NUMBERED.map(|(name, what, [low, high], _)| format!("{name}={what} ({low} to {high})"));
+    let names = numbered.join(", ");
+    format!("nominal, {names}, combination=NUMBER, drawn=NUMBER")
+}
 
 impl Variation {
     /// The factors one at a time: load ±40 and ±80 %, mass ×2/3, 2 and 16/3, supply
@@ -110,6 +130,66 @@ impl Variation {
         }
     }
 
+    /// The fields of an axis file that stand for it, with their values, where they differ from the sheet's.
+    #[must_use]
+    pub fn changes(&self, sheet: &AxisParams) -> Vec<Change> {
+        let plant = self.factors(sheet).plant(sheet);
+        let fields = |p: &AxisParams| {
+            let (supply, friction) = (&p.supply, &p.cylinder.friction);
+            // No board of a bench asks the contact: one that would never close is no reason.
+            let contact_pa = |pa: f64| pa.min(supply.set_pressure_pa);
+            [
+                ("moving.mass", vec![p.moving_mass_kg], "kg"),
+                ("moving.load", vec![p.load_n], "N"),
+                ("supply.set_pressure", vec![supply.set_pressure_pa], "Pa"),
+                (
+                    "supply.source_pressure",
+                    vec![supply.source_pressure_pa],
+                    "Pa",
+                ),
+                (
+                    "supply.switch_on",
+                    vec![contact_pa(supply.switch.on_pa)],
+                    "Pa",
+                ),
+                (
+                    "supply.switch_off",
+                    vec![contact_pa(supply.switch.off_pa)],
+                    "Pa",
+                ),
+                ("friction.coulomb", vec![friction.coulomb_n], "N"),
+                ("friction.static", vec![friction.static_n], "N"),
+                ("friction.viscous", vec![friction.viscous_n_s_m], "N s/m"),
+                (
+                    "cylinder.timing_spread",
+                    p.cylinder.timing_spread.to_vec(),
+                    "1",
+                ),
+            ]
+        };
+        let both = fields(sheet).into_iter().zip(fields(&plant));
+        let changed = both.filter(|((_, own, _), (_, values, _))| own != values);
+        let change = |(_, (path, values, unit)): (_, (&str, Vec<f64>, &str))| Change {
+            path: path.to_owned(),
+            values,
+            unit: unit.to_owned(),
+            source: format!("`{self}`"),
+        };
+        changed.map(change).collect()
+    }
+
+    /// Refuses what the axis cannot be, as its file would be refused with these values in it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the fields of the file, their values and what is allowed.
+    pub fn ensure_possible(&self, axis: &AxisConfig) -> Result<(), ConfigError> {
+        let what = format!("the axis {} cannot be compared with `{self}`", axis.name);
+        match self.changes(&axis.axis) {
+            changes if changes.is_empty() => Ok(()),
+            changes => axis.with(&what, &changes).map(drop),
+        }
+    }
+
     /// Where the delays come from: as on the sheet, they are the sheet's; else they
     /// are looked for at start-up, by every controller's board in the same way.
     #[must_use]
@@ -163,29 +243,18 @@ impl FromStr for Variation {
             return value.parse().map(Self::Drawn).map_err(|_| unknown());
         }
         let number: f64 = value.parse().map_err(|_| unknown())?;
-        let within = |low: f64, high: f64| {
-            (low..=high)
-                .contains(&number)
-                .then_some(number)
-                .ok_or_else(unknown)
-        };
-        Ok(match name {
-            "load" => Self::Load(within(-0.95, 0.95)?),
-            "mass" => Self::Mass(within(0.01, 1000.0)?),
-            "supply" => Self::Supply(within(1.0, 16.0)?),
-            "friction" => Self::Friction(within(0.1, 10.0)?),
-            "delay" => Self::Delay(within(0.1, 10.0)?),
-            "spread" => Self::Spread(within(0.0, 0.9)?),
-            "noise" => Self::Noise(within(0.0, 100.0)?),
-            _ => return Err(unknown()),
-        })
+        let mut known = NUMBERED.into_iter();
+        let (.., [low, high], made) = known.find(|known| known.0 == name).ok_or_else(unknown)?;
+        let number = Some(number).filter(|number| (low..=high).contains(number));
+        number.map(made).ok_or_else(unknown)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_config::AxisConfig;
+    use crate::axis_sim::Kind;
+    use crate::compare::{Case, Move};
 
     #[test]
     fn every_variation_comes_back_from_its_word() {
@@ -210,6 +279,46 @@ mod tests {
         ] {
             assert!(wrong.parse::<Variation>().is_err(), "{wrong}");
         }
+    }
+
+    /// What may be typed is played on every built-in axis, or refused in words of its file; a step beyond
+    /// is no variation.
+    #[test]
+    fn both_ends_of_every_variation_are_played_or_refused_with_the_field_of_the_file() {
+        let (mut played, mut refused) = (0, 0);
+        for (axis, ..) in wheeleg_config::axis::AXES {
+            let axis = AxisConfig::load(axis).expect("built in");
+            for (name, _, [low, high], made) in NUMBERED {
+                for (end, beyond) in [(low, low - 0.01), (high, high + 0.01)] {
+                    let word = format!("{name}={beyond}");
+                    let error = word.parse::<Variation>().expect_err(&word).to_string();
+                    assert!(error.contains(&format!("({low} to {high})")), "{error}");
+                    let variation: Variation = format!("{name}={end}").parse().expect("allowed");
+                    assert_eq!(variation, made(end));
+                    if let Err(error) = variation.ensure_possible(&axis) {
+                        let told = wheeleg_config::plain_text(&error);
+                        let path = &variation.changes(&axis.axis)[0].path;
+                        for part in [&format!("`{name}={end}`"), path, "allowed"] {
+                            assert!(told.contains(part), "{part}: {told}");
+                        }
+                        refused += 1;
+                        continue;
+                    }
+                    let case = Case::new(&axis.name, &axis.axis, variation, 1);
+                    let case = case.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
+                    for motion in [Move::Step100, Move::SCurve] {
+                        let done = case.play(Kind::Predictive, motion);
+                        done.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
+                        played += 1;
+                    }
+                }
+            }
+        }
+        println!("{played} played, {refused} refused");
+        assert!(
+            played > 40 && refused > 4,
+            "{played} played, {refused} refused"
+        );
     }
 
     #[test]

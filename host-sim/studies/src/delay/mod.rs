@@ -34,9 +34,10 @@ use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
 
 use crate::StudyError;
+use crate::axis_sim::suite::AxisSimError;
 use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, Settings};
-use trial::{BusPath, Outcome, Trial};
+use trial::{BusPath, Law, Outcome, Start, Trial};
 use wheeleg_config::{RobotConfig, brief};
 use wheeleg_report::results::CSV;
 use wheeleg_report::stats;
@@ -49,6 +50,13 @@ pub const PAPER_BAND_S: f64 = 0.05;
 pub const PREVIEW_LIMIT_S: f64 = 0.08;
 /// Largest motion before an announced move \[mm\].
 pub const EARLY_LIMIT_MM: f64 = 1.0;
+
+/// Masses that may be asked for \[kg\]; the step of a robot may allow less.
+pub const MASS_KG: [f64; 2] = [0.1, 50.0];
+/// Loads that may be asked for \[N\]; the cylinders of a study may start against less.
+pub const LOAD_N: [f64; 2] = [-100.0, 100.0];
+/// Starts per kind of move and law that may be asked for.
+pub const SEEDS: [u32; 2] = [1, 1000];
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -129,12 +137,31 @@ pub fn bus_of(robot: &RobotConfig) -> BusPath {
     }
 }
 
-/// Refuses a load against which one of the cylinders of the study would never start.
+/// Refuses a mass that the step of the robot cannot follow, and a load against which one of the
+/// cylinders of the study would never start.
 fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyError> {
     let axis = axis_of(robot, options.mass_kg, options.load_n);
+    let bores = scaling::all_bores(&axis);
+    let least_kg = bores.iter().filter_map(wheeleg_config::least_mass_kg);
+    if let Some(least_kg) = least_kg.reduce(f64::max) {
+        return Err(StudyError::refused(
+            format!(
+                "`--mass` = {} kg is too little for the step of {}: allowed are {} to {} kg",
+                brief(options.mass_kg),
+                robot.file,
+                brief(least_kg),
+                brief(MASS_KG[1]),
+            ),
+            format!(
+                "`numerics.step` = {} us, `friction.bristle_damping` and `end_stop.stiffness` of \
+                 the robot file decide what the step can follow",
+                axis.step_ns / 1000
+            ),
+        ));
+    }
     let most_n = scaling::most_load_n(&axis);
     if options.load_n <= most_n {
-        return Ok(());
+        return ensure_moves(&bores, options);
     }
     Err(StudyError::refused(
         format!(
@@ -153,15 +180,59 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
     ))
 }
 
+/// Starts every cylinder of the study once from both of its ends: what cannot be simulated, or never
+/// moves, is told before anything is measured.
+fn ensure_moves(bores: &[AxisParams], options: &Options) -> Result<(), StudyError> {
+    let given = format!(
+        "`--mass` = {} kg, `--load` = {} N",
+        brief(options.mass_kg),
+        brief(options.load_n)
+    );
+    for bored in bores {
+        for start in [Start::HomeHeld, Start::StopHeld] {
+            let outcome = Trial::new(bored, Law::Paper, start, 1).run();
+            let outcome = outcome.map_err(|e| not_simulated(&given, &e))?;
+            // Every bore of the study has to start from home.
+            if start == Start::HomeHeld && outcome.delay_s.is_none() {
+                return Err(StudyError::refused(
+                    format!(
+                        "{given}: a cylinder of {} mm never starts from `{}`",
+                        brief(bored.cylinder.bore_m * 1e3),
+                        start.name()
+                    ),
+                    "give less --mass or --load, or more `supply.set_pressure` in the robot file",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The answer to what leaves the model: `given` are the values of the command line.
+fn not_simulated(given: &str, error: &AxisSimError) -> StudyError {
+    let cause = match error {
+        AxisSimError::Unphysical { help, .. } => format!("; {help}"),
+        _ => String::new(),
+    };
+    StudyError::refused(
+        format!("{given}: a start cannot be simulated: {error}"),
+        format!("`--mass` stands for `moving.mass`, `--load` for the load{cause}"),
+    )
+}
+
 /// Runs trials; their outcomes are in order.
 fn run_all(what: &str, trials: &[Trial], progress: &Progress) -> Result<Vec<Outcome>, Ended> {
     progress.all(what, trials, |trial| {
-        trial.run().map_err(|e| {
-            StudyError::refused(
-                format!("a start cannot be simulated: {e}"),
-                "check the cylinder, valves and supply of the robot file; the message is in SI units",
+        let sheet = &trial.sheet;
+        let given = || {
+            format!(
+                "`--mass` = {} kg, `--load` = {} N",
+                brief(sheet.moving_mass_kg),
+                brief(sheet.load_n)
             )
-        })
+        };
+        let outcome = trial.run();
+        outcome.map_err(|e| not_simulated(&given(), &e))
     })
 }
 
@@ -178,34 +249,38 @@ struct Collected {
     ablation: Option<ablation::Ablation>,
     preview: Option<preview::Preview>,
     predictions: Option<predictions::Predictions>,
+    /// What ended it before its end, unless it was stopped.
+    failure: Option<StudyError>,
 }
 
 impl Collected {
-    fn measure(
-        robot: &RobotConfig,
-        options: &Options,
-        progress: &Progress,
-    ) -> Result<Self, StudyError> {
+    /// Measures one part after the other, until one fails or the study is stopped; what was measured
+    /// before is kept.
+    fn measure(robot: &RobotConfig, options: &Options, progress: &Progress) -> Self {
         let axis = axis_of(robot, options.mass_kg, options.load_n);
         let bus = bus_of(robot);
         let weight_n = robot.reference.m6_kg * robot.reference.gravity_m_s2;
         let seeds = options.seeds;
-        let starts = starts::measure(&axis, seeds, progress)?;
-        let ablation = ablation::measure(&axis, bus, weight_n, seeds, progress);
-        let ablation = Ended::kept(ablation)?;
-        let preview = Ended::kept(preview::measure(&axis, seeds.min(8), progress))?;
-        let predictions = match &preview {
-            Some(preview) => Ended::kept(predictions::measure(
-                &axis, &starts, preview, seeds, progress,
-            ))?,
-            None => None,
+        let mut collected = Self {
+            starts: starts::Starts::default(),
+            ablation: None,
+            preview: None,
+            predictions: None,
+            failure: None,
         };
-        Ok(Self {
-            starts,
-            ablation,
-            preview,
-            predictions,
-        })
+        let mut measure = || -> Result<(), Ended> {
+            starts::measure(&axis, seeds, progress, &mut collected.starts)?;
+            collected.ablation = Some(ablation::measure(&axis, bus, weight_n, seeds, progress)?);
+            let preview = preview::measure(&axis, seeds.min(8), progress)?;
+            let preview = collected.preview.insert(preview);
+            let starts = &collected.starts;
+            let predictions = predictions::measure(&axis, starts, preview, seeds, progress)?;
+            collected.predictions = Some(predictions);
+            Ok(())
+        };
+        let ended = measure();
+        collected.failure = Ended::kept(ended).err();
+        collected
     }
 
     /// The parts of the study, and which of them are done.
@@ -240,6 +315,7 @@ impl Collected {
             ablation: self.ablation.as_ref(),
             predictions: self.predictions.as_ref(),
             preview: self.preview.as_ref(),
+            failure: self.failure.as_ref().map(ToString::to_string),
         }
     }
 
@@ -283,6 +359,8 @@ pub struct Summary<'a> {
     predictions: Option<&'a predictions::Predictions>,
     /// Announced moves.
     preview: Option<&'a preview::Preview>,
+    /// What made a part fail; those before it are there.
+    failure: Option<String>,
 }
 
 impl study::Summary for Summary<'_> {
@@ -295,7 +373,10 @@ impl study::Summary for Summary<'_> {
 /// [`StudyError::Refused`] if the robot's cylinder cannot be simulated or does not move.
 pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, StudyError> {
     ensure_starts(robot, options)?;
-    let collected = Collected::measure(robot, options, &Progress::silent())?;
+    let mut collected = Collected::measure(robot, options, &Progress::silent());
+    if let Some(failure) = collected.failure.take() {
+        return Err(failure);
+    }
     // Nothing asks the silent one to stop.
     let study = collected.study(robot, options);
     study.ok_or_else(|| StudyError::refused("the study was stopped", ""))
@@ -304,7 +385,8 @@ pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, StudyError
 /// Measures and writes everything; the study itself is there if it was not stopped.
 ///
 /// # Errors
-/// [`StudyError`] if something cannot be simulated, drawn or written.
+/// [`StudyError`] if a start with these options cannot be simulated or never comes, or the folder cannot
+/// be used. A part that fails later is named in [`Finished::unwritten`], and those before it are kept.
 pub fn write(
     robot: &RobotConfig,
     options: &Options,
@@ -312,15 +394,22 @@ pub fn write(
 ) -> Result<Finished<Option<Study>>, StudyError> {
     ensure_starts(robot, options)?;
     let job = Job::begin("delay", settings, &[Path::new(&robot.file)])?;
-    let collected = Collected::measure(robot, options, &job.progress)?;
+    let mut collected = Collected::measure(robot, options, &job.progress);
     let parts = collected.parts();
     let done = parts.iter().filter(|(_, done)| *done).count() as u64;
     let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
     let summary = json(&collected.summary(robot, options), stopped.as_ref());
-    if let Some(stopped) = stopped {
-        let page = Job::stopped_page("Start delay of a pneumatic joint", &stopped, &parts);
+    let failure = collected.failure.take();
+    if failure.is_some() || stopped.is_some() {
+        let how = match (&failure, &stopped) {
+            (Some(failure), _) => format!("ended by an error after {done} parts: {failure}"),
+            (None, Some(stopped)) => stopped.to_string(),
+            (None, None) => String::new(),
+        };
+        let page = Job::stopped_page("Start delay of a pneumatic joint", &how, &parts);
         let rest = |_: &Job, _: &_| (page, Vec::new());
-        return Ok(job.finish(None, summary, Some(stopped), rest));
+        job.keep::<()>(failure.map_or(Ok(()), Err));
+        return Ok(job.finish(None, summary, stopped, rest));
     }
     let study = collected.study(robot, options);
     let study = study.ok_or_else(|| StudyError::refused("a part is missing", ""))?;

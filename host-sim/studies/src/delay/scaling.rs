@@ -91,14 +91,51 @@ pub(super) fn never() -> StudyError {
     )
 }
 
+/// The cylinder of the study with another bore and rod; `scaled`: tube, dead volumes and friction grow
+/// with the area.
+fn bored(axis: &AxisParams, (bore_m, rod_m): (f64, f64), scaled: bool) -> AxisParams {
+    let mut at = axis.clone();
+    let c = &mut at.cylinder;
+    let area = if scaled {
+        (bore_m / c.bore_m).powi(2)
+    } else {
+        1.0
+    };
+    (c.bore_m, c.rod_m) = (bore_m, rod_m);
+    for volume in [
+        &mut c.line_volume_m3,
+        &mut c.dead_volume_a_m3,
+        &mut c.dead_volume_b_m3,
+    ] {
+        *volume *= area;
+    }
+    let f = &mut c.friction;
+    for force in [
+        &mut f.coulomb_n,
+        &mut f.static_n,
+        &mut f.viscous_n_s_m,
+        &mut f.bristle_stiffness_n_m,
+        &mut f.bristle_damping_n_s_m,
+    ] {
+        *force *= area;
+    }
+    at
+}
+
+/// The cylinder of the study with every bore that it is tried with, its own first.
+pub(super) fn all_bores(axis: &AxisParams) -> Vec<AxisParams> {
+    let mut all = vec![axis.clone()];
+    for scaled in [false, true] {
+        all.extend(BORES_M.map(|bore| bored(axis, bore, scaled)));
+    }
+    all
+}
+
 /// The largest load that every bore of the study starts against, with a margin \[N\].
 pub(super) fn most_load_n(axis: &AxisParams) -> f64 {
-    let own = (axis.cylinder.bore_m, axis.cylinder.rod_m);
-    let left_n = BORES_M.into_iter().chain([own]).map(|(bore_m, rod_m)| {
-        let mut bored = axis.clone();
-        (bored.cylinder.bore_m, bored.cylinder.rod_m) = (bore_m, rod_m);
-        force_left_n(&bored)
-    });
+    let left_n = all_bores(axis)
+        .into_iter()
+        .map(|bored| force_left_n(&bored));
     left_n.fold(f64::INFINITY, f64::min) / MARGIN
 }
 
@@ -168,33 +205,10 @@ pub(super) fn scaling(axis: &AxisParams, work: Work<'_>) -> Result<Vec<Scaled>, 
 
 /// Delay of other bores whose valves give the same stroke time.
 pub(super) fn bores(axis: &AxisParams, stroke_s: f64, work: Work<'_>) -> Result<Vec<Bored>, Ended> {
-    let base_m = axis.cylinder.bore_m;
     let mut rows = Vec::new();
     for scaled in [false, true] {
         for (bore_m, rod_m) in BORES_M {
-            let mut at = axis.clone();
-            let c = &mut at.cylinder;
-            (c.bore_m, c.rod_m) = (bore_m, rod_m);
-            if scaled {
-                let area = (bore_m / base_m).powi(2);
-                for volume in [
-                    &mut c.line_volume_m3,
-                    &mut c.dead_volume_a_m3,
-                    &mut c.dead_volume_b_m3,
-                ] {
-                    *volume *= area;
-                }
-                let f = &mut c.friction;
-                for force in [
-                    &mut f.coulomb_n,
-                    &mut f.static_n,
-                    &mut f.viscous_n_s_m,
-                    &mut f.bristle_stiffness_n_m,
-                    &mut f.bristle_damping_n_s_m,
-                ] {
-                    *force *= area;
-                }
-            }
+            let at = bored(axis, (bore_m, rod_m), scaled);
             let given = at.cylinder.vent_valve.flow.conductance_m3_s_pa;
             let with = |conductance_m3_s_pa: f64| {
                 let mut p = at.clone();

@@ -36,7 +36,7 @@ pub struct Distribution {
 }
 
 /// All of them.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct Starts {
     /// Kinds of the first law, then of the second.
     pub list: Vec<Distribution>,
@@ -53,24 +53,25 @@ impl Starts {
     }
 }
 
-/// Measures `seeds` starts of every kind under both laws, as far as the study is not stopped.
+/// Measures `seeds` starts of every kind under both laws into `starts`, where they stay if one fails.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the axis cannot be simulated, or no start of a kind moved.
-pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Starts, StudyError> {
+/// [`Ended`] if the axis cannot be simulated, no start of a kind moved, or the study is stopped.
+pub fn measure(
+    axis: &AxisParams,
+    seeds: u32,
+    progress: &Progress,
+    starts: &mut Starts,
+) -> Result<(), Ended> {
     let kinds = Law::ALL
         .into_iter()
         .flat_map(|law| Start::ALL.map(|start| (law, start)));
-    let mut list = Vec::new();
-    let mut home = Vec::new();
     for (law, start) in kinds {
         let trials: Vec<Trial> = (1..=u64::from(seeds))
             .map(|seed| Trial::new(axis, law, start, seed))
             .collect();
         let what = format!("{} law, {}", law.name(), start.name());
-        let Some(outcomes) = Ended::kept(run_all(&what, &trials, progress))? else {
-            break;
-        };
+        let outcomes = run_all(&what, &trials, progress)?;
         let distribution = distribution(law, start, &outcomes).ok_or_else(|| {
             StudyError::refused(
                 format!(
@@ -81,12 +82,12 @@ pub fn measure(axis: &AxisParams, seeds: u32, progress: &Progress) -> Result<Sta
                 "the load may exceed what the cylinder can move; see --load and the supply of the robot file",
             )
         })?;
-        list.push(distribution);
+        starts.list.push(distribution);
         if start == Start::HomeHeld {
-            home.extend(outcomes.into_iter().next());
+            starts.home.extend(outcomes.into_iter().next());
         }
     }
-    Ok(Starts { list, home })
+    Ok(())
 }
 
 fn distribution(law: Law, start: Start, outcomes: &[Outcome]) -> Option<Distribution> {

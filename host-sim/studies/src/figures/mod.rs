@@ -194,7 +194,7 @@ pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyErro
     let stopped = job.progress.stopped(done, parts.len() as u64, "parts");
     let summary = json(&collected.summary(), stopped.as_ref());
     if let Some(stopped) = stopped {
-        let page = Job::stopped_page("Figures of the paper", &stopped, &parts);
+        let page = Job::stopped_page("Figures of the paper", &stopped.to_string(), &parts);
         let rest = |_: &Job, _: &_| (page, Vec::new());
         return Ok(job.finish(None, summary, Some(stopped), rest));
     }

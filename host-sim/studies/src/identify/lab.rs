@@ -8,6 +8,7 @@ use std::path::Path;
 
 use wheeleg_config::{builtin, pretty};
 use wheeleg_plant::axis::{AxisParams, TICK_US};
+use wheeleg_plant::supply::PRESSURES_PA;
 
 use super::map::Mapped;
 use crate::StudyError;
@@ -399,7 +400,8 @@ fn row(
             value as u16 * TICK_US
         };
     }
-    let pressure = |column: Place| ranged(column, [0.1, 20.0], "pressures are absolute, in bar");
+    let allowed_bar = PRESSURES_PA.map(|pa| pa * 1e-5);
+    let pressure = |column: Place| ranged(column, allowed_bar, "pressures are absolute, in bar");
     let pressure_pa = match columns.pressures {
         Some([a, b]) => Some([pressure(a)? * 1e5, pressure(b)? * 1e5]),
         None => None,

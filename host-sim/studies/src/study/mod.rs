@@ -178,12 +178,16 @@ impl Job {
         Ok(subfolder(self.folder(), name)?)
     }
 
-    /// Writes a text file; returns its path.
+    /// Writes a text file; returns its path. A folder that somebody has removed is made anew.
     ///
     /// # Errors
     /// [`StudyError::Report`] if it cannot be written.
     pub fn save(&self, name: &str, text: &str) -> Result<PathBuf, StudyError> {
         let path = self.folder().join(name);
+        if let Some(folder) = path.parent() {
+            // If that fails, so does the file, with a better message.
+            let _ = std::fs::create_dir_all(folder);
+        }
         std::fs::write(&path, text).map_err(|e| {
             // A part of a file would be taken for the whole.
             let _ = std::fs::remove_file(&path);
@@ -256,14 +260,14 @@ impl Job {
         }
     }
 
-    /// The report of a study that was stopped before its page could be made: the parts, and which
-    /// of them are done.
+    /// The report of a study that was stopped before its page could be made: `how` it was, the parts, and
+    /// which of them are done.
     ///
     /// # Errors
     /// [`StudyError::Report`] if the page cannot be made.
     pub fn stopped_page(
         title: &str,
-        stopped: &Stopped,
+        how: &str,
         parts: &[(String, bool)],
     ) -> Result<String, StudyError> {
         let parts: Vec<_> = parts
@@ -272,7 +276,7 @@ impl Job {
             .collect();
         let values = context! {
             title => title,
-            stopped => stopped.to_string(),
+            stopped => how,
             parts => parts,
             version => env!("CARGO_PKG_VERSION"),
         };
@@ -290,11 +294,15 @@ impl Job {
         stopped: Option<Stopped>,
         rest: impl FnOnce(&Self, &T) -> (Result<String, StudyError>, Vec<Drawn>),
     ) -> Finished<T> {
-        self.keep(self.save(SUMMARY, &summary));
+        let saved = self.keep(self.save(SUMMARY, &summary));
         let (page, drawn) = rest(&self, &result);
         self.keep(page.and_then(|page| self.save(REPORT, &page)));
         if !drawn.is_empty() {
             self.keep(self.save_figures(&drawn));
+        }
+        // It is gone if somebody has removed the folder meanwhile; no report is without it.
+        if saved.is_some_and(|path| !path.exists()) {
+            self.keep(self.save(SUMMARY, &summary));
         }
         self.end(result, summary, stopped)
     }

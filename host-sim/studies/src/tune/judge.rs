@@ -9,6 +9,7 @@
 //! | error at rest | 0.5 mm |
 //! | error after a lost contact | 2 mm |
 //! | overshoot, but for a load that is let go | 3 mm |
+//! | error on the way of an S-curve or a sine | 5 mm |
 //! | it settles at all | yes |
 //! | settling time, of a board that settles and rests | 0.25 s |
 //!
@@ -26,6 +27,8 @@ const ERROR_MM: f64 = 0.5;
 const CONTACT_MM: f64 = 2.0;
 /// Overshoot that is good enough, mm.
 const OVERSHOOT_MM: f64 = 3.0;
+/// Largest error on the way of a reference that moves that is good enough, mm.
+const TRACKING_MM: f64 = 5.0;
 /// Settling time that is good enough, s.
 const SETTLE_S: f64 = 0.25;
 /// What a figure may grow by within its own scatter.
@@ -45,6 +48,8 @@ pub enum Figure {
     ContactError,
     /// Overshoot \[mm\].
     Overshoot,
+    /// Largest error on the way of an S-curve or a sine \[mm\].
+    TrackingError,
     /// It does not settle: 1.
     NeverSettles,
     /// Settling time \[s\].
@@ -80,6 +85,9 @@ impl Worse {
                 format!("{name}: error after the contact {after:.2} mm, before {before:.2} mm")
             }
             Figure::Overshoot => format!("{name}: overshoot {after:.2} mm, before {before:.2} mm"),
+            Figure::TrackingError => {
+                format!("{name}: error on the way {after:.2} mm, before {before:.2} mm")
+            }
             Figure::NeverSettles => format!("{name}: never settles"),
             Figure::SettlingTime => {
                 format!("{name}: settles in {after:.3} s, before in {before:.3} s")
@@ -108,6 +116,7 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     let judged = |figure: Figure| match figure {
         Figure::LimitCycle => rests,
         Figure::Overshoot => !motion.loses_contact() && tried,
+        Figure::TrackingError => matches!(motion, Move::SCurve | Move::Sine) && tried,
         // Whoever never settles, or goes on about the target, has no time to compare with.
         Figure::SettlingTime => {
             tried && step && before.settle_s.is_some() && before.limit_cycle != Some(true)
@@ -145,6 +154,12 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
             size(after.overshoot_mm),
             OVERSHOOT_MM,
         ),
+        (
+            Figure::TrackingError,
+            size(before.worst_mm),
+            size(after.worst_mm),
+            TRACKING_MM,
+        ),
         (Figure::NeverSettles, never(before), never(after), 0.0),
         (
             Figure::SettlingTime,
@@ -155,7 +170,8 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     ];
     rows.into_iter()
         .filter(|(figure, before, after, enough)| {
-            judged(*figure) && *after > enough.max(SCATTER * before)
+            // What is no number is worse than any.
+            judged(*figure) && (!after.is_finite() || *after > enough.max(SCATTER * before))
         })
         .map(|(figure, before, after, _)| Worse {
             motion,
@@ -218,5 +234,31 @@ mod tests {
         };
         assert_eq!(names(&cycling, &slow(0.9)), [], "it never was at rest");
         assert_eq!(names(&away, &away), []);
+        let broken = Figures {
+            steady_error_mm: Some(f64::NAN),
+            ..good.clone()
+        };
+        assert_eq!(names(&good, &broken), [Figure::SteadyError], "no number");
+        assert_eq!(names(&broken, &good), []);
+    }
+
+    #[test]
+    fn an_error_on_the_way_counts_where_the_reference_moves() {
+        let off = |worst_mm: f64| Figures {
+            worst_mm: Some(worst_mm),
+            settle_s: Some(0.3),
+            ..Figures::default()
+        };
+        let names = |motion, before: f64, after: f64| -> Vec<Figure> {
+            let worse = worse_of(motion, &off(before), &off(after));
+            worse.into_iter().map(|w| w.figure).collect()
+        };
+        for motion in [Move::SCurve, Move::Sine] {
+            assert_eq!(names(motion, 4.0, 9.0), [Figure::TrackingError]);
+            assert_eq!(names(motion, 9.0, 9.5), [], "its own scatter");
+            assert_eq!(names(motion, 1.0, 4.9), [], "good enough");
+        }
+        // Of a step it is the step itself.
+        assert_eq!(names(Move::Step100, 4.0, 99.0), []);
     }
 }

@@ -8,7 +8,7 @@ use wheeleg_config::Drawing;
 use wheeleg_protocol::{Address, Fault};
 use wheeleg_telemetry::{EventCode, EventKind, Logged, Read, Scalar, channels, read};
 
-use super::plain::plain;
+use super::plain;
 use super::signals::{self, Signal, foot, joint, signal};
 use super::thin::Thin;
 use crate::StudyError;

@@ -8,7 +8,6 @@ mod content;
 mod difference;
 mod ground;
 mod page;
-mod plain;
 mod signals;
 mod thin;
 
@@ -16,10 +15,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use wheeleg_config::{Drawing, builtin};
+pub use wheeleg_report::plain::{acts, plain};
 use wheeleg_report::results::COMPARED_PAGE;
 
 use self::content::{Content, Span};
-pub use self::plain::{acts, plain};
 use self::signals::Signal;
 use crate::StudyError;
 use crate::export::write_new;

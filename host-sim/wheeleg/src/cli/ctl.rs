@@ -16,10 +16,11 @@ use clap::{Args, Subcommand};
 use serde_json::{Map, Value, json};
 use wheeleg_access::Key;
 use wheeleg_access::host::{HOLD_S, SPEED, STEP_MAX};
+use wheeleg_access::request::HZ_MAX;
 use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::{CONTROL_FILE, VIEW_FILE};
 use wheeleg_console::unpack::unpack;
-use wheeleg_console::usual;
+use wheeleg_console::{EVENTS, usual};
 use wheeleg_master::command::CommandCode;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
@@ -50,7 +51,7 @@ enum CtlCommand {
         #[arg(value_name = "CHANNEL")]
         channels: Vec<String>,
         /// Samples per second of a channel, 1 to 50.
-        #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, 50))]
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, HZ_MAX as u32))]
         hz: u32,
     },
     /// Show the robot on the whole terminal: Esc stops it, q quits.
@@ -66,7 +67,7 @@ enum CtlCommand {
     /// Print the newest events, the oldest of them first.
     Events {
         /// How many, 1 to 256.
-        #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1_u32, 256))]
+        #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1_u32, EVENTS as u32))]
         last: u32,
     },
     /// Stop the robot.

@@ -11,7 +11,7 @@ use wheeleg_config::builtin;
 use wheeleg_config::builtin::DEFAULT_ROBOT;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::delay::trial::{Law, Start};
-use wheeleg_studies::delay::{self, Options, Study};
+use wheeleg_studies::delay::{self, LOAD_N, MASS_KG, Options, SEEDS, Study};
 use wheeleg_studies::study::Finished;
 
 /// Arguments of `wheeleg delay`.
@@ -30,7 +30,7 @@ pub(super) struct DelayArgs {
     #[arg(long)]
     json: bool,
     /// Starts per kind of move and law, 1 to 1000.
-    #[arg(long, default_value_t = Options::default().seeds, value_parser = whole(1_u32, 1000))]
+    #[arg(long, default_value_t = Options::default().seeds, value_parser = whole(SEEDS[0], SEEDS[1]))]
     seeds: u32,
     /// Mass that moves with the rod, kg, 0.1 to 50 (assumed: rod and carriage, lying).
     #[arg(long, value_name = "KG", default_value_t = Options::default().mass_kg, value_parser = mass)]
@@ -41,15 +41,15 @@ pub(super) struct DelayArgs {
 }
 
 fn mass(text: &str) -> Result<f64, String> {
-    within(text, "kg", 0.1, 50.0)
+    within(text, "kg", MASS_KG)
 }
 
 fn load(text: &str) -> Result<f64, String> {
-    within(text, "N", -100.0, 100.0)
+    within(text, "N", LOAD_N)
 }
 
 /// A number in a range; the message names value, unit and range.
-fn within(text: &str, unit: &str, min: f64, max: f64) -> Result<f64, String> {
+fn within(text: &str, unit: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (min..=max).contains(&value) => Ok(value),
         Ok(_) => Err(format!("allowed are {min} to {max} {unit}")),

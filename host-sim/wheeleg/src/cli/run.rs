@@ -270,7 +270,26 @@ fn run_text(finished: &Finished<Run>) -> String {
 /// Injected faults that are listed; of more there is the number.
 const FAULTS_SHOWN: usize = 20;
 
+/// Targets that are listed: more than a built-in scenario has, and not all of a file that has
+/// thousands of bars.
+const TARGETS_SHOWN: usize = 60;
+
+/// The table of the first targets, and of how many more there are, and are missed among them.
 fn target_table(targets: &[Target]) -> String {
+    let (shown, more) = targets.split_at(targets.len().min(TARGETS_SHOWN));
+    let mut out = table_of(shown);
+    if !more.is_empty() {
+        let missed = more.iter().filter(|t| t.required && !t.pass).count();
+        let _ = writeln!(
+            out,
+            "and {} more, {missed} required ones of them missed: in report and summary.json",
+            more.len()
+        );
+    }
+    out
+}
+
+fn table_of(targets: &[Target]) -> String {
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let cells: Vec<[String; 5]> = targets
         .iter()
@@ -320,4 +339,34 @@ fn target_table(targets: &[Target]) -> String {
         row(c, Some(t.judgement()), &t.description);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_very_many_targets_the_first_are_listed_and_the_others_counted() {
+        let target = |i: usize| Target {
+            id: format!("bar-{i}"),
+            description: "a bar".to_owned(),
+            value: Some(1.0),
+            unit: "mm",
+            min: None,
+            max: Some(1.0),
+            pass: i % 100 != 99,
+            required: true,
+        };
+        let lines = |count: usize| {
+            let targets: Vec<Target> = (0..count).map(target).collect();
+            let text = target_table(&targets);
+            (text.lines().count(), text)
+        };
+        let (all, text) = lines(TARGETS_SHOWN);
+        assert_eq!(all, 1 + TARGETS_SHOWN, "{text}");
+        let (some, text) = lines(2000);
+        assert_eq!(some, 2 + TARGETS_SHOWN, "{text}");
+        let told = "and 1940 more, 20 required ones of them missed: in report and summary.json\n";
+        assert!(text.ends_with(told), "{text}");
+    }
 }

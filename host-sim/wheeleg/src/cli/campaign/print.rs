@@ -1,7 +1,7 @@
 //! What `wheeleg campaign` prints.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -157,10 +157,15 @@ pub(super) fn state(state: &State, store: &Store) -> String {
         state.missing.len(),
         store.blocks()
     );
-    for (path, why) in &state.bad {
-        let _ = writeln!(out, "bad     {}: {why}", path.display());
-    }
-    out
+    out + &bad_parts(&state.bad)
+}
+
+/// Parts that cannot be read.
+fn bad_parts(bad: &[(PathBuf, String)]) -> String {
+    let lines = bad
+        .iter()
+        .map(|(path, why)| format!("bad     {}: {why}", path.display()));
+    listed(lines, "bad     and", "more: --json has them all")
 }
 
 /// The same as a line of JSON.
@@ -203,18 +208,20 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
 /// What a table says, in a few lines.
 pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<&Path>) -> String {
     let mut out = format!("rows    {}\n", findings.rows);
-    for (cell, rate) in &findings.passed {
+    let passed = findings.passed.iter().map(|(cell, rate)| {
         let cell = if cell.is_empty() { "all cases" } else { cell };
         let [low, high] = rate.exact.map(|share| 1e2 * share);
-        let _ = writeln!(
-            out,
+        format!(
             "passed  {} of {} ({low:.2} to {high:.2} %): {cell}",
             rate.met, rate.of
-        );
-    }
-    let paired = findings.paired.iter();
-    for p in paired.chain(pairs.map(|pairs| &pairs.paired)) {
-        out.push_str(&pair(p));
+        )
+    });
+    out += &listed(passed, "passed  and", "more cells: the page has them all");
+    let paired = findings.paired.iter().map(pair);
+    out += &listed(paired, "paired  and", "more: the page has them all");
+    for p in pairs.iter().map(|pairs| &pairs.paired) {
+        out += &pair(p);
+        out.push('\n');
     }
     if let Some(pairs) = pairs {
         let _ = writeln!(
@@ -229,9 +236,22 @@ pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<
     out
 }
 
+/// Lines of a list that are printed.
+const LISTED: usize = 20;
+
+/// The first lines of a list; of more there is a line with their number between two texts.
+fn listed(lines: impl ExactSizeIterator<Item = String>, before: &str, after: &str) -> String {
+    let more = lines.len().saturating_sub(LISTED);
+    let mut out: String = lines.take(LISTED).map(|line| line + "\n").collect();
+    if more > 0 {
+        let _ = writeln!(out, "{before} {more} {after}");
+    }
+    out
+}
+
 fn pair(p: &Paired) -> String {
     format!(
-        "paired  {}: {} lost, {} gained, {} the same (p = {:.3})\n",
+        "paired  {}: {} lost, {} gained, {} the same (p = {:.3})",
         p.what, p.passed.lost, p.passed.gained, p.passed.same, p.passed.p
     )
 }
@@ -239,4 +259,56 @@ fn pair(p: &Paired) -> String {
 /// The same as JSON.
 pub(super) fn findings_json(findings: &Findings, against: Option<&Pairs>) -> String {
     schema::indented(&ReportForm { findings, against })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_campaign::report::Rate;
+
+    /// Lines that begin with a word, and the last of them.
+    fn lines(text: &str, word: &str) -> (usize, String) {
+        let own = text.lines().filter(|line| line.starts_with(word));
+        let own: Vec<&str> = own.collect();
+        (
+            own.len(),
+            own.last().copied().unwrap_or_default().to_owned(),
+        )
+    }
+
+    #[test]
+    fn of_very_many_cells_pairs_and_bad_parts_the_first_are_listed_and_the_others_counted() {
+        for (count, told) in [(20, 20), (150, 21)] {
+            let numbers = || (0..count).map(|i: i32| i.to_string());
+            let passed = numbers().map(|cell| (cell, Rate::default())).collect();
+            let paired = numbers()
+                .map(|what| Paired {
+                    what,
+                    ..Paired::default()
+                })
+                .collect();
+            let findings = Findings {
+                passed,
+                paired,
+                ..Findings::default()
+            };
+            let text = super::findings(&findings, None, None);
+            let (cells, last) = lines(&text, "passed  ");
+            assert_eq!(cells, told, "{text}");
+            assert_eq!(lines(&text, "paired  ").0, told, "{text}");
+            assert_eq!(
+                told == 21,
+                last == "passed  and 130 more cells: the page has them all"
+            );
+            let bad: Vec<_> = numbers()
+                .map(|part| (part.into(), "torn".to_owned()))
+                .collect();
+            let (parts, last) = lines(&bad_parts(&bad), "bad     ");
+            assert_eq!(parts, told, "{last}");
+            assert_eq!(
+                told == 21,
+                last == "bad     and 130 more: --json has them all"
+            );
+        }
+    }
 }
