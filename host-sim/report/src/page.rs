@@ -18,6 +18,7 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     let mut env = Environment::new();
     env.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     number::add_filters(&mut env);
+    env.add_filter("code", |text: String| Value::from_safe_string(code(&text)));
     env.add_template("tokens.css", include_str!("../page/tokens.css"))?;
     env.add_template("ui.css", include_str!("../page/ui.css"))?;
     env.add_template("report.css", include_str!("../page/report.css"))?;
@@ -27,6 +28,22 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     env.add_template("page.html", template)?;
     let values = Value::from(Serde(values));
     Ok(env.get_template("page.html")?.render(values)?)
+}
+
+/// A text in which what stands between backticks is code.
+fn code(text: &str) -> String {
+    let mut out = String::new();
+    for (i, part) in text.split('`').enumerate() {
+        if i > 0 {
+            out.push_str(if i % 2 == 1 { "<code>" } else { "</code>" });
+        }
+        let part = part.replace('&', "&amp;");
+        out.push_str(&part.replace('<', "&lt;").replace('>', "&gt;"));
+    }
+    if !text.matches('`').count().is_multiple_of(2) {
+        out.push_str("</code>");
+    }
+    out
 }
 
 /// A figure for a template.
@@ -74,4 +91,15 @@ pub fn pictures(figures: &[(Figure, String)]) -> Vec<Picture<'_>> {
 pub fn json(value: &impl Serialize) -> String {
     let text = serde_json::to_string(value).expect("plain data is JSON");
     text.replace('<', "\\u003c")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backticks_become_code_and_nothing_else_markup() {
+        assert_eq!(code("a (event `stuck`)"), "a (event <code>stuck</code>)");
+        assert_eq!(code("<b> & `x"), "&lt;b&gt; &amp; <code>x</code>");
+    }
 }

@@ -217,12 +217,17 @@ fn messages_text(messages: &[String]) -> String {
 fn run_text(finished: &Finished<Run>) -> String {
     let s = &finished.result.summary;
     let mut out = String::new();
+    for (i, line) in s.cause.iter().enumerate() {
+        let word = if i == 0 { "cause" } else { "" };
+        let _ = writeln!(out, "{word:<8}{line}");
+    }
     // A part of a run meets or misses nothing.
     if s.complete && !s.targets.is_empty() {
-        out.push_str(&target_table(&s.targets));
         let required = s.targets.iter().filter(|t| t.required);
         let met = required.clone().filter(|t| t.pass).count();
-        let _ = writeln!(out, "\n{met} of {} required targets met", required.count());
+        let _ = writeln!(out, "{met} of {} required targets met\n", required.count());
+        out.push_str(&target_table(&s.targets));
+        out.push('\n');
     }
     if !s.complete {
         let _ = writeln!(
@@ -263,7 +268,10 @@ fn run_text(finished: &Finished<Run>) -> String {
 /// Injected faults that are listed; of more there is the number.
 const FAULTS_SHOWN: usize = 20;
 
+/// What was missed comes first.
 fn target_table(targets: &[Target]) -> String {
+    let mut targets: Vec<&Target> = targets.iter().collect();
+    targets.sort_by_key(|target| target.judgement() != Judgement::Missed);
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let cells: Vec<[String; 5]> = targets
         .iter()
@@ -272,7 +280,7 @@ fn target_table(targets: &[Target]) -> String {
                 t.judgement().word().to_owned(),
                 t.id.clone(),
                 t.value_text(),
-                t.unit.to_owned(),
+                t.unit_text().to_owned(),
                 t.band_text(),
             ]
         })
