@@ -4,10 +4,11 @@
 
 Each is made by the program, with as little work as it lets one ask for. At three sizes, light and dark: the verdict comes
 first, nothing is wider than the window, nothing is asked for from elsewhere, the console is empty, axe-core finds nothing,
-and the first column of a table that scrolls stays. Figures have a legend with values, and those over the same abscissa share a cursor.
+and the first column of a table that scrolls stays. The main figure stands before all tables; axes have a name and a unit. Figures have a legend with values, and those over the same abscissa share a cursor.
 Without scripts, and on paper, verdict, tables and pictures are there. Screenshots go to FOLDER.
 """
 
+import re
 import shutil
 import subprocess
 import sys
@@ -53,6 +54,25 @@ def figures(browser, report, name):
     expect(moved > 0, f"{name}: no legend tells a value at the cursor: {cursors(page)[:5]}")
     bare = page.evaluate("() => [...document.querySelectorAll('.plot')].filter((p) => p.querySelectorAll('.key').length === 0).map((p) => p.querySelector('h3, h4').textContent)")
     expect(bare == [] or all(bare), f"{name}: panels without a legend: {bare}")
+    unnamed = page.evaluate("""() => [...document.querySelectorAll('.fig script[type="application/json"]')].map((data) => JSON.parse(data.textContent))
+        .filter((panel) => !(/\\[.+\\]$/.test(panel.x_label) || panel.x_label === 'seed') || panel.unit === '').map((panel) => `${panel.title}: ${panel.x_label}, ${panel.unit}`)""")
+    expect(not unnamed, f"{name}: axes without name or unit: {unnamed}")
+    first = page.evaluate("() => [...document.querySelectorAll('main figure, main table')][0].tagName")
+    expect(first == "FIGURE", f"{name}: a {first} comes before the main figure")
+    page.context.close()
+
+
+def small(browser, report, name):
+    """On a small screen the letters of a picture stay readable, and no cell lies on the next one."""
+    page = opened(browser, report, 400, 800, "light")
+    page.wait_for_load_state("load")
+    page.evaluate("() => document.querySelectorAll('details').forEach((d) => (d.open = true))")
+    shrunk = page.evaluate("""() => [...document.querySelectorAll('.still svg')].filter((one) => one.checkVisibility())
+        .map((one) => (11 * one.getBoundingClientRect().width) / 940).filter((px) => px < 9)""")
+    expect(not shrunk, f"{name}: letters of {shrunk} px in pictures")
+    over = page.evaluate("""() => [...document.querySelectorAll('.scroll td')].filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth + 1)
+        .map((one) => one.textContent)""")
+    expect(not over, f"{name}: cells that lie on the next one: {over[:3]}")
     page.context.close()
 
 
@@ -69,6 +89,8 @@ def tables(browser, report, name):
         return gone;
     }).map((box) => box.querySelector('th').textContent)""")
     expect(not lost, f"{name}: the first column scrolls away: {lost}")
+    words = page.inner_text("main")
+    expect(not re.search(r"(^|\D)1 axes", words) and "≤ –" not in words, f"{name}: a count or a bound without sense")
     page.context.close()
 
 
@@ -112,6 +134,7 @@ def main(program, folder, axe):
             if name not in WITHOUT_FIGURES:
                 figures(browser, report, name)
             tables(browser, report, name)
+            small(browser, report, name)
             without_scripts(browser, report, name)
             on_paper(browser, report, name, folder)
         browser.close()

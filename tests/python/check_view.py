@@ -85,7 +85,7 @@ def cause(browser, program, folder):
     for report, place in [("log.html", "h1"), ("report.html", "header .verdict")]:
         page = opened(browser, (run / report).resolve(), 1280, 720, "light")
         told = page.inner_text(place)
-        expect(told.rstrip(".") == "Joint 3: the position sensor reads outside its range, at 3.00 s", f"{report}: {told!r}")
+        expect(told.rstrip(".") == "Joint 3: the position sensor reads outside its range at 3.00 s", f"{report}: {told!r}")
         expect("potentiometer wiring" in page.inner_text("header"), f"{report} does not say what to do")
         page.screenshot(path=folder / f"cause-{report}.png")
         readings = lambda: page.inner_text(".readings")
@@ -95,6 +95,48 @@ def cause(browser, program, folder):
         page.keyboard.press("End")
         expect("no reading" in readings(), f"{report}: after the fault the joint seems to be read: {readings()!r}")
         page.context.close()
+
+
+def gave_up(browser, program, folder):
+    """A robot that gives up has no fault of a board: its log says so first, marks it, and finds it by the name that the
+    report gives it; the report says what was missed, and by how much."""
+    run = folder / "wall"
+    subprocess.run([program, "run", "wall-30", "--out", str(run)], capture_output=True, text=True)
+    made(program, run / "log.html", run / "log.mcap")
+    page = opened(browser, (run / "log.html").resolve(), 1280, 720, "light")
+    told = page.inner_text("h1")
+    expect(told.startswith("The robot got stuck and gave up at "), f"log.html: {told!r}")
+    expect("lead it another way" in page.inner_text("header .remedy"), "log.html does not say what to do")
+    at = float(told.split(" at ")[1].split()[0])
+    expect(page.locator("#motion-view .tick").count() == 1, "the time line does not mark where the robot gave up")
+    page.locator(".missed-list .seek").first.click()
+    expect(abs(cursors(page)[0] - at) < 0.011, f"gone to {cursors(page)[0]} s, the robot gave up at {at} s")
+    words = page.eval_on_selector_all("#motion-view .seg", "all => all.map((seg) => [seg.textContent, seg.scrollWidth > seg.clientWidth])")
+    expect(any(word == "walk" for word, _ in words), f"phases are named {words}")
+    page.fill("input[data-filter]", "stuck")
+    rows = page.locator("#event-table tbody:visible")
+    expect(rows.count() == 1 and rows.locator("td.bad").count() == 1, f"{rows.count()} events are found by the name stuck")
+    page.screenshot(path=folder / "stuck-log.html.png")
+    page.context.close()
+    small = opened(browser, (run / "log.html").resolve(), 400, 800, "light")
+    words = small.eval_on_selector_all("#motion-view .seg", "all => all.map((seg) => [seg.textContent, seg.scrollWidth > seg.clientWidth])")
+    expect(any(word == "walk" for word, _ in words) and not any(cut for _, cut in words), f"400 px: phases are named {words}")
+    small.context.close()
+    page = opened(browser, (run / "report.html").resolve(), 1280, 720, "light")
+    told = page.inner_text("h1")
+    if "missed" in told:
+        expect(f"{at:.2f} s, asked ≤ 20 s" in told, f"report.html: {told!r}")
+        missed = page.inner_text(".missed-list li >> nth=0")
+        expect("asked: ≤ 20 s" in missed and "`" not in missed, f"report.html: {missed!r}")
+    expect("gave up at" in page.inner_text("header .verdict"), "report.html does not say that the robot gave up")
+    page.screenshot(path=folder / "stuck-report.html.png")
+    page.context.close()
+    both = folder / "unlike.html"
+    told = made(program, both, folder / "pot-open", run).stdout
+    for words in ["different robots (wheeleg-2003, wheeleg)", "scenarios (three-step, wall-30)", "First log: Joint 3", "Second log: The robot got stuck", "goes on for"]:
+        expect(words in told, f"a comparison does not say {words!r}: {told}")
+    told = made(program, folder / "beyond.html", run, "--to", "99").stderr
+    expect("ends at 60.0" in told, f"a part beyond the end is not told: {told!r}")
 
 
 def main(program, log, folder, axe):
@@ -121,10 +163,11 @@ def main(program, log, folder, axe):
         journey(browser, whole.resolve())
         ground(browser, program, folder)
         cause(browser, program, folder)
+        gave_up(browser, program, folder)
         page = opened(browser, cut.resolve(), 1280, 720, "light")
         expect("breaks off" in page.inner_text(".note"), "the page does not say that its log breaks off")
         browser.close()
-    for run in ["slope", "pot-open"]:
+    for run in ["slope", "pot-open", "wall"]:
         shutil.rmtree(folder / run, ignore_errors=True)
     if problems:
         sys.exit("\n".join(problems))

@@ -323,7 +323,10 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         "pot-open",
         "PASS",
         "The position sensor reads outside its range",
-        "detected 0.9 to 3.1, axis 4.1, all 35, physical ",
+        // Each limit below its value.
+        "<br><small>0.9 to 3.1</small></td>",
+        "<br><small>≤ 4.1</small></td>",
+        "<br><small>≤ 35</small></td>",
         "in the one row that was run",
         "wheeleg run three-step --seed ",
         "wheeleg view again",

@@ -8,7 +8,8 @@ import { stepByKey } from "./transport.js";
 /** @typedef {{title: string, unit: string, x_label: string, x: [number, number], y: [number, number],
  *   series: Series[], limits: number[], marks: number[], marked: string, height: number}} Panel */
 
-const PAD = { left: 52, right: 12, top: 8, bottom: 22 };
+/** The bottom has room for the numbers of the abscissa, and below them its name. */
+const PAD = { left: 52, right: 12, top: 8, bottom: 36 };
 const ZOOM_PX = 6;
 
 /** A token of the page's style. @param {string} name */
@@ -61,7 +62,7 @@ export class Plot {
     this.span = html("div", { class: "span", hidden: true });
     this.area = html(
       "div",
-      { class: "plot-area", style: `height:${Math.max(120, Math.min(260, panel.height)) + PAD.bottom}px`, tabindex: 0, role: "slider", "aria-label": `${panel.title}, time`, "aria-valuemin": panel.x[0], "aria-valuemax": panel.x[1], "aria-valuenow": panel.x[0] },
+      { class: "plot-area", style: `height:${Math.max(120, Math.min(260, panel.height)) + PAD.bottom}px`, tabindex: 0, role: "slider", "aria-label": `${panel.title}, ${panel.x_label}`, "aria-valuemin": panel.x[0], "aria-valuemax": panel.x[1], "aria-valuenow": panel.x[0] },
       this.canvas,
       this.span,
       this.cursor,
@@ -174,6 +175,7 @@ export class Plot {
       line(Math.round(X(t)) + 0.5, PAD.top + inner.h, Math.round(X(t)) + 0.5, PAD.top + inner.h + 4);
       g.fillText(short(t), Math.min(X(t), width - 16), PAD.top + inner.h + 13);
     }
+    g.fillText(panel.x_label, PAD.left + inner.w / 2, PAD.top + inner.h + 28, inner.w + PAD.left);
 
     g.save();
     g.beginPath();

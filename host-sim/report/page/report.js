@@ -87,7 +87,13 @@ function showFigures(clock) {
       const panel = JSON.parse(data.textContent ?? "");
       let linked = panel.on_clock ? shared : null;
       if (!linked) {
-        linked = own.get(panel.x_label) ?? new Linked(new Player(panel.x[0], panel.x[1]));
+        linked = own.get(panel.x_label) ?? null;
+      }
+      if (!linked) {
+        // In the middle most curves have a value, at an end few.
+        const player = new Player(panel.x[0], panel.x[1]);
+        player.seek((panel.x[0] + panel.x[1]) / 2);
+        linked = new Linked(player);
         own.set(panel.x_label, linked);
       }
       const plot = new Plot(panel, linked);
@@ -138,6 +144,14 @@ for (const input of document.querySelectorAll("input[data-filter]")) {
   field.addEventListener("input", () => {
     const wanted = field.value.toLowerCase();
     for (const body of table.tBodies) body.hidden = !(body.textContent ?? "").toLowerCase().includes(wanted);
+  });
+}
+// A link into a folded table opens it.
+for (const link of document.querySelectorAll('a[href^="#"]')) {
+  link.addEventListener("click", () => {
+    const target = document.getElementById((link.getAttribute("href") ?? "#").slice(1));
+    const folded = target?.matches("details") ? target : target?.closest("details");
+    if (folded instanceof HTMLDetailsElement) folded.open = true;
   });
 }
 // What is folded is not lost on paper.

@@ -153,7 +153,7 @@ export class Scope {
       this.subscribe(topic);
     }
     const series = choice.traces.map((trace) => ({ label: trace.label || "value", colour: trace.colour, width: 1, x: [], y: [] }));
-    const panel = { title: choice.name, unit: choice.unit, x_label: "s", x: /** @type {[number, number]} */ ([this.now - this.span, this.now]), y: /** @type {[number, number]} */ ([...choice.least]), series, limits: [], marks: [], marked: "", height: 120 };
+    const panel = { title: choice.name, unit: choice.unit, x_label: "time [s]", x: /** @type {[number, number]} */ ([this.now - this.span, this.now]), y: /** @type {[number, number]} */ ([...choice.least]), series, limits: [], marks: [], marked: "", height: 120 };
     const plot = new Plot(panel, this.linked, "h3");
     const close = html("button", { class: "btn close", type: "button", "aria-label": `Close the plot ${choice.name}` }, "×");
     const root = html("div", { class: "scope-plot" }, plot.root, close);

@@ -3,6 +3,9 @@ import { html, say, sign, fixed } from "./dom.js";
 
 const SPEEDS = [1, 0.25, 2];
 const STEP_S = 0.02;
+/** Width of a letter in a phase, at most on average, and of what is around its name. */
+const LETTER_PX = 6.5;
+const AROUND_PX = 8;
 
 /** @typedef {{from: number, to: number, name: string, air: boolean}} Phase */
 /** @typedef {{t: number, text: string}} Mark */
@@ -14,10 +17,11 @@ export function transport(player, { phases, marks }) {
   const place = (t) => `${(((t - player.start) / length) * 100).toFixed(3)}%`;
   const head = html("div", { class: "head" });
   const clock = html("output");
+  const segments = phases.map((p) => html("div", { class: p.air ? "seg air" : "seg", title: p.name, style: `left:${place(p.from)};width:calc(${place(player.start + p.to - p.from)} - 1px)` }, p.name));
   const track = html(
     "div",
     { class: "scrub", role: "slider", tabindex: 0, "aria-label": "Time", "aria-valuemin": player.start, "aria-valuemax": player.end },
-    phases.map((p) => html("div", { class: p.air ? "seg air" : "seg", style: `left:${place(p.from)};width:calc(${place(player.start + p.to - p.from)} - 1px)` }, p.name)),
+    segments,
     marks.map((m) => html("span", { class: "tick", style: `left:${place(m.t)}`, title: m.text }, sign("alarm"))),
     seconds(player).map((t) => html("small", { style: `left:${place(t)}` }, `${t}`)),
     head,
@@ -31,6 +35,11 @@ export function transport(player, { phases, marks }) {
   };
   new ResizeObserver(([entry]) => {
     width = entry.contentRect.width;
+    // A word that is cut is none: the whole name, its begin, or nothing.
+    phases.forEach((p, i) => {
+      const room = ((p.to - p.from) / length) * width - AROUND_PX;
+      say(segments[i], [p.name, p.name.split(",")[0]].find((text) => text.length * LETTER_PX <= room) ?? "");
+    });
     draw(player.t);
   }).observe(track);
 

@@ -74,6 +74,23 @@ pub fn grouped(count: u64) -> String {
     out
 }
 
+/// A count with its word: one axis, two axes.
+#[must_use]
+pub fn counted(count: usize, one: &str, more: &str) -> String {
+    let word = if count == 1 { one } else { more };
+    format!("{} {word}", grouped(count as u64))
+}
+
+/// Names in a sentence: a, b and c.
+#[must_use]
+pub fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 /// A text of numbers with true minus signs.
 #[must_use]
 pub fn minus(text: &str) -> String {
@@ -128,6 +145,15 @@ pub(crate) fn add_filters(env: &mut Environment<'_>) {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn counts_and_lists_read_as_a_sentence() {
+        let told = [0, 1, 2000].map(|n| super::counted(n, "axis", "axes"));
+        assert_eq!(told, ["0 axes", "1 axis", "2\u{2009}000 axes"]);
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let told = [0, 1, 2, 3].map(|n| super::listed(&names[..n]));
+        assert_eq!(told, ["", "a", "a and b", "a, b and c"]);
+    }
+
     use super::*;
 
     #[test]

@@ -20,6 +20,7 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     let mut env = Environment::new();
     env.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     number::add_filters(&mut env);
+    env.add_filter("code", |text: String| Value::from_safe_string(code(&text)));
     env.add_template("tokens.css", include_str!("../page/tokens.css"))?;
     env.add_template("ui.css", include_str!("../page/ui.css"))?;
     env.add_template("report.css", include_str!("../page/report.css"))?;
@@ -34,6 +35,22 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
         false => c,
     };
     Ok(text.chars().map(shown).collect())
+}
+
+/// A text in which what stands between backticks is code.
+fn code(text: &str) -> String {
+    let mut out = String::new();
+    for (i, part) in text.split('`').enumerate() {
+        if i > 0 {
+            out.push_str(if i % 2 == 1 { "<code>" } else { "</code>" });
+        }
+        let part = part.replace('&', "&amp;");
+        out.push_str(&part.replace('<', "&lt;").replace('>', "&gt;"));
+    }
+    if !text.matches('`').count().is_multiple_of(2) {
+        out.push_str("</code>");
+    }
+    out
 }
 
 /// A figure for a template.
@@ -95,5 +112,11 @@ mod tests {
         let shown = "a\u{fffd}b\u{fffd}[31mc\u{fffd}d\u{fffd}e\tf\ng";
         assert!(made.contains(shown), "it is shown");
         assert!(!made.contains(|c: char| acts(c) && !"\n\t".contains(c)));
+    }
+
+    #[test]
+    fn backticks_become_code_and_nothing_else_markup() {
+        assert_eq!(code("a (event `stuck`)"), "a (event <code>stuck</code>)");
+        assert_eq!(code("<b> & `x"), "&lt;b&gt; &amp; <code>x</code>");
     }
 }

@@ -1,9 +1,11 @@
-//! What went wrong first: the faults of a run or a log, without those that only follow from one.
+//! What went wrong first: the faults of a run or a log, and where the robot gave up, without those that
+//! only follow from one.
 
+use serde::Serialize;
 use wheeleg_master::event::HoldReason;
 use wheeleg_protocol::{Address, Fault};
 use wheeleg_telemetry::event::hold_name;
-use wheeleg_telemetry::{Event, EventCode, EventKind, Row, finding_of_name};
+use wheeleg_telemetry::{Event, EventCode, EventKind, finding_of_name};
 
 /// What comes so soon after a fault may follow from it, ns.
 const FOLLOWS_NS: u64 = 1_000_000_000;
@@ -14,36 +16,16 @@ const HOLDS_THAT_FOLLOW: [&str; 3] = [
     hold_name(&HoldReason::NodeDisarmed(0)),
 ];
 
-/// Why all axes hold although no board has a fault: what happened, and what to do about it.
-const HOLDS: [(&str, &str, &str); 5] = [
-    (
-        hold_name(&HoldReason::SupplyLost),
-        "Supply pressure lost: all axes hold",
-        "Check compressor, hose and regulator, then clear and arm.",
-    ),
-    (
-        hold_name(&HoldReason::OperatorLost),
-        "Operator lost: all axes hold",
-        "Reconnect, take the control, then clear and arm.",
-    ),
-    (
-        hold_name(&HoldReason::EmergencyStop),
-        "E-stop: all axes hold",
-        "Remove the cause, then clear and arm.",
-    ),
-    (
-        hold_name(&HoldReason::LayerOneStalled),
-        "Layer 1 gave nothing for 100 ms: all axes hold",
-        "Clear and arm.",
-    ),
-    (
-        hold_name(&HoldReason::LayerOneGone),
-        "Layer 1 does not come back: all axes hold",
-        "Clear and arm.",
-    ),
-];
+/// Whether an event says that something went wrong: a fault, or a robot that gives up.
+pub(crate) fn goes_wrong(kind: Option<EventKind>, code: Option<EventCode>) -> bool {
+    match code {
+        Some(EventCode::Stuck) => true,
+        Some(EventCode::FaultsCleared) => false,
+        _ => kind == Some(EventKind::Fault),
+    }
+}
 
-/// An event that somebody has to know of: of the kind [`EventKind::Fault`], or a robot that has given up.
+/// An event of which [`goes_wrong`] holds.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FaultEvent {
     pub(crate) t_ns: u64,
@@ -58,12 +40,13 @@ pub(crate) struct FaultEvent {
 }
 
 impl FaultEvent {
-    /// That of an event of a run, if it is a fault after the start-up.
+    /// That of an event of a run, if it goes wrong after the start-up.
     pub(crate) fn of(t_ns: u64, event: &Event) -> Option<Self> {
-        let is_fault = is_fault(Some(event.cause.kind()), Some(event.cause.code()));
-        (is_fault && event.start_up_us.is_none()).then(|| Self {
+        let (kind, code) = (event.cause.kind(), event.cause.code());
+        let is_wrong = goes_wrong(Some(kind), Some(code)) && event.start_up_us.is_none();
+        is_wrong.then(|| Self {
             t_ns,
-            code: Some(event.cause.code()),
+            code: Some(code),
             detail: event.cause.detail(),
             fault: event.cause.fault_code().and_then(Fault::from_code),
             boards: event.cause.board().into_iter().collect(),
@@ -83,47 +66,87 @@ impl FaultEvent {
     }
 }
 
-/// Whether an event is a fault, or tells that the robot has given up: it walks no more.
-pub(crate) fn is_fault(kind: Option<EventKind>, code: Option<EventCode>) -> bool {
-    kind == Some(EventKind::Fault) || code == Some(EventCode::Stuck)
-}
-
 /// Names of boards in a row.
 pub(crate) fn names(boards: &[Address]) -> String {
     let names: Vec<String> = boards.iter().map(Address::to_string).collect();
     names.join(", ")
 }
 
-/// A fault with what to do about it.
+/// What went wrong, with what to do about it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) t_s: f64,
     /// What happened, to whom.
     pub(crate) headline: String,
+    /// What the robot does because of it, where that is not what every fault of a board does.
+    pub(crate) consequence: Option<&'static str>,
     pub(crate) remedy: Option<&'static str>,
+}
+
+/// What the robot does when the master holds.
+const ALL_HOLD: &str = "all axes hold";
+
+/// Headline, consequence and remedy of a HOLD that no board has given, by its name in the log.
+fn hold(name: &str) -> Option<(&'static str, &'static str, Option<&'static str>)> {
+    let known = [
+        (
+            HoldReason::SupplyLost,
+            "Supply pressure lost",
+            ALL_HOLD,
+            Some("Check compressor, hose and regulator, then clear and arm."),
+        ),
+        (
+            HoldReason::LayerOneStalled,
+            "Layer 1 gave nothing for 100 ms",
+            "a walk is brought to a stand by its behaviours",
+            None,
+        ),
+        (
+            HoldReason::LayerOneGone,
+            "Layer 1 does not come back",
+            "no leg answers the ground any more",
+            Some("Clear and arm."),
+        ),
+        (
+            HoldReason::OperatorLost,
+            "The operator in control is gone",
+            ALL_HOLD,
+            Some("Reconnect, take the control, then clear and arm."),
+        ),
+        (HoldReason::EmergencyStop, "Emergency stop", ALL_HOLD, None),
+    ];
+    let found = known.into_iter().find(|row| hold_name(&row.0) == name);
+    found.map(|(_, headline, consequence, remedy)| (headline, consequence, remedy))
 }
 
 impl Cause {
     fn of(event: &FaultEvent) -> Self {
+        let stem = |sentence: &str| sentence.trim_end_matches('.').to_owned();
+        let told = |headline: String, consequence, remedy| Self {
+            t_s: event.t_ns as f64 * 1e-9,
+            headline: capital(&headline),
+            consequence,
+            remedy,
+        };
         let row = match event.code {
+            Some(EventCode::Stuck) => {
+                let remedy = Some("Turn it, or lead it another way.");
+                return told("The robot got stuck and gave up".to_owned(), None, remedy);
+            }
+            Some(EventCode::Hold) => {
+                if let Some((headline, consequence, remedy)) = hold(&event.detail) {
+                    return told(headline.to_owned(), Some(consequence), remedy);
+                }
+                None
+            }
             Some(EventCode::FaultLatched) => {
                 event.fault.map(|fault| (fault.sentence(), fault.remedy()))
             }
             Some(EventCode::Finding) => {
                 finding_of_name(&event.detail).map(|finding| (finding.sentence(), finding.remedy()))
             }
-            Some(EventCode::Hold) => {
-                let mut holds = HOLDS.into_iter();
-                let found = holds.find(|(name, ..)| *name == event.detail);
-                found.map(|(_, sentence, remedy)| (sentence, remedy))
-            }
-            Some(EventCode::Stuck) => Some((
-                "The robot got no further in three tries, and stands",
-                "Turn it, or lead it another way.",
-            )),
             _ => None,
         };
-        let stem = |sentence: &str| sentence.trim_end_matches('.').to_owned();
         let headline = match row {
             Some((sentence, _)) if event.boards.is_empty() => stem(sentence),
             Some((sentence, _)) => {
@@ -131,26 +154,38 @@ impl Cause {
             }
             None => stem(&event.text),
         };
-        Self {
-            t_s: event.t_ns as f64 * 1e-9,
-            headline,
-            remedy: row.map(|(_, remedy)| remedy),
-        }
+        told(headline, None, row.map(|(_, remedy)| remedy))
+    }
+
+    /// In a sentence without its end; `count`: how many there are.
+    pub(crate) fn sentence(&self, count: usize) -> String {
+        let Self { t_s, headline, .. } = self;
+        let first = match count {
+            0 | 1 => String::new(),
+            _ => format!(", the first of {count} faults"),
+        };
+        let consequence = self.consequence.map(|what| format!(": {what}"));
+        format!(
+            "{headline} at {t_s:.2} s{first}{}",
+            consequence.unwrap_or_default()
+        )
     }
 }
 
-/// A sentence at its begin.
-fn capital(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    let first = letters.next().map(char::to_uppercase);
-    first.into_iter().flatten().chain(letters).collect()
+/// A text with a capital at its begin.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next();
+    first.map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
-/// A sentence as it stands behind a colon; what is all in capitals stays so.
-fn within(sentence: &str) -> String {
+/// A sentence as it stands behind a colon; what is all in capitals, or a symbol, stays so.
+pub(crate) fn within(sentence: &str) -> String {
     let mut letters = sentence.chars();
     match (letters.next(), letters.next()) {
-        (Some(first), Some(second)) if !second.is_uppercase() => first
+        (Some(first), Some(second)) if !second.is_uppercase() && !second.is_numeric() => first
             .to_lowercase()
             .chain(sentence.chars().skip(1))
             .collect(),
@@ -158,40 +193,49 @@ fn within(sentence: &str) -> String {
     }
 }
 
-/// The first cause of what went wrong, and how many there are; events in their order.
-pub(crate) fn first(events: impl Iterator<Item = FaultEvent>) -> Option<(Cause, usize)> {
+/// Causes of what went wrong; events in their order. Most runs have none, and what they have is told
+/// one by one.
+pub(crate) fn causes(events: impl Iterator<Item = FaultEvent>) -> Vec<Cause> {
     let mut causes: Vec<FaultEvent> = Vec::new();
-    for event in events.filter(|event| event.code != Some(EventCode::FaultsCleared)) {
+    for event in events {
         // What is latched again within the second is the same.
         if !causes.iter().any(|cause| event.follows(cause)) {
             causes.push(event);
         }
     }
-    let cause = causes.first().map(Cause::of)?;
-    Some((cause, causes.len()))
+    causes.iter().map(Cause::of).collect()
 }
 
-/// What went wrong first in a run, in a sentence without its end, and what to do about it.
-pub(crate) fn of_run(events: &[Row<Event>]) -> Option<(String, Option<&'static str>)> {
-    let faults = events
-        .iter()
-        .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
-    let (cause, count) = first(faults)?;
-    Some((sentence(&cause, count), cause.remedy))
+/// Most causes in the list of a page.
+pub(crate) const LISTED: usize = 10;
+
+/// Something that went wrong, for a template.
+#[derive(Serialize)]
+pub(crate) struct Wrong {
+    /// Time on the clock of the page, s.
+    t: f64,
+    text: String,
+    remedy: Option<&'static str>,
 }
 
-/// What went wrong, in a sentence without its end.
-pub(crate) fn sentence(cause: &Cause, count: usize) -> String {
-    let Cause { t_s, headline, .. } = cause;
-    match count {
-        1 => format!("{}, at {t_s:.2} s", capital(headline)),
-        _ => format!("{count} faults, the first: {headline}, at {t_s:.2} s"),
-    }
+/// The first causes, for the list of a page; `clock`: from their time to that of the page.
+pub(crate) fn listed(causes: &[Cause], clock: impl Fn(f64) -> f64) -> Vec<Wrong> {
+    let listed = causes.iter().take(LISTED);
+    let wrong = listed.map(|cause| Wrong {
+        t: clock(cause.t_s),
+        text: cause.sentence(1),
+        remedy: cause.remedy,
+    });
+    wrong.collect()
+}
+
+/// The first of some causes, in a sentence without its end.
+pub(crate) fn first_sentence(causes: &[Cause]) -> Option<String> {
+    causes.first().map(|first| first.sentence(causes.len()))
 }
 
 #[cfg(test)]
 mod tests {
-    use wheeleg_master::behaviour::Act;
     use wheeleg_master::event::Event as MasterEvent;
     use wheeleg_master::finding::Finding;
 
@@ -243,14 +287,12 @@ mod tests {
                 "",
             ),
             hold(3_020, HoldReason::NodeFault { node: 3, faults: 1 }),
-            event(3_500, EventCode::FaultsCleared, "", None, Some(3), ""),
         ];
-        let (cause, count) = first(one.clone().into_iter()).expect("a cause");
-        assert_eq!((count, cause.remedy), (1, Some(fault.remedy())));
-        let told = sentence(&cause, count);
+        let found = causes(one.clone().into_iter());
+        assert_eq!((found.len(), found[0].remedy), (1, Some(fault.remedy())));
         assert_eq!(
-            told,
-            "Joint 3: the position sensor reads outside its range, at 3.00 s"
+            first_sentence(&found).expect("a cause"),
+            "Joint 3: the position sensor reads outside its range at 3.00 s"
         );
         // The operator is lost for a reason of their own; what comes later, too.
         for (another, expected) in [
@@ -260,37 +302,65 @@ mod tests {
             (latched(3_100, 3, Fault::LinkLost), 2),
         ] {
             let all = one.iter().cloned().chain([another.clone()]);
-            let (cause, count) = first(all).expect("a cause");
-            assert_eq!(count, expected, "{another:?}");
+            let found = causes(all);
+            assert_eq!(found.len(), expected, "{another:?}");
             assert_eq!(
-                cause.headline,
-                "joint 3: the position sensor reads outside its range"
+                found[0].headline,
+                "Joint 3: the position sensor reads outside its range"
             );
         }
-        let lost = hold(10, HoldReason::OperatorLost);
-        let (cause, _) = first([lost].into_iter()).expect("a cause");
-        assert_eq!(
-            sentence(&cause, 1),
-            "Operator lost: all axes hold, at 0.01 s"
-        );
-        assert!(
-            cause
-                .remedy
-                .is_some_and(|remedy| remedy.contains("clear and arm"))
-        );
-        assert_eq!(first(std::iter::empty()), None);
+        assert!(first_sentence(&causes(std::iter::empty())).is_none());
     }
 
-    /// Nobody has a fault, and yet the robot does not do what it was asked for.
+    /// A board that has lost its supply gives no fault: the master's reason is told, as typed.
     #[test]
-    fn a_robot_that_gives_up_is_a_cause() {
-        let stuck = wheeleg_telemetry::Cause::Master(MasterEvent::Behaviour(Act::Stuck));
-        let event = FaultEvent::of(26_340_000_000, &stuck.into()).expect("a cause");
-        let (cause, count) = first([event].into_iter()).expect("a cause");
-        let told = "The robot got no further in three tries, and stands, at 26.34 s";
-        assert_eq!((sentence(&cause, count).as_str(), count), (told, 1));
-        let homed = wheeleg_telemetry::Cause::Master(MasterEvent::Homed);
-        assert_eq!(FaultEvent::of(0, &homed.into()), None);
+    fn a_hold_is_told_by_its_reason_with_the_remedy_apart() {
+        let told = |reason: HoldReason| {
+            let text = "master: all axes hold: so";
+            let hold = event(3_050, EventCode::Hold, hold_name(&reason), None, None, text);
+            let found = causes([hold].into_iter());
+            (found[0].sentence(1), found[0].sentence(2), found[0].remedy)
+        };
+        let (one, several, remedy) = told(HoldReason::SupplyLost);
+        assert_eq!(one, "Supply pressure lost at 3.05 s: all axes hold");
+        let first = "Supply pressure lost at 3.05 s, the first of 2 faults: all axes hold";
+        assert_eq!(several, first);
+        assert!(remedy.expect("a remedy").starts_with("Check compressor"));
+        for reason in [
+            HoldReason::LayerOneStalled,
+            HoldReason::LayerOneGone,
+            HoldReason::OperatorLost,
+            HoldReason::EmergencyStop,
+        ] {
+            let (one, ..) = told(reason);
+            assert!(!one.contains("master"), "{one}");
+        }
+        let (other, ..) = told(HoldReason::NodeLost(3));
+        assert_eq!(other, "Master: all axes hold: so at 3.05 s");
+    }
+
+    /// It is no fault of a board, but what the run failed of.
+    #[test]
+    fn a_robot_that_gives_up_has_gone_wrong() {
+        let stuck = event(
+            26_340,
+            EventCode::Stuck,
+            "",
+            None,
+            None,
+            "master: no progress",
+        );
+        let found = causes([stuck].into_iter());
+        assert_eq!(
+            found[0].sentence(1),
+            "The robot got stuck and gave up at 26.34 s"
+        );
+        assert!(found[0].remedy.is_some());
+        let info = Some(EventKind::Info);
+        assert!(goes_wrong(info, Some(EventCode::Stuck)));
+        assert!(!goes_wrong(info, Some(EventCode::BackOff)));
+        let fault = Some(EventKind::Fault);
+        assert!(!goes_wrong(fault, Some(EventCode::FaultsCleared)) && goes_wrong(fault, None));
     }
 
     #[test]
@@ -299,12 +369,12 @@ mod tests {
         let found = |node| {
             let found = wheeleg_telemetry::Cause::Master(MasterEvent::Found { node, finding });
             let event = FaultEvent::of(0, &found.into()).expect("a fault");
-            first([event].into_iter()).expect("a cause").0
+            causes([event].into_iter()).remove(0)
         };
         let sentence = finding.sentence().trim_end_matches('.');
         let cause = found(Some(2));
         assert_eq!(cause.remedy, Some(finding.remedy()));
-        assert_eq!(cause.headline, format!("joint 2: {}", within(sentence)));
+        assert_eq!(cause.headline, format!("Joint 2: {}", within(sentence)));
         assert_eq!(found(None).headline, sentence);
     }
 }

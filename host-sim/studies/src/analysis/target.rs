@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::cause::within;
+
 /// What is to be said of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -95,6 +97,36 @@ impl Target {
         }
     }
 
+    /// The unit as it stands behind a value: none behind a count or a share.
+    #[must_use]
+    pub fn unit_text(&self) -> &'static str {
+        if self.unit == "1" { "" } else { self.unit }
+    }
+
+    /// The value with its unit.
+    #[must_use]
+    pub fn measured_text(&self) -> String {
+        let unit = self.value.map_or("", |_| self.unit_text());
+        format!("{} {unit}", self.value_text())
+            .trim_end()
+            .to_owned()
+    }
+
+    /// What was asked, with the unit.
+    #[must_use]
+    pub fn asked_text(&self) -> String {
+        let band = self.band_text();
+        let band = band.strip_prefix("= ").unwrap_or(&band);
+        format!("{band} {}", self.unit_text()).trim_end().to_owned()
+    }
+
+    /// What is measured, as it stands in a sentence: without what its brackets explain.
+    #[must_use]
+    pub fn name_text(&self) -> String {
+        let name = self.description.split(" (").next().unwrap_or_default();
+        within(name)
+    }
+
     /// The band as text.
     #[must_use]
     pub fn band_text(&self) -> String {
@@ -129,6 +161,18 @@ impl Target {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_count_has_no_unit_and_a_band_has_that_of_its_value() {
+        let three = Target::new("X", "Steps (all)", Some(1.0), "1", Some(3.0), Some(3.0));
+        let told = [three.measured_text(), three.asked_text(), three.name_text()];
+        assert_eq!(told, ["1", "3", "steps"]);
+        let late = Target::new("X", "b5 moves", Some(26.34), "s", None, Some(20.0));
+        let told = [late.measured_text(), late.asked_text(), late.name_text()];
+        assert_eq!(told, ["26.34 s", "≤ 20 s", "b5 moves"]);
+        let never = Target::new("X", "x", None, "s", None, Some(20.0));
+        assert_eq!(never.measured_text(), "not measured");
+    }
 
     #[test]
     fn bands_include_their_ends_and_an_unmeasured_value_fails() {

@@ -1,5 +1,6 @@
 //! The pictures of a comparison.
 
+use wheeleg_report::number::listed;
 use wheeleg_report::plot::Colour;
 
 use super::single::range;
@@ -109,6 +110,19 @@ pub(crate) fn panel(
     Panel::new(title, (-0.05, end_s), 230, content)
 }
 
+/// End of the panels of a step \[s\], what is shown about its target \[mm\], and its last part, in which a curve
+/// should be at rest \[s\].
+const STEP_END_S: f64 = 1.5;
+const ABOUT_MM: f64 = 4.0;
+const AT_REST_S: f64 = 0.5;
+
+/// Whether a curve leaves the panel about its target where it should be at rest.
+fn is_beyond(series: &Series) -> bool {
+    let at_rest = STEP_END_S - AT_REST_S..=STEP_END_S;
+    let mut rest = series.points.iter().filter(|(t, _)| at_rest.contains(t));
+    rest.any(|(_, mm)| mm.abs() > ABOUT_MM)
+}
+
 /// The large step with its end enlarged: two panels.
 fn step_panels(comparison: &Comparison, axis: &str) -> Option<Vec<Panel>> {
     let step = comparison.overlay(axis, Move::Step100, |_, x| x);
@@ -116,16 +130,30 @@ fn step_panels(comparison: &Comparison, axis: &str) -> Option<Vec<Panel>> {
         return None;
     }
     let error = comparison.overlay(axis, Move::Step100, |r, x| x - r);
+    // What swings through the panel to its end hides the others.
+    let (error, swinging): (Vec<Series>, Vec<Series>) =
+        error.into_iter().partition(|series| !is_beyond(series));
+    let left_out: Vec<String> = swinging.into_iter().map(|series| series.label).collect();
+    let title = match left_out.as_slice() {
+        [] => "The same about its target".to_owned(),
+        names => format!(
+            "The same about its target, without what is beyond ±{ABOUT_MM} mm to the end ({})",
+            listed(names)
+        ),
+    };
     let mut error = panel(
-        "The same about its target",
+        &title,
         "[mm]; ±1 mm counts as settled",
-        1.5,
+        STEP_END_S,
         error,
-        Some((-4.0, 4.0)),
+        Some((-ABOUT_MM, ABOUT_MM)),
         &[-1.0, 1.0],
     );
     error.name_only(0..0);
-    Some(vec![panel("Stroke", "[mm]", 1.5, step, None, &[]), error])
+    Some(vec![
+        panel("Stroke", "[mm]", STEP_END_S, step, None, &[]),
+        error,
+    ])
 }
 
 /// What the README shows: the step of the first axis, and bars.
@@ -228,7 +256,7 @@ fn steps(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     Some(Figure {
         id: format!("steps-{name}"),
         title: format!("Steps on {name}"),
-        caption: "The last measured move of the first seed, after the learning move. Errors are stroke less reference; red lines at ±1 mm.".to_owned(),
+        caption: "The last measured move of the first seed, after the learning move. Errors are stroke less reference; limit lines at ±1 mm.".to_owned(),
         panels,
     })
 }
@@ -270,7 +298,7 @@ fn tracking(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     Some(Figure {
         id: format!("tracking-{name}"),
         title: format!("Tracking on {name}"),
-        caption: "Stroke less reference; red lines at ±1.5 mm; errors beyond ±15 mm are drawn at the edge.".to_owned(),
+        caption: "Stroke less reference; limit lines at ±1.5 mm; errors beyond ±15 mm lie beyond the edge.".to_owned(),
         panels: stacked,
     })
 }
@@ -303,7 +331,7 @@ fn contact(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
         id: format!("contact-{name}"),
         title: format!("Contact on {name}"),
         caption: format!(
-            "A load of {load_n} N goes at the first red mark and is back at the second."
+            "A load of {load_n} N goes at the first upright mark and is back at the second."
         ),
         panels,
     })

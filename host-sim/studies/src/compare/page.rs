@@ -7,12 +7,12 @@ use super::judged::{ERROR_MM, Judged, Quantile, judging_root};
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
-use wheeleg_report::number::{DASH, fixed, or_dash, signed};
+use wheeleg_report::number::{DASH, counted, fixed, listed, or_dash, signed};
 use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// Bar that cells are coloured by: overshoot of one factor at a time \[mm\].
+/// Bar that cells are judged by: overshoot of one factor at a time \[mm\].
 const OVERSHOOT_MM: f64 = 3.0;
 
 /// The largest of the values; `None` if one is missing or there is none.
@@ -76,6 +76,12 @@ impl Comparison {
             .collect()
     }
 
+    /// What came of it, in a sentence: which controller is best, and on what grounds.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        best(self, &self.judged()).unwrap_or_else(|| supervised(self))
+    }
+
     /// Feasible cases in which the supervision latched a fault: no fault was put in,
     /// so each is a false alarm.
     pub fn false_alarms(&self) -> impl Iterator<Item = &Row> + Clone {
@@ -127,6 +133,7 @@ struct Page<'a> {
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
+    supervised: String,
     kinds: Vec<&'static str>,
     columns: [&'static str; COLUMNS.len()],
     axes: Vec<Axis<'a>>,
@@ -229,16 +236,16 @@ impl Combined {
     }
 }
 
-/// A quantile and its bound.
+/// A quantile and its bound, as far as there are such.
 fn bounded(quantile: Quantile, digits: usize) -> String {
-    format!(
-        "{} ≤ {}",
-        or_dash(quantile.value, digits),
-        or_dash(quantile.at_most, digits)
-    )
+    let value = or_dash(quantile.value, digits);
+    match quantile.at_most {
+        Some(at_most) => format!("{value} ≤ {}", fixed(at_most, digits)),
+        None => value,
+    }
 }
 
-/// A cell of the factor table: error and overshoot of a step, coloured by the bars.
+/// A cell of the factor table: error and overshoot of a step, judged by the bars.
 fn cell(row: Option<&Row>, motion: Move) -> Cell {
     let cell = |text: &str, class| Cell {
         text: text.to_owned(),
@@ -317,7 +324,8 @@ pub(super) fn render(
     let values = Page {
         stopped: comparison.stopped.as_ref().map(ToString::to_string),
         version: env!("CARGO_PKG_VERSION"),
-        verdict: verdict(comparison, played),
+        verdict: comparison.verdict(),
+        supervised: supervised(comparison),
         kinds: options.kinds.iter().map(|k| k.name()).collect(),
         columns: COLUMNS,
         axes: axes.collect(),
@@ -336,13 +344,142 @@ pub(super) fn render(
     Ok(page(TEMPLATE, values)?)
 }
 
-/// The page's first sentence.
-fn verdict(comparison: &Comparison, played: usize) -> String {
-    let (controllers, axes) = (comparison.options.kinds.len(), comparison.axes.len());
-    let what = format!("{played} cases of {controllers} controllers on {axes} axes");
+/// What is said of a controller on all axes.
+struct Standing {
+    kind: Kind,
+    /// Random combinations that it has missed, and those played.
+    missed: u64,
+    combinations: u64,
+    /// Axes on which the large step of the sheet never settles, and those on which it was played.
+    never: usize,
+    played: usize,
+    /// Its worst settling time on each of the others \[s\].
+    settled_s: Vec<f64>,
+}
+
+impl Standing {
+    fn of(comparison: &Comparison, judged: &[Judged], kind: Kind) -> Self {
+        let mut standing = Self {
+            kind,
+            missed: 0,
+            combinations: 0,
+            never: 0,
+            played: 0,
+            settled_s: Vec::new(),
+        };
+        for one in judged.iter().filter(|one| one.controller == kind) {
+            standing.missed += one.missed;
+            standing.combinations += one.combinations;
+        }
+        for axis in &comparison.axes {
+            let mut rows = comparison.nominal(&axis.config.name, kind, Move::Step100);
+            let Some(first) = rows.next() else {
+                continue;
+            };
+            standing.played += 1;
+            let all = std::iter::once(first).chain(rows);
+            match largest(all, |row| row.figures.settle_s) {
+                Some(settled_s) => standing.settled_s.push(settled_s),
+                None => standing.never += 1,
+            }
+        }
+        standing
+    }
+
+    /// Misses, then steps that never settle, then the time of those that do.
+    fn is_better_than(&self, other: &Self) -> bool {
+        let sum = |one: &Self| one.settled_s.iter().sum::<f64>();
+        let counts = |one: &Self| (one.missed, one.never);
+        counts(self) < counts(other) || counts(self) == counts(other) && sum(self) < sum(other)
+    }
+
+    /// What it misses of the random combinations, and what the others do; how long its step takes.
+    fn grounds(&self, others: &str) -> String {
+        let mut grounds = Vec::new();
+        if self.combinations > 0 {
+            let (missed, all) = (self.missed, self.combinations);
+            grounds.push(format!(
+                "misses {missed} of {all} random combinations{others}"
+            ));
+        }
+        let least = self.settled_s.iter().copied().reduce(f64::min);
+        let most = self.settled_s.iter().copied().reduce(f64::max);
+        grounds.extend(least.zip(most).map(|(least, most)| {
+            let [least, most] = [least, most].map(|s| fixed(s, 2));
+            if least == most {
+                format!("settles the large step in {most} s")
+            } else {
+                format!("settles the large step in {least} to {most} s")
+            }
+        }));
+        grounds.join(" and ")
+    }
+}
+
+/// The page's first sentence: which controller is best, on what grounds, and which never settle. None where
+/// nothing was played that says so.
+fn best(comparison: &Comparison, judged: &[Judged]) -> Option<String> {
+    let kinds = comparison.options.kinds.iter();
+    let all: Vec<Standing> = kinds
+        .map(|kind| Standing::of(comparison, judged, *kind))
+        .filter(|standing| standing.played > 0)
+        .collect();
+    let mut best = all.first()?;
+    for standing in &all {
+        if standing.is_better_than(best) {
+            best = standing;
+        }
+    }
+    let others = all.iter().filter(|standing| standing.kind != best.kind);
+    let missed = others.clone().map(|standing| standing.missed);
+    let others = match (missed.clone().min(), missed.max()) {
+        (Some(least), Some(most)) if least == most => format!(" (the others miss {least})"),
+        (Some(least), Some(most)) => format!(" (the others miss {least} to {most})"),
+        _ => String::new(),
+    };
+    let grounds = Some(best.grounds(&others)).filter(|grounds| !grounds.is_empty())?;
+    let axes = comparison.axes.len();
+    let never = all.iter().filter(|standing| standing.never > 0);
+    let never: Vec<String> = never
+        .map(|standing| match axes {
+            1 => standing.kind.name().to_owned(),
+            _ => format!(
+                "{} on {} of {axes} axes",
+                standing.kind.name(),
+                standing.never
+            ),
+        })
+        .collect();
+    let never = match never.len() {
+        0 => String::new(),
+        1 if axes == 1 => format!("; {} never settles", listed(&never)),
+        _ if axes == 1 => format!("; {} never settle", listed(&never)),
+        _ => format!("; never settle: {}", listed(&never)),
+    };
+    let name = best.kind.name();
+    Some(if all.len() == 1 {
+        format!("The law {name} {grounds}{never}.")
+    } else {
+        format!("Best is {name}: it {grounds}{never}.")
+    })
+}
+
+/// What the supervision made of it.
+fn supervised(comparison: &Comparison) -> String {
+    let played = comparison.rows.iter().filter(|r| r.case.feasible).count();
+    let controllers = comparison.options.kinds.len();
+    let what = format!(
+        "{} of {} on {}",
+        counted(played, "case", "cases"),
+        counted(controllers, "controller", "controllers"),
+        counted(comparison.axes.len(), "axis", "axes"),
+    );
     match comparison.false_alarms().count() {
         0 => format!("In {what} the supervision raised no false alarm."),
-        n => format!("In {what} the supervision raised {n} false alarms."),
+        n => format!(
+            "In {what} the supervision raised {}.",
+            counted(n, "false alarm", "false alarms")
+        ),
     }
 }
 

@@ -44,6 +44,9 @@ pub(super) fn figures(study: &Study) -> Vec<Figure> {
     ]
 }
 
+/// End of the abscissa of the starts \[s\].
+const END_S: f64 = 0.35;
+
 /// Shares of starts that have come, over time.
 fn starts(study: &Study) -> Figure {
     let panel = |law: Law| {
@@ -56,31 +59,33 @@ fn starts(study: &Study) -> Figure {
             let n = delays.len().max(1) as f64;
             let mut points = vec![(0.0, 0.0)];
             for (i, d) in delays.iter().enumerate() {
-                points.push((*d, i as f64 / n));
-                points.push((*d, (i + 1) as f64 / n));
+                points.push((*d, 100.0 * i as f64 / n));
+                points.push((*d, 100.0 * (i + 1) as f64 / n));
             }
-            points.push((0.4, 1.0));
+            points.push((END_S, 100.0));
             line(start.name(), colours(start), 2, points)
         });
         let mut panel = curves(
             match law {
-                Law::Paper => "paper's law:",
-                Law::Default => "default law:",
+                Law::Paper => "paper's law: share of starts that have come",
+                Law::Default => "default law: share of starts that have come",
             },
             (
                 "time since the set-point reached the board [s]",
-                (0.0, 0.35),
+                (0.0, END_S),
             ),
-            ("started", (0.0, 1.02)),
+            ("[%]", (0.0, 102.0)),
             series.into(),
             &[],
         );
-        panel.marks = vec![PAPER_DELAY_S - PAPER_BAND_S, PAPER_DELAY_S + PAPER_BAND_S];
-        panel.marked = "paper's delay";
+        panel.marks = [-PAPER_BAND_S, 0.0, PAPER_BAND_S]
+            .map(|off_s| PAPER_DELAY_S + off_s)
+            .to_vec();
+        panel.marked = "the paper's 0.25 s, and ±0.05 s";
         panel
     };
     let mut panels = vec![panel(Law::Paper), panel(Law::Default)];
-    // The legend of seven lines is too long for one panel: four and three.
+    // The legend of seven lines is too long for one picture: four and three.
     for (i, panel) in panels.iter_mut().enumerate() {
         panel.name_only(if i == 0 { 0..4 } else { 4..7 });
     }
@@ -88,7 +93,7 @@ fn starts(study: &Study) -> Figure {
         id: "starts".to_owned(),
         title: "Start delays by kind of move".to_owned(),
         caption: format!(
-            "Share of {} seeded starts whose piston has moved 1 mm. Red: the paper's 0.25 s ± 0.05 s.",
+            "Share of {} seeded starts whose piston has moved 1 mm. Upright lines: the paper's 0.25 s, and 0.05 s less and more.",
             study.seeds
         ),
         panels,
@@ -143,7 +148,7 @@ fn home(study: &Study) -> Figure {
     Figure {
         id: "home".to_owned(),
         title: "The move from the held home".to_owned(),
-        caption: "Retracting from the extended stop, first seed. The piston cannot move before chamber A has vented and B has filled; an announced move does that before the command. Red: the first millimetre.".to_owned(),
+        caption: "Retracting from the extended stop, first seed. The piston cannot move before chamber A has vented and B has filled; an announced move does that before the command. Upright line: the first millimetre.".to_owned(),
         panels,
     }
 }
@@ -179,16 +184,22 @@ fn ablation(study: &Study) -> Figure {
         })
         .collect();
     let panel = |title: &str, rows, mark| {
-        let mut panel = Panel::new(title, (0.0, end), 300, Content::Raster(rows));
+        let panel = Panel::new(title, (0.0, end), 300, Content::Raster(rows));
+        let mut panel = panel.over("time since the command [s]");
         panel.marks = vec![mark];
         panel
     };
+    let words = a.rows.iter().map(|r| format!("{}: {}", r.id, r.text));
+    let words: Vec<String> = words.collect();
     Figure {
         id: "ablation".to_owned(),
         title: "What the delay is made of".to_owned(),
         caption: format!(
-            "Move from the held home, paper's law, mean of {} seeds. Above: the start delay without one contribution; red: with all of them ({:.3} s). Below: contributions taken away one after the other, from the command on; red: what is left ({:.3} s).",
-            a.seeds, a.base_s, a.residual_s
+            "Move from the held home, paper's law, mean of {} seeds. Above: the start delay without one contribution; upright line: with all of them ({:.3} s). Below: contributions taken away one after the other, from the command on; upright line: what is left ({:.3} s). What is taken away: {}.",
+            a.seeds,
+            a.base_s,
+            a.residual_s,
+            words.join("; ")
         ),
         panels: vec![
             panel("delay without one contribution", alone, a.base_s),
@@ -276,7 +287,7 @@ fn preview(study: &Study) -> Figure {
         id: "preview".to_owned(),
         title: "What an announced move gains".to_owned(),
         caption: format!(
-            "Default law, worst of {} seeds. Red: at most {PREVIEW_LIMIT_S} s, and at most {EARLY_LIMIT_MM} mm before the command.",
+            "Default law, worst of {} seeds. Level lines: at most {PREVIEW_LIMIT_S} s, and at most {EARLY_LIMIT_MM} mm before the command.",
             study.preview.seeds
         ),
         panels: vec![

@@ -24,40 +24,20 @@ fn maybe(value: Option<f64>) -> String {
     value.map_or_else(|| "never".to_owned(), seconds)
 }
 
-/// In one sentence each: where the paper's delay is reached, and where not.
+/// Whether a start delay is the paper's.
+fn is_papers(delay_s: f64) -> bool {
+    (PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S).contains(&delay_s)
+}
+
+/// Below "In short", in one sentence each.
 pub(super) fn findings(study: &Study) -> Vec<String> {
-    let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
-    let mut list = Vec::new();
-    for law in Law::ALL {
-        let named = |inside: bool| {
-            let of = study.starts.list.iter().filter(|d| d.law == law);
-            let names: Vec<String> = of
-                .filter(|d| band.contains(&d.median_s) == inside)
-                .map(|d| format!("{} {} s", d.start.name(), seconds(d.median_s)))
-                .collect();
-            if names.is_empty() {
-                "none".to_owned()
-            } else {
-                names.join("; ")
-            }
-        };
-        list.push(format!(
-            "{} law (medians): within 0.25 ± 0.05 s: {}. Outside: {}.",
-            match law {
-                Law::Paper => "Paper's",
-                Law::Default => "Default",
-            },
-            named(true),
-            named(false)
-        ));
-    }
     let a = &study.ablation;
-    list.push(format!(
+    let mut list = vec![format!(
         "Filling and venting of the chambers make {:.0} % of the {} s that pass from the command in the master to the first millimetre; without them {} s are left.",
         1e2 * a.swap_share,
         seconds(a.base_s),
         seconds(a.without_swap_s)
-    ));
+    )];
     for start in [Start::HomeHeld, Start::HomeRest] {
         let last = study.preview.of(Law::Default, start).last();
         list.push(match (study.preview.enough_s(start), last) {
@@ -94,6 +74,8 @@ struct Page<'a> {
     findings: Vec<String>,
     kinds: Vec<Kind<'a>>,
     predictions: Vec<Predicted<'a>>,
+    /// Those that do not hold, and rivals that are not ruled out.
+    rejected: Vec<Predicted<'a>>,
     previews: Vec<Announced<'a>>,
     /// Medians \[s\].
     paper_home: Option<f64>,
@@ -110,6 +92,8 @@ struct Kind<'a> {
     name: &'static str,
     text: &'static str,
     laws: Vec<&'a Distribution>,
+    /// Whether the median is the paper's delay, for each law.
+    papers: Vec<bool>,
 }
 
 #[derive(Serialize)]
@@ -141,25 +125,36 @@ impl<'a> Announced<'a> {
 fn verdict(study: &Study) -> String {
     let home = study.starts.of(Law::Paper, Start::HomeHeld);
     format!(
-        "The paper's law starts {} s after its command from the held home (the paper reports 0.25 s), and the swap of the chambers' pressures makes {:.0} % of that.",
+        "The paper's law starts {} s after its command from the held home, {} the paper's 0.25 ± 0.05 s, and the swap of the chambers' pressures makes {:.0} % of that.",
         maybe(home.map(|d| d.median_s)),
+        if home.is_some_and(|d| is_papers(d.median_s)) {
+            "within"
+        } else {
+            "outside of"
+        },
         1e2 * study.ablation.swap_share
     )
 }
 
 pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<String, StudyError> {
-    let kinds = Start::ALL.map(|start| Kind {
-        name: start.name(),
-        text: start.text(),
-        laws: Law::ALL
-            .into_iter()
-            .filter_map(|law| study.starts.of(law, start))
-            .collect(),
+    let kinds = Start::ALL.map(|start| {
+        let laws = Law::ALL.into_iter();
+        let laws: Vec<&Distribution> = laws.filter_map(|law| study.starts.of(law, start)).collect();
+        Kind {
+            name: start.name(),
+            text: start.text(),
+            papers: laws.iter().map(|d| is_papers(d.median_s)).collect(),
+            laws,
+        }
     });
-    let predictions = study.predictions.list.iter().map(|prediction| Predicted {
-        rival: prediction.rival,
-        prediction,
-    });
+    let predictions = || {
+        let list = study.predictions.list.iter();
+        list.map(|prediction| Predicted {
+            rival: prediction.rival,
+            prediction,
+        })
+    };
+    let rejected = predictions().filter(|row| row.prediction.holds == row.rival);
     let previews = study.preview.rows.iter().map(Announced::new);
     let home = |law| study.starts.of(law, Start::HomeHeld).map(|d| d.median_s);
     let announced = |start| {
@@ -169,7 +164,6 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
             .last()
             .map(Announced::new)
     };
-    let band = PAPER_DELAY_S - PAPER_BAND_S..=PAPER_DELAY_S + PAPER_BAND_S;
     let values = Page {
         version: env!("CARGO_PKG_VERSION"),
         verdict: verdict(study),
@@ -177,10 +171,11 @@ pub(super) fn render(study: &Study, figures: &[(Figure, String)]) -> Result<Stri
         figures: pictures(figures),
         findings: findings(study),
         kinds: kinds.into(),
-        predictions: predictions.collect(),
+        predictions: predictions().collect(),
+        rejected: rejected.collect(),
         previews: previews.collect(),
         paper_home: home(Law::Paper),
-        paper_reached: home(Law::Paper).is_some_and(|s| band.contains(&s)),
+        paper_reached: home(Law::Paper).is_some_and(is_papers),
         default_home: home(Law::Default),
         announced: announced(Start::HomeHeld),
         announced_rest: announced(Start::HomeRest),

@@ -46,7 +46,7 @@ fn compared(checks: &[AxisCheck], figure: u8, reading: &str) -> String {
                 c.unit,
                 short(c.axis_min),
                 short(c.axis_max),
-                if c.fits { "fits" } else { "does not fit" },
+                if c.fits { "fits" } else { "◆ does not fit" },
             )
         })
         .collect();
@@ -214,14 +214,14 @@ pub(super) fn figures(results: &Results) -> Vec<Figure> {
     };
     all.push(heat(
         "precision-forward",
-        "Single precision: foot from strokes",
+        "Foot from strokes: single precision",
         &map.forward_m,
         map.worst_forward_m,
         "Foot position",
     ));
     all.push(heat(
         "precision-inverse",
-        "Single precision: strokes from foot",
+        "Strokes from foot: single precision",
         &map.inverse_m,
         map.worst_inverse_m,
         "Strokes",

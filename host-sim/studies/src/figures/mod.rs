@@ -9,6 +9,8 @@ pub mod precision;
 pub mod section6;
 pub(crate) mod tables;
 
+use std::collections::BTreeSet;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -45,6 +47,15 @@ pub struct Results {
     pub misprints: Vec<Misprint>,
     /// Single against double precision.
     pub precision: PrecisionMap,
+}
+
+impl Results {
+    /// Equations that are misprinted or ambiguous: one may differ in several components.
+    #[must_use]
+    pub fn equations(&self) -> usize {
+        let equations = self.misprints.iter().map(|m| m.equation);
+        equations.collect::<BTreeSet<_>>().len()
+    }
 }
 
 /// What was computed until the study ended or was stopped.

@@ -1,7 +1,5 @@
 //! The page: one self-contained file in the style of a run's report.
 
-use std::collections::BTreeSet;
-
 use serde::Serialize;
 
 use super::Results;
@@ -21,6 +19,8 @@ struct Page<'a> {
     verdict: String,
     figures: Vec<Picture<'a>>,
     axes: &'a [AxisCheck],
+    /// Those that do not hold what is computed.
+    misfits: Vec<&'a AxisCheck>,
     misprints: &'a [Misprint],
     equations: usize,
     argument_fits: String,
@@ -34,18 +34,19 @@ pub(super) fn render(
     results: &Results,
     figures: &[(Figure, String)],
 ) -> Result<String, StudyError> {
-    let equations = results.misprints.iter().map(|m| m.equation);
-    let equations = equations.collect::<BTreeSet<_>>().len();
+    let equations = results.equations();
     let worst_m = results.precision.worst_m();
     let values = Page {
         version: env!("CARGO_PKG_VERSION"),
         verdict: format!(
-            "Read with the abscissa as time/8, {} axes of Figs. 5 to 8 hold what is computed; {equations} equations are misprinted or ambiguous; single precision is off by at most {} µm.",
+            "Read with the abscissa as time/8, {} axes of Figs. 5 to 8 hold what is computed, read as seconds {}; {equations} equations are misprinted or ambiguous; single precision is off by at most {} µm.",
             fitting(results, "argument"),
+            fitting(results, "literal"),
             short(1e6 * worst_m)
         ),
         figures: pictures(figures),
         axes: &results.checks,
+        misfits: results.checks.iter().filter(|c| !c.fits).collect(),
         misprints: &results.misprints,
         equations,
         argument_fits: fitting(results, "argument"),

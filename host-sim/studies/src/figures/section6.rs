@@ -17,6 +17,8 @@ pub struct Reading {
     pub text: &'static str,
     /// Label of the time axis.
     pub abscissa: &'static str,
+    /// Its unit.
+    pub abscissa_unit: &'static str,
     /// Height of the arch A (m).
     pub amplitude_m: f64,
     /// Travel X over the whole motion (m).
@@ -39,7 +41,8 @@ const B5_START_M: f64 = 0.01;
 pub const ARGUMENT: Reading = Reading {
     name: "argument",
     text: "the abscissa is the argument time/8, so the motion lasts 8π = 25.1 s",
-    abscissa: "time/8 [s]",
+    abscissa: "argument time/8 [rad]",
+    abscissa_unit: "rad",
     amplitude_m: 0.18,
     travel_m: 0.24,
     omega_rad_s: 0.125,
@@ -52,6 +55,7 @@ pub const LITERAL: Reading = Reading {
     name: "literal",
     text: "taken literally: seconds and metres, so the motion lasts 3.5 s",
     abscissa: "time [s]",
+    abscissa_unit: "s",
     amplitude_m: 1.0,
     travel_m: 0.24,
     omega_rad_s: 0.125,
@@ -192,7 +196,7 @@ pub fn checks(reading: &Reading, motion: &[Instant]) -> Vec<AxisCheck> {
         AxisCheck::new(
             ("A10", 6, "abscissa"),
             reading.name,
-            "s",
+            reading.abscissa_unit,
             (0.0, 3.5),
             motion.iter().map(|i| i.abscissa),
         ),

@@ -9,7 +9,7 @@ use super::row::{Expect, Row, Since};
 use crate::StudyError;
 use crate::study::Stopped;
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
-use wheeleg_report::number::minus;
+use wheeleg_report::number::{counted, fixed, minus};
 use wheeleg_report::page;
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -43,46 +43,69 @@ pub(super) fn tidy(ms: f64) -> f64 {
     (ms * 1e3).round() / 1e3
 }
 
-/// Limits of a row, in words, as it is judged by them.
-fn limits(outcome: &Outcome) -> String {
-    let row = &outcome.row;
-    let after = |all_ms: f64| {
+/// Limits by which a row is judged, each for the column of what it limits; none where nothing is.
+#[derive(Default, Serialize)]
+struct Limits {
+    detected: String,
+    own: String,
+    commanded: String,
+    sensed: String,
+    physical: String,
+    wheels: String,
+    deviation: String,
+    /// Those that have no column.
+    others: Vec<String>,
+}
+
+impl Limits {
+    /// Those of a row on which all axes stop, `all_ms` after the fault at the latest.
+    fn all(outcome: &Outcome, all_ms: f64) -> Self {
         let AfterAll {
             physical_ms,
             wheels_ms,
         } = outcome.after_all;
-        format!(
-            "all {all_ms}, physical {:.1}, wheels {:.0} ms",
-            all_ms + physical_ms,
-            all_ms + wheels_ms
-        )
-    };
-    match row.expect {
-        Expect::Stop(stop) => {
-            let [from, to] = stop.detected_ms;
-            let own = if stop.axis > 0 {
-                format!(", axis {}", stop.own_ms)
-            } else {
-                String::new()
-            };
-            let dump = if row.estop {
-                format!(", dump {} ms", stop.all_ms)
-            } else {
-                String::new()
-            };
-            let held = row.held_mm.map(|mm| format!(", held within {mm} mm"));
-            minus(&format!(
-                "detected {from} to {to}{own}, {}{dump}{}",
-                after(stop.all_ms),
-                held.unwrap_or_default()
-            ))
+        let at_most = |ms: f64, digits: usize| format!("≤ {}", fixed(ms, digits));
+        let all = format!("≤ {all_ms}");
+        Self {
+            commanded: all.clone(),
+            sensed: all,
+            physical: at_most(all_ms + physical_ms, 1),
+            wheels: at_most(all_ms + wheels_ms, 0),
+            ..Self::default()
         }
-        Expect::GoesOn { deviation_mm } => format!("deviation {deviation_mm} mm"),
-        Expect::Degrades => format!(
-            "after the detection {}; without one, deviation {DEGRADED_MM} mm",
-            after(REACTION_MS)
-        ),
-        _ => String::new(),
+    }
+
+    fn of(outcome: &Outcome) -> Self {
+        let row = &outcome.row;
+        match row.expect {
+            Expect::Stop(stop) => {
+                let [from, to] = stop.detected_ms;
+                let mut limits = Self::all(outcome, stop.all_ms);
+                limits.detected = minus(&format!("{from} to {to}"));
+                if stop.axis > 0 {
+                    limits.own = format!("≤ {}", stop.own_ms);
+                }
+                if row.estop {
+                    limits.others.push(format!("dump ≤ {} ms", stop.all_ms));
+                }
+                let held = row.held_mm.map(|mm| format!("held within {mm} mm"));
+                limits.others.extend(held);
+                limits
+            }
+            Expect::GoesOn { deviation_mm } => Self {
+                deviation: format!("≤ {deviation_mm}"),
+                ..Self::default()
+            },
+            Expect::Degrades => {
+                let mut limits = Self::all(outcome, REACTION_MS);
+                limits.deviation = format!("≤ {DEGRADED_MM}");
+                let others =
+                    "times count after the detection; without one, the deviation is judged";
+                limits.others.push(others.to_owned());
+                limits
+            }
+            _ => Self::default(),
+        }
     }
 }
 
@@ -110,9 +133,9 @@ struct Page<'a> {
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
+    seed: u64,
     /// That of the rows in which the robot walks.
     scenario: &'static str,
-    seed: u64,
     rows: Vec<Shown<'a>>,
     passed: usize,
     failed: usize,
@@ -128,7 +151,7 @@ struct Shown<'a> {
     faults: String,
     phase: &'static str,
     reaction: String,
-    limits: String,
+    limits: Limits,
     /// Whether it was run.
     run: bool,
     failed: bool,
@@ -147,7 +170,7 @@ impl<'a> Shown<'a> {
             faults: what_goes_wrong(o),
             phase: o.row.phase.label(),
             reaction: reaction(&o.row),
-            limits: limits(o),
+            limits: Limits::of(o),
             run: o.verdict != Verdict::NotImplemented,
             failed: o.verdict == Verdict::Fail,
             measured: &o.measured,
@@ -186,8 +209,8 @@ pub(super) fn render(
             }
             0 => format!("Passed: the robot reacts as it must in all {passed} rows that were run."),
             _ => format!(
-                "Failed: the robot does not react as it must in {failed} of {} rows.",
-                passed + failed
+                "Failed: the robot does not react as it must in {failed} of {}.",
+                counted(passed + failed, "row", "rows")
             ),
         },
         seed,

@@ -9,13 +9,14 @@ use super::figures::Source;
 use super::motion::motion;
 use crate::StudyError;
 use crate::analysis::{Judgement, StartDelay, Target};
-use crate::cause;
+use crate::cause::{self, FaultEvent, Wrong};
 use wheeleg_protocol::NODE_NAMES;
+use wheeleg_report::number::minus;
 use wheeleg_report::plot::Figure;
 use wheeleg_report::{Picture, json, page, pictures};
 use wheeleg_telemetry::event::BoardChange;
 use wheeleg_telemetry::messages::after_power_up;
-use wheeleg_telemetry::{Cause, Event, EventKind, LinkSample, Row};
+use wheeleg_telemetry::{Cause, Event, EventCode, EventKind, LinkSample, Row};
 
 const TEMPLATE: &str = include_str!("template.html");
 
@@ -23,6 +24,7 @@ const TEMPLATE: &str = include_str!("template.html");
 struct Line {
     t_ns: u64,
     kind: EventKind,
+    code: EventCode,
     text: String,
 }
 
@@ -48,6 +50,7 @@ fn grouped<'a>(events: impl Iterator<Item = &'a Row<Event>>) -> Vec<Line> {
         lines.push(Line {
             t_ns: row.t_ns,
             kind: cause.kind(),
+            code: cause.code(),
             text: cause.to_string(),
         });
     }
@@ -76,9 +79,12 @@ fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
 struct Page<'a> {
     summary: &'a Summary,
     verdict: String,
-    /// What went wrong first, and what to do about it.
+    /// What went wrong first.
     cause: Option<String>,
     remedy: Option<&'static str>,
+    wrong: Vec<Wrong>,
+    /// Causes beyond those listed.
+    more_wrong: usize,
     scenario_text: &'a str,
     robot_text: &'a str,
     pil: Option<Boards<'a>>,
@@ -113,6 +119,9 @@ struct Judged<'a> {
     value: String,
     unit: &'a str,
     band: String,
+    /// Value, and what was asked, with their unit.
+    measured: String,
+    asked: String,
     /// None of a run that was cut short.
     judgement: Option<Judgement>,
     required: bool,
@@ -124,8 +133,10 @@ impl<'a> Judged<'a> {
             id: &target.id,
             description: &target.description,
             value: target.value_text(),
-            unit: target.unit,
+            unit: target.unit_text(),
             band: target.band_text(),
+            measured: target.measured_text(),
+            asked: target.asked_text(),
             judgement: complete.then(|| target.judgement()),
             required: target.required,
         }
@@ -145,10 +156,8 @@ struct Parameter<'a> {
 /// The page's first sentence: what came of the run, and what that is worth.
 fn verdict(summary: &Summary) -> String {
     let required = summary.targets.iter().filter(|t| t.required);
-    let (count, missed) = (
-        required.clone().count(),
-        required.filter(|t| !t.pass).count(),
-    );
+    let count = required.clone().count();
+    let missed: Vec<&Target> = required.filter(|t| !t.pass).collect();
     let differing = summary.pil.as_ref().map_or(0, |pil| pil.differing_bits);
     let name = &summary.scenario;
     if summary.failure.is_some() {
@@ -159,10 +168,19 @@ fn verdict(summary: &Summary) -> String {
         format!("{name}: boards differ from the native application in {differing} bits.")
     } else if count == 0 {
         format!("{name}: ran to its end; the scenario requires nothing.")
-    } else if missed == 0 {
-        format!("{name}: all {count} required targets are met.")
+    } else if let Some(first) = missed.first() {
+        let what = first.name_text();
+        let [measured, asked] = [first.measured_text(), first.asked_text()].map(|t| minus(&t));
+        let more = match missed.len() - 1 {
+            0 => String::new(),
+            n => format!("; {n} more below"),
+        };
+        format!(
+            "{name}: {} of {count} required targets missed: {what}, {measured}, asked {asked}{more}.",
+            missed.len()
+        )
     } else {
-        format!("{name}: {missed} of {count} required targets missed.")
+        format!("{name}: all {count} required targets are met.")
     }
 }
 
@@ -198,6 +216,8 @@ pub(super) fn render(
             context! {
                 t => format!("{:.3}", line.t_ns as f64 * 1e-9),
                 kind => line.kind.name(),
+                name => line.code.name(),
+                wrong => cause::goes_wrong(Some(line.kind), Some(line.code)),
                 text => line.text,
             }
         })
@@ -211,12 +231,17 @@ pub(super) fn render(
     });
     let required = summary.targets.iter().filter(|t| t.required);
     let met = required.clone().filter(|t| t.pass).count();
-    let (cause, remedy) = cause::of_run(all).unzip();
+    let faults = all
+        .iter()
+        .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
+    let causes = cause::causes(faults);
     let values = Page {
         summary,
         verdict: verdict(summary),
-        cause,
-        remedy: remedy.flatten(),
+        cause: cause::first_sentence(&causes),
+        remedy: causes.first().and_then(|first| first.remedy),
+        wrong: cause::listed(&causes, |t_s| source.t(t_s)),
+        more_wrong: causes.len().saturating_sub(cause::LISTED),
         scenario_text: &source.scenario.description,
         robot_text: &source.robot.description,
         pil: summary.pil.as_ref().map(Boards::new),

@@ -20,7 +20,6 @@ use std::time::Instant;
 
 use self::figures::Source;
 use crate::StudyError;
-use crate::cause;
 use crate::study::{Finished, Job, Settings, Stop};
 use wheeleg_config::faults::FaultSpec;
 use wheeleg_config::{EventAction, LawChoice, Motion, RobotConfig, Scenario, builtin};
@@ -63,8 +62,6 @@ pub struct Run {
     pub failure: Option<SimError>,
     /// When boards outside were down.
     pub down_times: DownTimes,
-    /// What went wrong first, and what to do about it: a sentence without its end, and one with it.
-    pub cause: Option<(String, Option<&'static str>)>,
 }
 
 /// Samples per second in the CSV files; 500 per second are in the MCAP log.
@@ -247,7 +244,6 @@ fn run_with(
         summary,
         failure: outcome.failure,
         down_times: outcome.down_times,
-        cause: cause::of_run(&source.recording.events),
     };
     Ok(report::write(job, &source, run, stopped))
 }

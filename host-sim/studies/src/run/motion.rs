@@ -2,6 +2,7 @@
 
 use super::figures::Source;
 use super::ground::picture;
+use crate::cause::goes_wrong;
 use crate::motion::{Blind, Mark, Motion, Phase, Readings, phase_name, rounded};
 use wheeleg_config::Drawing;
 use wheeleg_protocol::Fault;
@@ -103,11 +104,13 @@ fn phases(source: &Source<'_>, end: f64) -> Vec<Phase> {
     phases
 }
 
-/// Faults, the first at each instant: sixteen alike are one mark.
+/// What went wrong, the first at each instant: sixteen alike are one mark.
 fn marks(source: &Source<'_>) -> Vec<Mark> {
     let (start, end) = source.x_range();
-    let faults = source.recording.events.iter();
-    let faults = faults.filter(|row| row.v.cause.kind() == wheeleg_telemetry::EventKind::Fault);
+    let faults = source.recording.events.iter().filter(|row| {
+        let cause = &row.v.cause;
+        goes_wrong(Some(cause.kind()), Some(cause.code()))
+    });
     let mut marks: Vec<Mark> = Vec::new();
     for row in faults {
         let t = source.t(row.t_s());

@@ -44,7 +44,6 @@ mod tests {
             summary: summary.clone(),
             failure: None,
             down_times: wheeleg_sim::DownTimes::default(),
-            cause: None,
         };
         let source = Source {
             scenario,

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::analysis::{Analysis, Target};
+use crate::cause::{self, FaultEvent};
 use crate::study;
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_master::behaviour::Behaviour;
@@ -13,7 +14,7 @@ use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_protocol::Address;
 use wheeleg_remote_host::PilSummary;
-use wheeleg_telemetry::{Cause, EventKind, Recording};
+use wheeleg_telemetry::{Cause, EventCode, EventKind, Recording};
 
 /// Facts about a run that are not in its recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +54,9 @@ pub struct Summary {
     /// What went wrong and what to do about it, and commands that were not carried out, in order
     /// of time; equal ones of these are one message that tells how many.
     pub messages: Vec<String>,
+    /// What went wrong first, and below it what to do about it; empty if nothing did.
+    #[serde(skip)]
+    pub cause: Vec<String>,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
     /// Messages that could not be written to the log file.
@@ -120,6 +124,19 @@ const LISTED: usize = 20;
 /// What several boards tell alike within this time is one line \[ns\].
 const ALIKE_NS: u64 = 50_000_000;
 
+/// The first cause of what went wrong, a sentence a line.
+fn cause(recording: &Recording) -> Vec<String> {
+    let wrong = recording.events.iter();
+    let wrong = wrong.filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
+    let causes = cause::causes(wrong);
+    let remedy = causes.first().and_then(|first| first.remedy);
+    let sentence = cause::first_sentence(&causes).map(|told| format!("{told}."));
+    sentence
+        .into_iter()
+        .chain(remedy.map(str::to_owned))
+        .collect()
+}
+
 /// Faults, findings and refusals as the user reads them, with their time: the first twenty, and how
 /// many more there are. A user who asks for the same again and again gets one line, at the time of
 /// the first refusal.
@@ -132,7 +149,8 @@ fn messages(recording: &Recording) -> Vec<String> {
     let mut more = 0_u64;
     for event in &recording.events {
         let refusal = refusal(&event.v.cause);
-        if refusal.is_none() && event.v.cause.kind() != EventKind::Fault {
+        let gives_up = event.v.cause.code() == EventCode::Stuck;
+        if refusal.is_none() && !gives_up && event.v.cause.kind() != EventKind::Fault {
             continue;
         }
         let known = refusals
@@ -222,6 +240,7 @@ impl Summary {
             seed: info.seed.to_string(),
             faults: scenario.faults.iter().map(ToString::to_string).collect(),
             messages: messages(recording),
+            cause: cause(recording),
             hash: recording.hash.clone(),
             dropped_messages: recording.dropped,
             unwritten: Vec::new(),
@@ -246,6 +265,7 @@ impl study::Summary for Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_master::behaviour::Act;
     use wheeleg_master::command::CommandCode;
     use wheeleg_master::dispatcher::{Refusal, Reject};
     use wheeleg_protocol::Fault;
@@ -340,6 +360,28 @@ mod tests {
             found[20].starts_with("19981 more of these"),
             "{}",
             found[20]
+        );
+    }
+
+    /// What the run failed of is told first, whether a board has a fault or not.
+    #[test]
+    fn a_robot_that_gives_up_is_told_as_the_cause_and_as_a_message() {
+        let mut recording = Recording::default();
+        assert!(cause(&recording).is_empty());
+        recording.events.push(Row {
+            t_ns: 26_340_000_000,
+            v: Cause::Master(MasterEvent::Behaviour(Act::Stuck)).into(),
+        });
+        let told = cause(&recording);
+        let expected = [
+            "The robot got stuck and gave up at 26.34 s.",
+            "Turn it, or lead it another way.",
+        ];
+        assert_eq!(told, expected);
+        let messages = messages(&recording);
+        assert!(
+            messages.len() == 1 && messages[0].starts_with("26.340 s: "),
+            "{messages:?}"
         );
     }
 

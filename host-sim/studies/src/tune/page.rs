@@ -7,7 +7,7 @@ use crate::StudyError;
 use crate::axis_sim::Delays;
 use crate::axis_sim::Trace;
 use crate::compare::{Figures, MARGIN, Move, panel};
-use wheeleg_report::number::or_dash;
+use wheeleg_report::number::{fixed, or_dash};
 use wheeleg_report::plot::{Figure, Series, colour, line};
 use wheeleg_report::{Picture, page, pictures};
 
@@ -43,10 +43,12 @@ pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
         let trace = &test.played[0].measured[index];
         trace.rows.len() as f64 * 1e-3 - trace.motion.start_s()
     };
-    tuned
-        .tests
-        .iter()
-        .filter(|t| t.motion != Move::Hold)
+    // The large step is the main figure.
+    let mut tests: Vec<&Test> = tuned.tests.iter().collect();
+    tests.retain(|test| test.motion != Move::Hold);
+    tests.sort_by_key(|test| test.motion != Move::Step100);
+    tests
+        .into_iter()
         .map(|test| {
             let mut panels = Vec::new();
             for index in 0..test.played[0].measured.len() {
@@ -70,7 +72,7 @@ pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
             Figure {
                 id: test.motion.name().to_owned(),
                 title: format!("{}: before and after", test.motion.name()),
-                caption: "After the learning move. Limit lines at ±1 mm; larger errors are drawn at the edge.".to_owned(),
+                caption: "After the learning move. Limit lines at ±1 mm; larger errors lie beyond the edge.".to_owned(),
                 panels,
             }
         })
@@ -152,15 +154,12 @@ struct Page<'a> {
     sheet_on_s: f64,
     sheet_off_s: f64,
     found: Option<Delays>,
-    /// Settling time of the large step \[s\].
-    before_s: Option<f64>,
-    after_s: Option<f64>,
+    /// What is worse than before.
+    worse: Vec<String>,
     tests: Vec<Shown>,
     parameters: Vec<Described<'a>>,
     toml: &'a str,
     figures: Vec<Picture<'a>>,
-    /// Which of them comes first.
-    main: &'static str,
 }
 
 #[derive(Serialize)]
@@ -209,6 +208,37 @@ fn lines(test: &Test) -> Vec<Line> {
     list
 }
 
+/// The page's first sentence: the large step before and after, or why the parameters are refused.
+fn verdict(tuned: &Tuned, large: Option<&Test>) -> String {
+    if let Some(first) = tuned.worse.first() {
+        return format!(
+            "Refused: {} worse than before tuning. {}.",
+            match tuned.worse.len() {
+                1 => "1 figure is".to_owned(),
+                n => format!("{n} figures are"),
+            },
+            first.message()
+        );
+    }
+    let Some(test) = large else {
+        return "The large step was not played.".to_owned();
+    };
+    let told = |f: &Figures| {
+        let settled = f.settle_s.map_or_else(
+            || "never settles".to_owned(),
+            |s| format!("settles in {} s", fixed(s, 3)),
+        );
+        let overshoot = f.overshoot_mm;
+        let overshoot = overshoot.map(|mm| format!(" with {} mm of overshoot", fixed(mm, 2)));
+        settled + &overshoot.unwrap_or_default()
+    };
+    format!(
+        "Tuned, the large step {}; with the board's defaults it {}.",
+        told(&test.after),
+        told(&test.before)
+    )
+}
+
 pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<String, StudyError> {
     let tests = tuned.tests.iter().map(|t| Shown {
         name: t.motion.name(),
@@ -220,28 +250,11 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
     });
     let valve = &tuned.config.axis.cylinder.fill_valve;
     let large = tuned.tests.iter().find(|t| t.motion == Move::Step100);
-    let settle = |f: fn(&Test) -> Option<f64>| large.and_then(f);
-    let (before_s, after_s) = (settle(|t| t.before.settle_s), settle(|t| t.after.settle_s));
     let values = Page {
         stopped: tuned.stopped.as_ref().map(ToString::to_string),
         version: env!("CARGO_PKG_VERSION"),
-        verdict: match (before_s, after_s) {
-            _ if !tuned.worse.is_empty() => {
-                let first: Vec<String> = tuned.worse.iter().take(3).map(Worse::message).collect();
-                format!(
-                    "Refused: {} figures are worse than before tuning. {}.",
-                    tuned.worse.len(),
-                    first.join("; ")
-                )
-            }
-            (Some(before), Some(after)) => format!(
-                "Tuned, the large step settles in {after:.3} s, with the board's defaults in {before:.3} s."
-            ),
-            (None, Some(after)) => format!(
-                "Tuned, the large step settles in {after:.3} s; with the board's defaults it never does."
-            ),
-            (_, None) => "Tuned, the large step does not settle.".to_owned(),
-        },
+        verdict: verdict(tuned, large),
+        worse: tuned.worse.iter().map(Worse::message).collect(),
         name: &tuned.config.name,
         description: &tuned.config.description,
         seed: tuned.seed,
@@ -253,13 +266,10 @@ pub(super) fn render(tuned: &Tuned, figures: &[(Figure, String)]) -> Result<Stri
         sheet_on_s: valve.t_on_s,
         sheet_off_s: valve.t_off_s,
         found: tuned.delays,
-        before_s,
-        after_s,
         tests: tests.collect(),
         parameters: parameters.collect(),
         toml: &tuned.toml,
         figures: pictures(figures),
-        main: Move::Step100.name(),
     };
     Ok(page(TEMPLATE, values)?)
 }

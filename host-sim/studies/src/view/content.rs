@@ -20,7 +20,7 @@ const INSTANTS: usize = 3_000;
 const PERIOD_NS: u64 = 20_000_000;
 /// Most phases that are shown on the time line.
 const PHASES: usize = 400;
-/// Most events that are listed.
+/// Most events that are listed; of those that went wrong twice as many.
 const EVENTS: usize = 2_000;
 /// Most lines of what went into a run.
 const HEAD: usize = 2_000;
@@ -53,6 +53,16 @@ pub(super) struct LoggedEvent {
 }
 
 impl LoggedEvent {
+    /// Whether it is a fault, or the robot gives up.
+    pub(super) fn goes_wrong(&self) -> bool {
+        cause::goes_wrong(self.kind, self.code)
+    }
+
+    /// Its name, as logged; none of a later version.
+    pub(super) fn name(&self) -> &'static str {
+        self.code.map_or("", EventCode::name)
+    }
+
     fn fault(&self) -> FaultEvent {
         FaultEvent {
             t_ns: self.t_ns,
@@ -98,11 +108,11 @@ pub(super) struct Content {
     pub(super) more_events: u64,
     /// What went into the run, by kind.
     pub(super) head: Vec<(String, String)>,
-    /// Time of the first and the last sample, ns.
+    /// Time of the first and the last sample in the part that is looked at, ns.
     pub(super) first_ns: Option<u64>,
     pub(super) last_ns: u64,
-    /// End of the log, whatever part of it is looked at, ns.
-    pub(super) end_ns: u64,
+    /// The same of the whole log.
+    pub(super) whole_ns: Option<(u64, u64)>,
     pub(super) end: Read,
     /// Every stroke, for a comparison.
     pub(super) strokes: [Vec<(u64, f32)>; 6],
@@ -199,7 +209,7 @@ impl Content {
             head: Vec::new(),
             first_ns: None,
             last_ns: 0,
-            end_ns: 0,
+            whole_ns: None,
             end: Read {
                 messages: 0,
                 others: 0,
@@ -218,7 +228,10 @@ impl Content {
                 content.provenance(&logged);
                 return ControlFlow::Continue(());
             }
-            content.end_ns = content.end_ns.max(logged.t_ns);
+            if Some(logged.channel) != events {
+                let (first, last) = content.whole_ns.unwrap_or((logged.t_ns, logged.t_ns));
+                content.whole_ns = Some((first.min(logged.t_ns), last.max(logged.t_ns)));
+            }
             if !(span.from_ns..=span.to_ns).contains(&logged.t_ns) {
                 return ControlFlow::Continue(());
             }
@@ -317,7 +330,9 @@ impl Content {
         let mut now = now.take_while(|other| other.t_ns == event.t_ns);
         if let Some(same) = now.find(|other| event.is_alike(other)) {
             same.boards.extend(event.boards);
-        } else if self.events.len() < EVENTS {
+        } else if self.events.len() < EVENTS || event.goes_wrong() && self.events.len() < 2 * EVENTS
+        {
+            // What went wrong late in a long log is listed as well.
             self.events.push(event);
         } else {
             self.more_events += 1;
@@ -343,16 +358,14 @@ impl Content {
         found.map(|(_, text)| text.as_str())
     }
 
-    /// Faults.
+    /// What went wrong.
     pub(super) fn faults(&self) -> impl Iterator<Item = &LoggedEvent> {
-        self.events
-            .iter()
-            .filter(|event| cause::is_fault(event.kind, event.code))
+        self.events.iter().filter(|event| event.goes_wrong())
     }
 
-    /// The first cause of its faults, and how many there are.
-    pub(super) fn cause(&self) -> Option<(Cause, usize)> {
-        cause::first(self.faults().map(LoggedEvent::fault))
+    /// The causes of it.
+    pub(super) fn causes(&self) -> Vec<Cause> {
+        cause::causes(self.faults().map(LoggedEvent::fault))
     }
 
     /// The robot for the page's player.

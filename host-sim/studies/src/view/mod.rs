@@ -43,7 +43,7 @@ pub struct Options {
 }
 
 /// A page that was made.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Viewed {
     /// Where it is.
     pub page: PathBuf,
@@ -51,6 +51,8 @@ pub struct Viewed {
     pub verdict: String,
     /// Logs that break off.
     pub broken_off: Vec<PathBuf>,
+    /// Logs that end before the part that was asked for does, and when, s.
+    pub ended: Vec<(PathBuf, f64)>,
 }
 
 /// A log with its name.
@@ -58,6 +60,9 @@ struct Named {
     name: String,
     content: Content,
 }
+
+/// A log that lacks less of the part that was asked for has its last sample a little earlier, s.
+const SAMPLES_S: f64 = 0.05;
 
 /// Makes the page; `None` if it was stopped before: no page is written then.
 ///
@@ -88,16 +93,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
             return Ok(None);
         }
         if content.first_ns.is_none() {
-            return Err(StudyError::refused(
-                format!(
-                    "{}: nothing is in the part from {} s to {}; the log ends at {:.2} s",
-                    path.display(),
-                    options.from_s,
-                    end_of(options.to_s),
-                    content.end_ns as f64 * 1e-9
-                ),
-                "give --from and --to before its end, or leave them out",
-            ));
+            return Err(empty(path, &content));
         }
         let name = plain(&path.display().to_string());
         logs.push(Named { name, content });
@@ -126,26 +122,42 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
     progress.clear();
     let broken_off = options.logs.iter().zip(&logs);
     let broken_off = broken_off.filter(|(_, log)| !log.content.end.whole);
+    let ended = options.logs.iter().zip(&logs).filter_map(|(path, log)| {
+        let (_, last_ns) = log.content.whole_ns?;
+        let last_s = last_ns as f64 * 1e-9;
+        let is_short = options.to_s.is_finite() && last_s + SAMPLES_S < options.to_s;
+        is_short.then(|| (path.clone(), last_s))
+    });
     Ok(Some(Viewed {
         page,
         verdict: page::verdict(&logs, &differences),
         broken_off: broken_off.map(|(path, _)| path.clone()).collect(),
+        ended: ended.collect(),
     }))
 }
 
-/// The end of a part, in words.
-fn end_of(to_s: f64) -> String {
-    match to_s {
-        f64::INFINITY => "the end".to_owned(),
-        to_s => format!("{to_s} s"),
-    }
+/// A part without a sample, and which parts have some.
+fn empty(path: &Path, content: &Content) -> StudyError {
+    let path = path.display();
+    let Some((first, last)) = content.whole_ns else {
+        let help = "give the log of a run or of a recording";
+        return StudyError::refused(format!("{path}: it has no sample"), help);
+    };
+    let [first, last] = [first, last].map(|ns| ns as f64 * 1e-9);
+    StudyError::refused(
+        format!("{path}: no sample is in the part that was asked for"),
+        format!("give a part of {first:.2} s to {last:.2} s, or leave out --from and --to"),
+    )
 }
 
 /// The part that is looked at.
 fn span(options: &Options) -> Result<Span, StudyError> {
     let Options { from_s, to_s, .. } = *options;
     if !(from_s >= 0.0 && to_s > from_s) {
-        let to = end_of(to_s);
+        let to = match to_s {
+            f64::INFINITY => "the end".to_owned(),
+            to_s => format!("{to_s} s"),
+        };
         return Err(StudyError::refused(
             format!("from {from_s} s to {to} is not part of a log"),
             "give --from from 0 on, and --to after it",
@@ -187,6 +199,8 @@ fn beside(logs: &[PathBuf]) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_master::behaviour::Act;
+    use wheeleg_master::event::Event as MasterEvent;
     use wheeleg_protocol::{Address, Fault};
     use wheeleg_telemetry::event::BoardChange;
     use wheeleg_telemetry::{
@@ -196,14 +210,26 @@ mod tests {
     /// A log of one second, of a robot that its maker calls `robot`. At 0.6 s its joints measure another
     /// stroke, and board 3 may report a fault.
     fn log(path: &Path, robot: &str, stroke_mm: f64, fault: Option<Fault>) {
+        let board = Address::new(3).expect("a board");
+        match fault {
+            None => recorded(path, robot, stroke_mm, &|| {
+                Cause::Master(MasterEvent::Homed)
+            }),
+            Some(fault) => recorded(path, robot, stroke_mm, &|| {
+                let change = BoardChange::FaultLatched(fault);
+                Cause::Board { board, change }
+            }),
+        }
+    }
+
+    /// The same with any event at 0.6 s.
+    fn recorded(path: &Path, robot: &str, stroke_mm: f64, event: &dyn Fn() -> Cause) {
         let mut recorder = Recorder::create(path).expect("created");
         recorder.provenance("robot", robot);
         for ms in 0..1_000_u64 {
             let t_ns = ms * 1_000_000;
-            if let Some(fault) = fault.filter(|_| ms == 600) {
-                let board = Address::new(3).expect("a board");
-                let change = BoardChange::FaultLatched(fault);
-                recorder.event(t_ns, Cause::Board { board, change });
+            if ms == 600 {
+                recorder.event(t_ns, event());
             }
             for joint in 0..6 {
                 let sample = JointSample {
@@ -279,7 +305,58 @@ mod tests {
         let page = std::fs::read_to_string(&told.page).expect("written");
         assert!(page.contains("data-seek=\"0.600\""));
         let same = viewed(&options(&[&one, &one])).expect("a page");
-        assert!(same.verdict.contains("are equal"), "{}", same.verdict);
+        assert!(
+            same.verdict
+                .starts_with("The strokes of the two logs are equal"),
+            "{}",
+            same.verdict
+        );
+        // Another robot is no other run of the same.
+        let third = folder.path().join("third.mcap");
+        log(&third, "wheeleg", 90.0, None);
+        let unlike = viewed(&options(&[&one, &third])).expect("a page").verdict;
+        let begin = "The logs are of different robots (wheeleg-2003, wheeleg). The strokes";
+        assert!(unlike.starts_with(begin), "{unlike}");
+    }
+
+    /// A robot that gives up has no fault, but that is what its log is opened for.
+    #[test]
+    fn where_the_robot_gave_up_is_said_first_marked_and_found_by_its_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        let stuck = || Cause::Master(MasterEvent::Behaviour(Act::Stuck));
+        recorded(&path, "wheeleg", 90.0, &stuck);
+        let told = viewed(&options(&[&path])).expect("a page");
+        assert_eq!(told.verdict, "The robot got stuck and gave up at 0.60 s");
+        let page = std::fs::read_to_string(told.page).expect("written");
+        for part in [
+            "<p class=\"remedy\">Turn it, or lead it another way.</p>",
+            "\"marks\":[{\"t\":0.6",
+            "<td class=\"bad\">info</td>",
+            "<td class=\"k\">stuck</td>",
+            "data-seek=\"0.600\"",
+        ] {
+            assert!(page.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn a_part_beyond_the_end_of_a_log_is_told() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("log.mcap");
+        log(&path, "wheeleg-2003", 90.0, None);
+        for (to_s, ends) in [(f64::INFINITY, 0), (1.0, 0), (99.0, 1)] {
+            let options = Options {
+                to_s,
+                ..options(&[&path])
+            };
+            let ended = viewed(&options).expect("a page").ended;
+            assert_eq!(ended.len(), ends, "{to_s}: {ended:?}");
+            assert!(
+                ended.iter().all(|(_, s)| (s - 1.0).abs() < 0.01),
+                "{ended:?}"
+            );
+        }
     }
 
     /// A board that reports no reading leaves a gap, and a comparison names its fault.
@@ -304,7 +381,7 @@ mod tests {
         let told = viewed(&options(&[&sound, &broken]))
             .expect("a page")
             .verdict;
-        let fault = "Second log: Joint 3: the position sensor reads outside its range, at 0.60 s";
+        let fault = "Second log: Joint 3: the position sensor reads outside its range at 0.60 s";
         assert!(
             told.contains(fault) && told.contains("part at 0.60 s"),
             "{told}"
@@ -322,7 +399,7 @@ mod tests {
             ..options(&[&path])
         };
         for (options, word) in [
-            (part(5.0, 6.0), "from 5 s to 6 s; the log ends at 1.00 s"),
+            (part(5.0, 6.0), "no sample"),
             (part(2.0, 1.0), "not part"),
             (part(f64::NAN, 1.0), "not part"),
             (

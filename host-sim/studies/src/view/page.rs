@@ -13,7 +13,7 @@ use super::Named;
 use super::difference::Difference;
 use super::signals::{Curve, Group, Plot};
 use crate::StudyError;
-use crate::cause::sentence;
+use crate::cause::{LISTED, Wrong, first_sentence, listed};
 use crate::motion::Motion;
 
 const TIME: &str = "time of the log [s]";
@@ -41,7 +41,10 @@ pub(super) fn is_ours(page: &Path) -> bool {
 struct Line {
     t: f64,
     kind: &'static str,
+    /// Whether something went wrong.
     fault: bool,
+    /// As the log has it, which does not change.
+    name: &'static str,
     text: String,
     log: usize,
 }
@@ -60,7 +63,9 @@ struct About {
     others: u64,
     whole: bool,
     more_events: u64,
-    faults: usize,
+    wrong: Vec<Wrong>,
+    /// Causes beyond those listed.
+    more_wrong: usize,
 }
 
 #[derive(Serialize)]
@@ -127,7 +132,7 @@ fn panel(plot: &Plot, logs: &[Named]) -> Panel {
         let faults = log.content.faults().map(|event| event.t_ns as f64 * 1e-9);
         panel.marks.extend(faults.take(MARKS));
     }
-    panel.marked = "fault";
+    panel.marked = "gone wrong";
     panel.on_clock = true;
     panel
 }
@@ -150,6 +155,7 @@ fn about(log: &Named) -> About {
     let content = &log.content;
     let known = |kind| content.about(kind).unwrap_or("not said").to_owned();
     let (from, to) = content.range();
+    let causes = content.causes();
     About {
         name: log.name.clone(),
         robot: known("robot"),
@@ -162,16 +168,17 @@ fn about(log: &Named) -> About {
         others: content.end.others,
         whole: content.end.whole,
         more_events: content.more_events,
-        faults: content.faults().count(),
+        more_wrong: causes.len().saturating_sub(LISTED),
+        wrong: listed(&causes, |t_s| t_s),
     }
 }
 
-/// The faults of the two logs: which log has what first.
+/// What went wrong in the two logs: which has what first.
 fn faults(logs: &[Named]) -> String {
     let both = ["First", "Second"].into_iter().zip(logs);
     let told = both.filter_map(|(which, log)| {
-        let (cause, count) = log.content.cause()?;
-        Some(format!(". {which} log: {}", sentence(&cause, count)))
+        let told = first_sentence(&log.content.causes())?;
+        Some(format!(". {which} log: {told}"))
     });
     told.collect()
 }
@@ -182,8 +189,8 @@ pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
         .iter()
         .filter(|d| d.times > 0)
         .max_by(|a, b| a.largest_mm.total_cmp(&b.largest_mm));
-    match (logs, largest) {
-        ([_, _], None) => "The two logs have no time in common".to_owned(),
+    let told = match (logs, largest) {
+        ([_, _], None) => format!("The two logs have no time in common{}", faults(logs)),
         ([_, _], Some(d)) if d.largest_mm == 0.0 => {
             format!(
                 "The strokes of the two logs are equal up to {:.2} s, the last time that both have{}",
@@ -199,7 +206,40 @@ pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
             d.largest_s,
             faults(logs)
         ),
-        _ => single(&logs[0]),
+        _ => return single(&logs[0]),
+    };
+    format!("{}{told}{}", unlike(logs), longer(logs))
+}
+
+/// In what two logs cannot be alike.
+fn unlike(logs: &[Named]) -> String {
+    let [one, other] = logs else {
+        return String::new();
+    };
+    let about = |kind, what: &str| {
+        let [a, b] = [one, other].map(|log| log.content.about(kind).unwrap_or("not said"));
+        (a != b).then(|| format!("different {what} ({a}, {b})"))
+    };
+    match (about("robot", "robots"), about("scenario", "scenarios")) {
+        (None, None) => String::new(),
+        (Some(a), Some(b)) => format!("The logs are of {a} and {b}. "),
+        (Some(one), None) | (None, Some(one)) => format!("The logs are of {one}. "),
+    }
+}
+
+/// Shorter logs than others by less than this differ in their last samples alone, s.
+const AS_LONG_S: f64 = 0.05;
+
+/// What one of two logs has beyond the end of the other.
+fn longer(logs: &[Named]) -> String {
+    let [one, other] = logs else {
+        return String::new();
+    };
+    let [(_, one_s), (_, other_s)] = [one, other].map(|log| log.content.range());
+    let which = if one_s > other_s { "first" } else { "second" };
+    match (one_s - other_s).abs() {
+        more_s if more_s < AS_LONG_S => String::new(),
+        more_s => format!(". The {which} log goes on for {more_s:.2} s more"),
     }
 }
 
@@ -224,10 +264,7 @@ fn single(log: &Named) -> String {
         name("robot"),
         name("scenario")
     );
-    content.cause().map_or_else(
-        || format!("{what}: no fault"),
-        |(cause, count)| sentence(&cause, count),
-    )
+    first_sentence(&content.causes()).unwrap_or_else(|| format!("{what}: no fault"))
 }
 
 /// Makes the page.
@@ -239,8 +276,9 @@ pub(super) fn make(
     drawn_as: Option<&str>,
 ) -> Result<String, StudyError> {
     let verdict = verdict(logs, differences);
-    let cause = logs[0].content.cause().filter(|_| logs.len() == 1);
-    let remedy = cause.and_then(|(cause, _)| cause.remedy);
+    let causes = logs[0].content.causes();
+    let first = causes.first().filter(|_| logs.len() == 1);
+    let remedy = first.and_then(|cause| cause.remedy);
     let figures: Vec<(Figure, String)> = groups
         .iter()
         .map(|group| (figure(group, logs), String::new()))
@@ -250,7 +288,8 @@ pub(super) fn make(
         events.extend(log.content.events.iter().map(|event| Line {
             t: event.t_ns as f64 * 1e-9,
             kind: event.kind.map_or("", EventKind::name),
-            fault: event.kind == Some(EventKind::Fault),
+            fault: event.goes_wrong(),
+            name: event.name(),
             text: event.text(),
             log: i + 1,
         }));

@@ -172,7 +172,7 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
 
 /// The tables of the axes, false alarms, and where the report is.
 fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
-    let mut out = String::new();
+    let mut out = format!("{}\n", comparison.verdict());
     for axis in &comparison.axes {
         out.push_str(&axis_table(comparison, &axis.config.name));
         if let Some(advice) = ValveResolution::of(&axis.config.axis).advice() {

@@ -57,7 +57,8 @@ fn text(results: &Results) -> String {
     }
     let _ = writeln!(
         out,
-        "misprints  {} lines in csv/printed-versus-corrected.csv",
+        "misprints  {} equations, in {} lines of csv/printed-versus-corrected.csv",
+        results.equations(),
         results.misprints.len()
     );
     let map = &results.precision;

@@ -217,19 +217,17 @@ fn messages_text(messages: &[String]) -> String {
 fn run_text(finished: &Finished<Run>) -> String {
     let s = &finished.result.summary;
     let mut out = String::new();
-    if let Some((cause, remedy)) = &finished.result.cause {
-        let _ = writeln!(out, "{cause}.");
-        if let Some(remedy) = remedy {
-            let _ = writeln!(out, "{remedy}");
-        }
-        out.push('\n');
+    for (i, line) in s.cause.iter().enumerate() {
+        let word = if i == 0 { "cause" } else { "" };
+        let _ = writeln!(out, "{word:<8}{line}");
     }
     // A part of a run meets or misses nothing.
     if s.complete && !s.targets.is_empty() {
-        out.push_str(&target_table(&s.targets));
         let required = s.targets.iter().filter(|t| t.required);
         let met = required.clone().filter(|t| t.pass).count();
-        let _ = writeln!(out, "\n{met} of {} required targets met", required.count());
+        let _ = writeln!(out, "{met} of {} required targets met\n", required.count());
+        out.push_str(&target_table(&s.targets));
+        out.push('\n');
     }
     if !s.complete {
         let _ = writeln!(
@@ -274,8 +272,11 @@ const FAULTS_SHOWN: usize = 20;
 /// thousands of bars.
 const TARGETS_SHOWN: usize = 60;
 
-/// The table of the first targets, and of how many more there are, and are missed among them.
+/// The table of the first targets, and of how many more there are, and are missed among them. What was
+/// missed comes first.
 fn target_table(targets: &[Target]) -> String {
+    let mut targets: Vec<&Target> = targets.iter().collect();
+    targets.sort_by_key(|target| target.judgement() != Judgement::Missed);
     let (shown, more) = targets.split_at(targets.len().min(TARGETS_SHOWN));
     let mut out = table_of(shown);
     if !more.is_empty() {
@@ -289,7 +290,7 @@ fn target_table(targets: &[Target]) -> String {
     out
 }
 
-fn table_of(targets: &[Target]) -> String {
+fn table_of(targets: &[&Target]) -> String {
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let cells: Vec<[String; 5]> = targets
         .iter()
@@ -298,7 +299,7 @@ fn table_of(targets: &[Target]) -> String {
                 t.judgement().word().to_owned(),
                 t.id.clone(),
                 t.value_text(),
-                t.unit.to_owned(),
+                t.unit_text().to_owned(),
                 t.band_text(),
             ]
         })

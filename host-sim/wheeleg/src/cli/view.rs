@@ -1,6 +1,6 @@
 //! `wheeleg view`: a log, or two, as one page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -52,18 +52,38 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "allowed are seconds with a decimal point, such as 0.1".to_owned())
 }
 
+/// The log of what is given, which may be a folder.
+fn log_in(given: &Path) -> Result<PathBuf, StudyError> {
+    let log = log_of(given);
+    if given.is_dir() && !log.exists() {
+        return Err(StudyError::refused(
+            format!(
+                "there is no log.mcap in `{}`",
+                plain(&given.display().to_string())
+            ),
+            "give a log, or the folder of a run or of a recording",
+        ));
+    }
+    Ok(log)
+}
+
 /// Makes the page and says where it is.
 pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
-    if args.logs.len() > 2 {
+    let logs = args.logs.iter().map(|log| log_in(log));
+    let logs = logs.collect::<Result<Vec<PathBuf>, _>>()?;
+    if logs.len() > 2 {
         return Err(StudyError::refused(
-            format!("{} logs are too many for one page", args.logs.len()),
-            "give one log, or two to compare",
+            format!(
+                "{} logs are given, and at most two can be compared",
+                logs.len()
+            ),
+            "give one log, or two",
         ));
     }
     let stop = stop_on_signals()?;
     let progress = Progress::new("view", stop.clone());
     let options = Options {
-        logs: args.logs.iter().map(|log| log_of(log)).collect(),
+        logs,
         robot: args.robot.clone(),
         from_s: args.from,
         to_s: args.to.unwrap_or(f64::INFINITY),
@@ -77,6 +97,12 @@ pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
             for log in &viewed.broken_off {
                 tell(&format!(
                     "{} is truncated: the part up to there is shown",
+                    plain(&log.display().to_string())
+                ));
+            }
+            for (log, end_s) in &viewed.ended {
+                tell(&format!(
+                    "{} ends at {end_s:.2} s, before the end of the part that was asked for: what there is is shown",
                     plain(&log.display().to_string())
                 ));
             }

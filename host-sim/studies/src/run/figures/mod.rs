@@ -254,8 +254,10 @@ fn strokes(s: &Source<'_>) -> Figure {
     let panels = [0, 3].map(|first| {
         let series: Vec<Series> = (first..first + 3)
             .flat_map(|j| {
+                // Grey: blue is a joint.
+                let label = if j == first { "commands" } else { "" };
                 [
-                    line("", colour::COMMAND, 1, s.joint(j, |v| v.commanded_mm)),
+                    line(label, colour::RAW, 1, s.joint(j, |v| v.commanded_mm)),
                     line(
                         JOINTS[j],
                         colour::AXES[j % 3],
