@@ -328,7 +328,7 @@ fn robot_json(live: &Live) -> String {
         "drawing": Drawing::of(&live.robot),
         "relief": uneven.then(|| Relief::of(&ground.terrain)),
         "simulated": !is_real,
-        "full_bar": (!is_real).then(|| live.robot.plant.supply.switch.on_pa * 1e-5),
+        "full_bar": (!is_real).then_some(live.robot.plant.supply.switch.on_pa * 1e-5),
         "unmeasured": unmeasured(is_real),
     })
     .to_string()
