@@ -35,7 +35,10 @@ fn texts_of_a_file_do_not_act_on_a_terminal() {
         .replace('\u{7}', "\\u0007");
     for (text, shown) in [
         // The name of a field, and a line that is no TOML.
-        (format!("\"field{quoted}\" = 1\n"), "unknown field `field"),
+        (
+            format!("\"field{quoted}\" = 1\n"),
+            "has the control character U+001B",
+        ),
         (format!("name = \"line{ACTS}\n"), "line"),
     ] {
         std::fs::write(&path, text).expect("written");

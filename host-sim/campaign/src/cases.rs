@@ -1,7 +1,7 @@
 //! Any case of a plan from its index.
 
 use wheeleg_config::plan::{Plan, Resolved, Resolver, Value};
-use wheeleg_config::{ConfigError, RobotConfig, Scenario};
+use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
 
@@ -9,24 +9,11 @@ use crate::CampaignError;
 use crate::columns::Columns;
 use crate::draw::Draws;
 use crate::identity::{CaseId, identity};
-use crate::simulate::why;
+use crate::place::Place;
+use crate::reasons::{problems, why};
 
 /// Cells that are looked at before the first case.
 const CELLS: u64 = 1000;
-
-/// Where a case stands in its plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    /// Index of the case. Replicates count first, then cells, then samples: more samples leave
-    /// the cases before them where they are.
-    pub index: u64,
-    /// Cell of the grid.
-    pub cell: u64,
-    /// Sample.
-    pub sample: u64,
-    /// Replicate.
-    pub replicate: u64,
-}
 
 /// A case.
 #[derive(Debug, Clone)]
@@ -143,12 +130,6 @@ impl<'a> Cases<'a> {
             setup,
         }
     }
-}
-
-/// All that is wrong with a file, on one line.
-pub(crate) fn problems(error: &ConfigError) -> String {
-    let problems = error.problems().iter().map(ToString::to_string);
-    problems.collect::<Vec<_>>().join("; ")
 }
 
 /// What the simulator, too, asks of the faults.

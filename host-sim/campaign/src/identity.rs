@@ -12,7 +12,7 @@ use std::str::FromStr;
 use serde_json::{Value as Json, json};
 use wheeleg_config::plan::{Plan, Resolved, Sets, Value};
 
-use crate::cases::Place;
+use crate::place::Place;
 
 /// Version of what is hashed.
 const FORMAT: u32 = 1;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use wheeleg_scene::Scene;
-use wheeleg_sim::{Boards, SimError};
+use wheeleg_sim::Boards;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::run::{self, Simulated};
@@ -12,7 +12,8 @@ use wheeleg_studies::study::Stop;
 use wheeleg_telemetry::{Keep, LogFile, Recorder};
 
 use crate::CampaignError;
-use crate::cases::{Case, problems};
+use crate::cases::Case;
+use crate::reasons::why;
 use crate::row::Status;
 
 /// What came of a case.
@@ -79,14 +80,6 @@ pub(crate) fn log(
     let result = made();
     let _ = std::fs::remove_file(&temporary);
     result
-}
-
-/// What a row says of an error: of a file what is wrong in it.
-pub(crate) fn why(error: &SimError) -> String {
-    match error {
-        SimError::Config(error) => problems(error),
-        other => other.to_string(),
-    }
 }
 
 fn recorded(

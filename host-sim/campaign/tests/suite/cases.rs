@@ -323,7 +323,10 @@ fn a_ground_on_which_the_robot_does_not_stand_is_named_in_its_row() {
     let plan = plan_of(&text);
     let cases = Cases::new(&plan).expect("a plan");
     let outcome = wheeleg_campaign::simulate(&cases.case(1), None, &Stop::default());
-    let error = outcome.expect("not stopped").error.expect("it does not stand");
+    let error = outcome
+        .expect("not stopped")
+        .error
+        .expect("it does not stand");
     for word in ["terrain[0]", "does not stand"] {
         assert!(error.contains(word), "{error}");
     }

@@ -168,10 +168,13 @@ impl Plan {
     /// a list.
     #[must_use]
     pub fn draws_from_lists_alone(&self) -> bool {
-        let drawn = self.factors.iter().filter_map(|factor| match &factor.values {
-            Values::Drawn(distribution) => Some(distribution),
-            Values::Grid(_) => None,
-        });
+        let drawn = self
+            .factors
+            .iter()
+            .filter_map(|factor| match &factor.values {
+                Values::Drawn(distribution) => Some(distribution),
+                Values::Grid(_) => None,
+            });
         let mut from_list = drawn.map(|drawn| matches!(drawn, Distribution::Choice(_)));
         from_list.next() == Some(true) && from_list.all(|from_list| from_list)
     }

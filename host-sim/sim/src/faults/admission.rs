@@ -454,7 +454,8 @@ mod tests {
             \"pot-open:joint3@0.4s\",\n]\n[motion]\nkind = \"stand\"\n";
         let mut scenario = Scenario::parse("my.toml", TEXT).expect("sound");
         let robot = builtin::robot("wheeleg").expect("built in");
-        let refused = |scenario: &Scenario| check(scenario, &robot, &Nodes::default()).expect_err("rivals");
+        let refused =
+            |scenario: &Scenario| check(scenario, &robot, &Nodes::default()).expect_err("rivals");
         let SimError::Config(refusal) = refused(&scenario) else {
             panic!("an error of the file");
         };
