@@ -463,7 +463,7 @@ mod tests {
         assert!(said.starts_with("my.toml:9: `faults[1]`: "), "{said}");
         assert!(said.contains("overlap on the potentiometer"), "{said}");
         scenario.faults[1] = "pot-open:joint2@0.2s".parse().expect("a fault");
-        scenario.faults.push(scenario.faults[0].clone());
+        scenario.faults.push(scenario.faults[0]);
         let added = refused(&scenario);
         assert!(matches!(added, SimError::Simulation { .. }), "{added:?}");
     }
