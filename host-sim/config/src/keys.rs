@@ -33,7 +33,7 @@ pub const TOP: [Key; 12] = [
         "text",
         "part of the output folder; 1 to 64 of `A-Z a-z 0-9 . _ -`",
     ),
-    key("description", "text", "one line"),
+    key("description", "text", "any"),
     key(
         "robot",
         "text",

@@ -5,10 +5,12 @@
 //! forces up to twice its break-away force apart. A step beyond that cannot bring a piston
 //! to where it rests but by luck, whatever the law.
 
+use fixed::types::I8F24;
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;
+use wheeleg_protocol::JointParam;
 
 use super::design::axis_data;
 
@@ -34,6 +36,15 @@ pub struct ValveResolution {
     /// Conductance of valve and line with which the ratio would be [`COARSE`] \[dm³/(s bar)\]; null
     /// where friction holds nothing.
     pub conductance_for_half_dm3_s_bar: Option<f64>,
+}
+
+/// A force in whole newtons, a small one in tenths.
+fn tenths(force_n: f64) -> String {
+    if force_n < 10.0 {
+        format!("{force_n:.1}")
+    } else {
+        format!("{force_n:.0}")
+    }
 }
 
 impl ValveResolution {
@@ -83,14 +94,22 @@ rests where its forces balance, and swings about it"
         (ratio > COARSE).then(|| {
             // Rounded down: what is printed must be enough.
             let throttled = (conductance * 1e3).floor() * 1e-3;
+            let least = I8F24::from_bits(JointParam::Conductance.info().min).to_num::<f64>();
+            let throttle = match throttled < least {
+                true => format!(
+                    "Throttled to the {least:.3} dm3/(s bar) that a board takes at least, they still are: take"
+                ),
+                false => format!(
+                    "Throttle valve and line together to {throttled:.3} dm3/(s bar), take"
+                ),
+            };
             format!(
-                "coarse valves: their shortest opening ({:.1} ms) changes the force by {:.0} N, and friction \
-holds no more than {:.0} N: rest beside the target, swinging or fault 34 (following_error) may be met \
-under a load. Throttle valve and line to {:.3} dm3/(s bar), take valves that shut faster, or give the chambers more volume",
+                "coarse valves: their shortest opening ({:.1} ms) changes the force by {} N, and friction \
+holds no more than {} N: rest beside the target, swinging or fault 34 (following_error) may be met \
+under a load. {throttle} valves that shut faster, or give the chambers more volume",
                 self.shortest_opening_ms,
-                self.force_step_n,
-                self.friction_holds_n,
-                throttled
+                tenths(self.force_step_n),
+                tenths(self.friction_holds_n),
             )
         })
     }
@@ -100,6 +119,21 @@ under a load. Throttle valve and line to {:.3} dm3/(s bar), take valves that shu
 mod tests {
     use super::*;
     use wheeleg_config::AxisConfig;
+
+    /// What a board cannot be told is no advice.
+    #[test]
+    fn no_axis_is_throttled_below_what_a_board_takes() {
+        let mut axis = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        axis.cylinder.friction.static_n = 0.1;
+        axis.cylinder.friction.coulomb_n = 0.1;
+        let text = ValveResolution::of(&axis).advice().expect("advice");
+        for words in [
+            "no more than 0.2 N",
+            "the 0.005 dm3/(s bar) that a board takes",
+        ] {
+            assert!(text.contains(words), "{text}");
+        }
+    }
 
     #[test]
     fn axes_of_this_project_are_not_coarse_and_a_wide_valve_is() {
