@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;
-use wheeleg_protocol::JointParam;
+use wheeleg_protocol::param::JointParam;
 
 use super::design::axis_data;
 
