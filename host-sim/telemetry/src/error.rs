@@ -41,7 +41,7 @@ pub enum LogError {
     #[diagnostic(
         code(wheeleg::log),
         help(
-            "the disk may be full; `wheeleg log recover` restores a complete log from what was written"
+            "the disk may be full; what was written of the log is recovered by `wheeleg log recover`"
         )
     )]
     Log {

@@ -38,7 +38,7 @@ impl Filling {
         }
         let name = place.file_name().unwrap_or_default().to_string_lossy();
         let beside = place.with_file_name(format!(".{name}.{}.part", std::process::id()));
-        let failed = |e| StudyError::output("create the folder", &beside, e);
+        let failed = |e| StudyError::output("create the folder", place, e);
         fs::create_dir_all(&beside).map_err(failed)?;
         Ok(Self {
             beside,
@@ -50,6 +50,11 @@ impl Filling {
     /// Where a file of it is written.
     pub(super) fn path(&self, name: &str) -> PathBuf {
         self.beside.join(name)
+    }
+
+    /// Where that file is in the end, as the user knows it.
+    pub(super) fn shown(&self, name: &str) -> PathBuf {
+        self.place.join(name)
     }
 
     /// Puts the folder in its place.

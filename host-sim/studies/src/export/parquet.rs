@@ -202,8 +202,10 @@ fn columns(def: &ChannelDef) -> String {
 impl Table {
     fn create(filling: &Filling, def: &ChannelDef) -> Result<Self, StudyError> {
         let name = def.topic.trim_start_matches('/').replace('/', "-");
-        let path = filling.path(&format!("{name}.parquet"));
-        let file = File::create(&path).map_err(|e| StudyError::output("create", &path, e))?;
+        let name = format!("{name}.parquet");
+        let path = filling.shown(&name);
+        let file = File::create(filling.path(&name))
+            .map_err(|e| StudyError::output("create", &path, e))?;
         let facts = [
             ("wheeleg.channel", def.topic.to_owned()),
             ("wheeleg.meaning", def.doc.to_owned()),
@@ -280,7 +282,11 @@ fn write_group(
 }
 
 fn unwritten(path: &Path, error: &ParquetError) -> StudyError {
-    StudyError::output("write", path, std::io::Error::other(error.to_string()))
+    let reason = match error {
+        ParquetError::External(reason) => reason.to_string(),
+        other => other.to_string(),
+    };
+    StudyError::output("write", path, std::io::Error::other(reason))
 }
 
 #[cfg(test)]
@@ -289,6 +295,17 @@ mod tests {
     use parquet::file::reader::{FileReader as _, SerializedFileReader};
     use parquet::record::RowAccessor as _;
     use wheeleg_telemetry::{BodySample, FootSample, Recorder};
+
+    #[test]
+    fn a_disk_that_is_full_is_told_in_its_own_words() {
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        let reason = full.to_string();
+        let told = unwritten(Path::new("tables/body.parquet"), &ParquetError::from(full));
+        assert_eq!(
+            told.to_string(),
+            format!("cannot write `tables/body.parquet`: {reason}")
+        );
+    }
 
     #[test]
     fn a_file_per_channel_with_every_row_and_its_units() {
