@@ -118,7 +118,7 @@ fn chunk(records: &[u8]) -> Vec<u8> {
     record(6, &[head.concat(), packed].concat())
 }
 
-/// A small file, and more than a gigabyte of names once it is read.
+/// A small file, and more than a gigabyte of names once it is read: what stands before them is shown.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_log_that_swells_when_it_is_read_costs_little_memory() {
@@ -126,13 +126,13 @@ fn a_log_that_swells_when_it_is_read_costs_little_memory() {
     let path = folder.path().join("log.mcap");
     let mut log = b"\x89MCAP0\r\n".to_vec();
     log.extend(record(1, &[text(""), text("a stranger")].concat()));
+    let body = [&1_u16.to_le_bytes()[..], &[0; 20], br#"{"x_mm":5}"#].concat();
+    log.extend(chunk(&[channel(1, "/body"), record(5, &body)].concat()));
     let long = "y".repeat(1_000_000);
     for n in 0..30 {
         let names = (0..40).flat_map(|k| channel(100 + 40 * n + k, &long));
         log.extend(chunk(&names.collect::<Vec<u8>>()));
     }
-    let body = [&1_u16.to_le_bytes()[..], &[0; 20], br#"{"x_mm":5}"#].concat();
-    log.extend(chunk(&[channel(1, "/body"), record(5, &body)].concat()));
     fs::write(&path, &log).expect("written");
     assert!(log.len() < 1_000_000, "{} bytes", log.len());
     let (output, page) = view(&path);

@@ -48,8 +48,8 @@ mod safe_states;
 mod schema;
 mod service;
 mod session;
-#[cfg(unix)]
 mod start_up;
+#[cfg(unix)]
 mod stop;
 #[cfg(unix)]
 mod terminal;

@@ -39,6 +39,7 @@ fn texts_of_a_file_do_not_act_on_a_terminal() {
             format!("\"field{quoted}\" = 1\n"),
             "has the control character U+001B",
         ),
+        ("\"field\u{202e}\" = 1\n".to_owned(), "unknown field `field"),
         (format!("name = \"line{ACTS}\n"), "line"),
     ] {
         std::fs::write(&path, text).expect("written");

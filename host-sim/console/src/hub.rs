@@ -202,7 +202,7 @@ pub(crate) struct Hub {
 pub(crate) struct Stops {
     /// Number of the last one that the master has taken.
     taken: u64,
-    /// It goes out: the bit is in SYNC, which boards answer, or the clock stands.
+    /// It goes out: the next SYNC has its bit, and a board answered the last one; or the clock stands.
     sent: bool,
     /// Master time, µs.
     now_us: u64,
@@ -451,7 +451,7 @@ impl Hub {
             inner.take_status(status);
             self.stops.send_replace(Stops {
                 taken: status.stops,
-                // Of a SYNC that no board answers nobody knows whether it was heard.
+                // Where no board answers nobody knows whether it is heard.
                 sent: (status.emergency_stop && status.hears()) || status.pace.paused,
                 now_us: status.now_us,
             });

@@ -10,16 +10,16 @@ const GO_ON = "press Clear fault and Ready";
 /** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
 const HOLDS = {
   operator_lost: ["Operator lost: the robot holds.", "Press Take control, Clear fault and Ready."],
-  supply_lost: ["Supply pressure lost", `Check compressor, hose and regulator; with the air back ${GO_ON}.`],
+  supply_lost: ["Supply pressure lost", `Check compressor, hose and regulator; once the air is back, ${GO_ON}.`],
   board_lost: ["A board does not answer: the robot holds.", `Check its cable and its power, then ${GO_ON}.`],
   board_disarmed: ["A board has restarted: the robot holds.", `Check its power, then ${GO_ON}.`],
-  layer_one_stalled: ["The gait gave nothing for 0.1 s: the robot holds.", `To go on ${GO_ON}.`],
-  layer_one_gone: ["The gait has stopped by itself: the robot holds.", `To go on ${GO_ON}.`],
+  layer_one_stalled: ["The gait sent nothing for 0.1 s: a walk is brought to a stand, all else holds.", `To go on, ${GO_ON}.`],
+  layer_one_gone: ["The gait does not come back: the robot holds.", `To go on, ${GO_ON}.`],
 };
 const LOST = "You saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
 /** Who loses control again so soon has a computer that is too slow for it. */
 const TOO_SLOW = "Close other programs, or drive from another computer.";
-const WATCHING = "With the view key you can only watch, and stop.";
+const WATCHING = "With the view key you can only watch and stop.";
 /** A pause of the page, or of the line, that is shorter does not lose an operator, ms. */
 const PAUSE_MS = 250;
 /** What was longer ago is not why an operator is lost now, ms. */
@@ -114,7 +114,7 @@ export function faultsView(ours) {
     const { stopped } = state;
     const by = stopped && stopper(stopped, here.session);
     const title = stopped ? `Stopped by ${by}, at ${fixed(stopped.at_us * 1e-6)} s.` : "Stopped.";
-    const next = here.looks ? WATCHING : `${by && by !== "you" ? "Make sure that nobody needs the robot to stand still, then press" : "To go on press"} Clear fault, then Ready, which waits for the air.`;
+    const next = here.looks ? WATCHING : `${by && by !== "you" ? "Make sure that nobody needs the robot to stay stopped, then press" : "To go on, press"} Clear fault, then Ready, which waits for the air.`;
     return card(title, next, [], `${boards.length > 0 ? `${titled(boards)}: ` : ""}EmergencyStop, number ${E_STOP}`);
   }
   return {

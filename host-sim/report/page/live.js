@@ -269,6 +269,8 @@ function watchControl() {
     took_ms = null;
   }
   if (took_ms === null) gave = false;
+  // Somebody else drives: there is nothing to take again.
+  if (!mine() && now.state?.control && !now.state.control.ended) loss = null;
 }
 const boards = boardsView();
 /** @type {Scope | null} */

@@ -30,7 +30,7 @@ const WORDS = {
   moving: () => "the robot is moving: wait for the end of the motion, or press Hold, or in a walk Stop walking",
   not_moving: () => "the robot does not walk; Hold ends any other motion",
   latched: () => "a stop or a hold is latched: press Clear fault, and Ready once the reservoir is full",
-  no_air: (around) => `the reservoir does not fill${filled(around) && `: ${filled(around)}`}. Check compressor, hose and regulator, then press Ready again`,
+  no_air: (around) => `the reservoir is not full${filled(around) && `: ${filled(around)}`}. Press Ready, which waits for it; if it stays so, check compressor, hose and regulator`,
   interrupted: () => "a stop, a hold or another command came between: Faults and Events tell which",
 };
 

@@ -39,20 +39,26 @@ fn remedy(robot: &RobotConfig) -> String {
     )
 }
 
-/// What each joint is asked for before a run, with the fields that say so: one leg is drawn back, the
-/// other held.
-fn moves(robot: &RobotConfig) -> [String; 6] {
+/// What each joint is asked for before a run in which `leg` steps, with the fields that say so: that leg is
+/// drawn back, the other held.
+fn moves(robot: &RobotConfig, leg: LegChoice) -> [String; 6] {
     let gait = &robot.gait;
-    let asked = [
+    let drawn = [
         ("yaw", "`gait.yaw_s2`", gait.yaw_s2_m),
         ("horizontal", "0", 0.0),
         ("vertical", "`gait.stroke`", gait.stroke_m),
+    ];
+    let held = [
         ("yaw", "`gait.yaw_s2`", gait.yaw_s2_m),
         ("horizontal", "`gait.held_leg_s5`", gait.held_leg_s5_m),
         ("vertical", "`gait.held_leg_s6`", gait.held_leg_s6_m),
     ];
+    let legs = match leg {
+        LegChoice::Left => [drawn, held],
+        LegChoice::Right => [held, drawn],
+    };
     std::array::from_fn(|joint| {
-        let (start, field, to_m) = asked[joint];
+        let (start, field, to_m) = legs[joint / 3][joint % 3];
         let from_mm = robot.plant.initial_stroke_m[joint] * 1e3;
         format!(
             "joint {} goes from `start.{start}.stroke` = {from_mm:.1} mm to {field} = {:.1} mm, where \
@@ -127,7 +133,7 @@ impl Operator {
             next_event: 0,
             flood_refused: false,
             remedy: remedy(robot),
-            moves: moves(robot),
+            moves: moves(robot, scenario.motion.stepping_leg()),
             late_remedy: format!(
                 "`start_up.limit` = {:.2} s of the robot {} is over, of which its rest, `start_up.rest`, \
                  takes {:.2} s: allow more time",
@@ -196,7 +202,14 @@ impl Operator {
             Stage::Settling { until_ns } if now_ns >= until_ns && now_ns <= self.limit_ns => {
                 return Ok(true);
             }
-            _ if now_ns > self.limit_ns => return Err(self.not_ready(now_ns, &self.late_remedy)),
+            Stage::Homing | Stage::Settling { .. } if now_ns > self.limit_ns => {
+                return Err(self.not_ready(now_ns, &self.late_remedy));
+            }
+            // Of boards that are not found, or not armed, time may not be what they lack.
+            _ if now_ns > self.limit_ns => {
+                let help = format!("{}; or {}", self.late_remedy, self.remedy);
+                return Err(self.not_ready(now_ns, &help));
+            }
             _ => return Ok(false),
         };
         world
@@ -209,6 +222,10 @@ impl Operator {
 
     /// The remedy, with what the joint is asked for that reported last.
     fn remedy_of_pose(&self) -> String {
+        // A walk begins where the robot stands.
+        if matches!(self.motion, Motion::Walk(_)) {
+            return self.remedy.clone();
+        }
         let mut boards = self.start_up.iter().rev().map(|(_, cause)| cause.board());
         let joint = boards.find_map(|board| {
             let joint = board.filter(|board| board.is_joint())?;

@@ -110,7 +110,8 @@ pub(crate) fn refused(
         return SimError::simulation(error.to_string(), help);
     };
     let allowed = format!(
-        "allowed is ground without rock, edge or hole below wheels and soles, nose uphill up to {deg}°"
+        "allowed is ground without rock, edge or hole below wheels and soles, lower than the belly between them, nose \
+         uphill up to {deg}°"
     );
     let Some((section, parts)) = culprit(&scenario.ground, params) else {
         let help = format!("correct the scenario's [[terrain]]: {allowed}");
@@ -121,7 +122,7 @@ pub(crate) fn refused(
         return SimError::Config(Box::new(refusal));
     }
     let places = places(params).map_or(String::new(), |places| format!("; {places}"));
-    let why = format!("{error}; without this part of the ground it does");
+    let why = format!("{error}; without this part of the ground the robot stands");
     let refusal = scenario.refuse_ground(section, &why, &format!("{allowed}{places}"));
     SimError::Config(Box::new(refusal))
 }

@@ -99,7 +99,7 @@ fn hold(name: &str) -> Option<(&'static str, &'static str, Option<&'static str>)
             HoldReason::LayerOneStalled,
             "Layer 1 gave nothing for 100 ms",
             "a walk is brought to a stand by its behaviours",
-            None,
+            Some("Clear and arm."),
         ),
         (
             HoldReason::LayerOneGone,
@@ -113,7 +113,12 @@ fn hold(name: &str) -> Option<(&'static str, &'static str, Option<&'static str>)
             ALL_HOLD,
             Some("Reconnect, take the control, then clear and arm."),
         ),
-        (HoldReason::EmergencyStop, "Emergency stop", ALL_HOLD, None),
+        (
+            HoldReason::EmergencyStop,
+            "Emergency stop",
+            ALL_HOLD,
+            Some("Remove the cause, then clear and arm."),
+        ),
     ];
     let found = known.into_iter().find(|row| hold_name(&row.0) == name);
     found.map(|(_, headline, consequence, remedy)| (headline, consequence, remedy))
@@ -185,10 +190,14 @@ pub(crate) fn capital(text: &str) -> String {
 pub(crate) fn within(sentence: &str) -> String {
     let mut letters = sentence.chars();
     match (letters.next(), letters.next()) {
-        (Some(first), Some(second)) if !second.is_uppercase() && !second.is_numeric() => first
-            .to_lowercase()
-            .chain(sentence.chars().skip(1))
-            .collect(),
+        (Some(first), Some(second))
+            if !second.is_uppercase() && !second.is_numeric() && second != '-' =>
+        {
+            first
+                .to_lowercase()
+                .chain(sentence.chars().skip(1))
+                .collect()
+        }
         _ => sentence.to_owned(),
     }
 }

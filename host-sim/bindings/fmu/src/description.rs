@@ -40,7 +40,8 @@ pub fn write(model: &Model, fmi: Fmi) -> io::Result<Vec<u8>> {
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let name = format!("wheeleg {}", model.config.name);
     // XML has no way to write most control characters.
-    let description = plain(&model.config.description);
+    let lines = model.config.description.split_whitespace();
+    let description = plain(&lines.collect::<Vec<_>>().join(" "));
     let tool = format!("wheeleg {}", env!("CARGO_PKG_VERSION"));
     let (version, token) = match fmi {
         Fmi::Two => ("2.0", "guid"),
@@ -285,8 +286,7 @@ mod tests {
                 !xml.contains(['\u{202e}', '\u{1b}']) && !xml.contains("<b a="),
                 "{fmi:?}"
             );
-            let shown =
-                "&lt;/x&gt;&lt;b a=&apos;&quot;&amp;\u{fffd}\u{fffd}\u{fffd}\u{fffd}\u{fffd}end";
+            let shown = "&lt;/x&gt;&lt;b a=&apos;&quot;&amp;\u{fffd}\u{fffd}\u{fffd}\u{fffd} end";
             assert!(xml.contains(shown), "{fmi:?}");
         }
     }

@@ -123,7 +123,7 @@ pub const RELATIONS: &[Relation] = &[
     law("time to touch down", &["gait.touchdown_speed", "gait.lower", "gait.push", "gait.stroke"], "a foot would still be coming down slowly when the push begins", laws::touchdown),
     law("time to push", &["gait.period", "gait.push", "gait.stroke", "gait.push_speed", "gait.push_acceleration"], "the push does not end within its step", laws::push),
     // Motors and wheels.
-    law("current of a motor", &["motor.resistance", "motor.supply"], "a winding would carry more than its model means", laws::current),
+    law("current of a motor", &["motor.resistance", "motor.supply"], "a winding would carry more current than its model is valid for", laws::current),
     law("friction of a motor", &["motor.friction", "motor.supply", "motor.torque_constant", "motor.resistance"], "a motor would never turn", laws::stall),
     law("speed of the wheels", &["gait.push_speed", "motor.supply", "motor.torque_constant", "motor.reduction", "body.wheel_radius"], "the wheels would not roll as fast as the gait pushes", laws::rolling),
     // Bodies and what they touch.

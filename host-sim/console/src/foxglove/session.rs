@@ -19,7 +19,8 @@ use crate::session::{SILENCE, send_all};
 use wheeleg_access::rate::Bucket;
 
 /// What is said to a viewer that asks too much.
-const TOO_MUCH: &str = "too many messages: at most 100 per second, and 100 KiB";
+const TOO_MUCH: &str =
+    "too many messages: at most 100 per second, where each KiB counts as one more";
 
 /// What a viewer is offered.
 pub(crate) struct Viewing {

@@ -85,8 +85,15 @@ impl Inner {
     /// Somebody has asked for a stop: remembers the first.
     pub(super) fn stopped_by(&mut self, by: StopBy, number: u64) {
         let first = self.stopped.as_ref();
+        // While the clock stands, one that was taken is in no record yet.
+        let status = self.status.as_ref();
+        let waits = |first: &Stopped| {
+            status.is_some_and(|status| status.pace.paused && status.stops >= first.number)
+        };
         // One that was not taken in this time is none: the master was dead.
-        if first.is_some_and(|first| first.latched || first.asked.elapsed() <= TAKEN) {
+        if first
+            .is_some_and(|first| first.latched || waits(first) || first.asked.elapsed() <= TAKEN)
+        {
             return;
         }
         let by = match by {

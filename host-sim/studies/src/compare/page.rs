@@ -417,8 +417,11 @@ impl Standing {
 }
 
 /// The page's first sentence: which controller is best, on what grounds, and which never settle. None where
-/// nothing was played that says so.
+/// nothing was played that says so, or some have played less than others.
 fn best(comparison: &Comparison, judged: &[Judged]) -> Option<String> {
+    if comparison.stopped.is_some() {
+        return None;
+    }
     let kinds = comparison.options.kinds.iter();
     let all: Vec<Standing> = kinds
         .map(|kind| Standing::of(comparison, judged, *kind))
@@ -433,6 +436,7 @@ fn best(comparison: &Comparison, judged: &[Judged]) -> Option<String> {
     let others = all.iter().filter(|standing| standing.kind != best.kind);
     let missed = others.clone().map(|standing| standing.missed);
     let others = match (missed.clone().min(), missed.max()) {
+        (Some(least), Some(_)) if all.len() == 2 => format!(" (the other misses {least})"),
         (Some(least), Some(most)) if least == most => format!(" (the others miss {least})"),
         (Some(least), Some(most)) => format!(" (the others miss {least} to {most})"),
         _ => String::new(),

@@ -229,7 +229,7 @@ fn verdict(tuned: &Tuned, large: Option<&Test>) -> String {
             |s| format!("settles in {} s", fixed(s, 3)),
         );
         let overshoot = f.overshoot_mm;
-        let overshoot = overshoot.map(|mm| format!(" with {} mm of overshoot", fixed(mm, 2)));
+        let overshoot = overshoot.map(|mm| format!(", overshoot {} mm", fixed(mm, 2)));
         settled + &overshoot.unwrap_or_default()
     };
     format!(

@@ -132,7 +132,7 @@ fn panel(plot: &Plot, logs: &[Named]) -> Panel {
         let faults = log.content.faults().map(|event| event.t_ns as f64 * 1e-9);
         panel.marks.extend(faults.take(MARKS));
     }
-    panel.marked = "gone wrong";
+    panel.marked = "went wrong";
     panel.on_clock = true;
     panel
 }

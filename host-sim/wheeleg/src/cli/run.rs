@@ -283,7 +283,7 @@ fn target_table(targets: &[Target]) -> String {
         let missed = more.iter().filter(|t| t.required && !t.pass).count();
         let _ = writeln!(
             out,
-            "and {} more, {missed} required ones of them missed: in report and summary.json",
+            "and {} more, of which {missed} required ones are missed: see report.html and summary.json",
             more.len()
         );
     }
@@ -367,7 +367,7 @@ mod tests {
         assert_eq!(all, 1 + TARGETS_SHOWN, "{text}");
         let (some, text) = lines(2000);
         assert_eq!(some, 2 + TARGETS_SHOWN, "{text}");
-        let told = "and 1940 more, 20 required ones of them missed: in report and summary.json\n";
+        let told = "and 1940 more, of which 20 required ones are missed: see report.html and summary.json\n";
         assert!(text.ends_with(told), "{text}");
         // Of 80 the first 60 that were missed.
         let missed = text.lines().filter(|line| line.starts_with("FAIL"));

@@ -102,7 +102,7 @@ pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
             }
             for (log, end_s) in &viewed.ended {
                 tell(&format!(
-                    "{} ends at {end_s:.2} s, before the end of the part that was asked for: what there is is shown",
+                    "{} ends at {end_s:.2} s, before the end of the part that was asked for: only the part up to there is shown",
                     plain(&log.display().to_string())
                 ));
             }

@@ -216,9 +216,17 @@ pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<
             rate.met, rate.of
         )
     });
-    out += &listed(passed, "passed  and", "more cells: the page has them all");
+    out += &listed(
+        passed,
+        "passed  and",
+        "more cells: the page and --json have them all",
+    );
     let paired = findings.paired.iter().map(pair);
-    out += &listed(paired, "paired  and", "more: the page has them all");
+    out += &listed(
+        paired,
+        "paired  and",
+        "more: the page and --json have them all",
+    );
     for p in pairs.iter().map(|pairs| &pairs.paired) {
         out += &pair(p);
         out.push('\n');
@@ -298,7 +306,7 @@ mod tests {
             assert_eq!(lines(&text, "paired  ").0, told, "{text}");
             assert_eq!(
                 told == 21,
-                last == "passed  and 130 more cells: the page has them all"
+                last == "passed  and 130 more cells: the page and --json have them all"
             );
             let bad: Vec<_> = numbers()
                 .map(|part| (part.into(), "torn".to_owned()))
