@@ -154,7 +154,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
     }
     assert!(page.contains("pwm-pid") && page.contains("supply 4 bar"));
     // It says first which controller is best, and on what grounds; no word is of a number that it has not.
-    let verdict = "Best is predictive: it misses 0 of 2 random combinations (the others miss ";
+    let verdict = "Best is predictive: it misses 0 of 2 random combinations (the other misses ";
     assert!(page.contains(verdict), "{page:.4000}");
     assert!(!page.contains("1 axes") && !page.contains("≤ –"));
 }
