@@ -130,7 +130,7 @@ pub(crate) fn refused(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wheeleg_config::builtin;
+    use wheeleg_config::{Problem, builtin};
 
     /// Tip-back by statics is at 24.2 degrees with the legs drawn in (d = 90 mm, h = 200 mm).
     #[test]
@@ -154,6 +154,21 @@ mod tests {
         assert!(high < low, "{high} {low}");
     }
 
+    /// What is wrong with a scenario on whose ground the robot falls.
+    fn refused_on(text: &str) -> Problem {
+        let scenario = Scenario::parse("my.toml", text).expect("sound");
+        let mut plant = builtin::robot("wheeleg").expect("built in").plant;
+        plant.terrain = scenario.ground.terrain.clone();
+        let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
+        else {
+            panic!("an error of the scenario");
+        };
+        let [problem] = refusal.problems() else {
+            panic!("{:?}", refusal.problems());
+        };
+        problem.clone()
+    }
+
     /// Of several parts of the ground the one is named that is in the way, with its line.
     #[test]
     fn the_part_of_the_ground_that_is_in_the_way_is_named() {
@@ -164,17 +179,7 @@ mod tests {
             [[terrain]]\nkind = \"plane\"\n\
             [[terrain]]\nkind = \"block\"\nx = { value = [-0.1, 0.1], unit = \"m\" }\n\
             y = { value = [-1.0, 1.0], unit = \"m\" }\nheight = \"1 m\"\n";
-        let robot = builtin::robot("wheeleg").expect("built in");
-        let scenario = Scenario::parse("my.toml", TEXT).expect("sound");
-        let mut plant = robot.plant.clone();
-        plant.terrain = scenario.ground.terrain.clone();
-        let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
-        else {
-            panic!("an error of the scenario");
-        };
-        let [problem] = refusal.problems() else {
-            panic!("{:?}", refusal.problems());
-        };
+        let problem = refused_on(TEXT);
         let said = problem.summary();
         assert!(
             said.starts_with("my.toml:16: `terrain[2]` (kind = \"block\""),
@@ -188,7 +193,6 @@ mod tests {
     /// What slips is told of its friction, and of the slope that this friction holds.
     #[test]
     fn ground_that_is_too_smooth_is_named_by_its_material() {
-        let robot = builtin::robot("wheeleg").expect("built in");
         for (material, slope, allowed) in [
             ("\"ice\"", "9 deg", "a slope up to 5°"),
             (
@@ -202,16 +206,7 @@ mod tests {
                  targets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\nkind = \"plane\"\n\
                  slope = \"{slope}\"\nmaterial = {material}\n"
             );
-            let scenario = Scenario::parse("my.toml", &text).expect("sound");
-            let mut plant = robot.plant.clone();
-            plant.terrain = scenario.ground.terrain.clone();
-            let SimError::Config(refusal) = refused(&scenario, "robot.toml", &plant, &"it falls")
-            else {
-                panic!("an error of the scenario");
-            };
-            let [problem] = refusal.problems() else {
-                panic!("{:?}", refusal.problems());
-            };
+            let problem = refused_on(&text);
             let help = problem.help_text().expect("what is allowed");
             assert!(
                 problem.summary().contains("it slips"),
