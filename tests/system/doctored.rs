@@ -377,6 +377,17 @@ fn a_run_with_very_many_faults_lists_a_few() {
     assert_eq!(summary.matches("\"pot-noisy:joint").count(), 3_000);
 }
 
+/// A command whose standard output takes nothing says so, and what is to be done.
+#[cfg(target_os = "linux")]
+fn assert_tells_full_output(mut command: Command) {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full");
+    let command = command.stdout(full.expect("a device"));
+    let output = command.output().expect("start");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{command:?}: {said}");
+    assert!(said.contains("standard output"), "{command:?}: {said}");
+}
+
 /// What is read as it comes says that standard output is full, and is done without a word where
 /// nobody reads on.
 #[cfg(target_os = "linux")]
@@ -393,15 +404,9 @@ fn a_full_standard_output_is_told_by_every_list() {
         &["export", "layout"],
         &["commission"],
     ] {
-        let full = fs::OpenOptions::new().write(true).open("/dev/full");
-        let output = Command::new(program::path())
-            .args(arguments)
-            .stdout(full.expect("a device"))
-            .output()
-            .expect("start");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(said.contains("standard output"), "{arguments:?}: {said}");
+        let mut command = Command::new(program::path());
+        command.args(arguments);
+        assert_tells_full_output(command);
         let shell = format!(
             "\"$0\" {} | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}",
             arguments.join(" ")
@@ -436,24 +441,13 @@ fn a_full_standard_output_costs_no_study() {
         (&["plant", "check", "bench-vq110u"], false),
     ] {
         let out = place.path(arguments[0]);
-        let full = fs::OpenOptions::new().write(true).open("/dev/full");
         let mut command = Command::new(program::path());
         command.args(arguments).env("NO_COLOR", "1");
         if study {
             command.arg("--out").arg(&out);
         }
-        let output = command
-            .stdout(full.expect("a device"))
-            .output()
-            .expect("start");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(said.contains("standard output"), "{arguments:?}: {said}");
-        assert_eq!(
-            out.join("summary.json").exists(),
-            study,
-            "{arguments:?}: {said}"
-        );
+        assert_tells_full_output(command);
+        assert_eq!(out.join("summary.json").exists(), study, "{arguments:?}");
     }
 }
 

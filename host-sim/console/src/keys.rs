@@ -162,14 +162,14 @@ pub(crate) fn owners_alone(path: &Path, help: &str) -> Result<File, ConsoleError
     let file = open_file(path).map_err(cannot)?;
     match open_to_others(&file).map_err(cannot)? {
         None => Ok(file),
-        Some(mode) => Err(ConsoleError::Key {
-            path: path.to_owned(),
-            what: format!("others can read this key (mode {mode:o})"),
-            help: format!(
+        Some(mode) => Err(wrong(
+            path,
+            format!("others can read this key (mode {mode:o})"),
+            &format!(
                 "chmod 600 {}; if somebody may have read it, make new keys: wheeleg serve --new-key",
                 path.display()
             ),
-        }),
+        )),
     }
 }
 
@@ -191,14 +191,14 @@ fn make_folder(folder: &Path) -> Result<(), ConsoleError> {
         .map_err(|e| wrong(folder, format!("cannot be created: {e}"), MAKE))?;
     match open_to_writers(folder) {
         None => Ok(()),
-        Some(mode) => Err(ConsoleError::Key {
-            path: folder.to_owned(),
-            what: format!("others can write to this folder, and change its keys (mode {mode:o})"),
-            help: format!(
+        Some(mode) => Err(wrong(
+            folder,
+            format!("others can write to this folder, and change its keys (mode {mode:o})"),
+            &format!(
                 "chmod 700 {}; then make new keys: wheeleg serve --new-key",
                 folder.display()
             ),
-        }),
+        )),
     }
 }
 

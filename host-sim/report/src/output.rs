@@ -69,14 +69,15 @@ pub fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// The first of `previous`, `previous-2`, … that does not exist.
-fn free_place(folder: &Path) -> PathBuf {
+/// The first of `previous`, `previous-2`, … at whose `place` nothing is.
+#[must_use]
+pub fn free_place(place: impl Fn(&str) -> PathBuf) -> PathBuf {
     let numbered = (2_u32..).map(|n| format!("{PREVIOUS}-{n}"));
     std::iter::once(PREVIOUS.to_owned())
         .chain(numbered)
-        .map(|name| folder.join(name))
+        .map(|name| place(&name))
         .find(|place| !is_there(place))
-        .unwrap_or_else(|| folder.join(PREVIOUS))
+        .unwrap_or_else(|| place(PREVIOUS))
 }
 
 /// The folder of the results of a run that is under way. Nobody else gets it until this is
@@ -286,7 +287,7 @@ fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<Path
     if old.is_empty() {
         return Ok(None);
     }
-    let previous = free_place(folder);
+    let previous = free_place(|name| folder.join(name));
     std::fs::create_dir_all(&previous)
         .map_err(|e| ReportError::output("create the folder", &previous, e))?;
     for (moved, name) in old.iter().enumerate() {

@@ -4,7 +4,7 @@ use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior, Value};
 use serde::Serialize;
 
-use crate::plain::acts;
+use crate::plain::acts_in_lines;
 use crate::plot::{Figure, PanelData};
 use crate::{ReportError, number, script};
 
@@ -12,7 +12,7 @@ use crate::{ReportError, number, script};
 /// style sheet and figures are the same on all of them, and numbers are formatted there
 /// by the filters of [`number`]. A value that a template prints or goes through and
 /// nobody gives is an error, not an empty place; `if` may ask. What a text of somebody else's would
-/// tell a reader to do is taken out ([`acts`]).
+/// tell a reader to do is taken out ([`acts_in_lines`]).
 ///
 /// # Errors
 /// [`ReportError::Template`] if the template does not fit its values.
@@ -30,11 +30,7 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     env.add_template("page.html", template)?;
     let values = Value::from(Serde(values));
     let text = env.get_template("page.html")?.render(values)?;
-    let shown = |c: char| match acts(c) && !matches!(c, '\n' | '\t') {
-        true => char::REPLACEMENT_CHARACTER,
-        false => c,
-    };
-    Ok(text.chars().map(shown).collect())
+    Ok(text.replace(acts_in_lines, "\u{fffd}"))
 }
 
 /// A text in which what stands between backticks is code.
@@ -103,6 +99,7 @@ pub fn json(value: &impl Serialize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plain::acts;
 
     #[test]
     fn what_a_text_would_tell_a_reader_to_do_is_taken_out_of_a_page() {

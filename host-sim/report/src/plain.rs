@@ -22,3 +22,9 @@ pub fn acts(c: char) -> bool {
         matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control() || turns
 }
+
+/// The same of a text of several lines, which ends of lines and tabs belong to.
+#[must_use]
+pub fn acts_in_lines(c: char) -> bool {
+    acts(c) && !matches!(c, '\n' | '\t')
+}

@@ -6,6 +6,7 @@ use super::moves::MoveMeter;
 use super::rest::{RestMeter, rest_targets};
 use super::{Analysis, Extremes, Target, within};
 use wheeleg_config::{GaitParams, RobotConfig};
+use wheeleg_report::number::counted;
 use wheeleg_telemetry::{JointSample, Row};
 
 /// The end stops are elastic: a stroke may pass the axis limit by this, mm.
@@ -337,9 +338,9 @@ impl ThreeStepMeter {
             "A25",
             format!(
                 "steps in the run: {} and {} by the foot switches, {} of b6",
-                counted(lifts, "lift"),
-                counted(touchdowns, "touchdown"),
-                counted(strides, "stride")
+                counted(lifts, "lift", "lifts"),
+                counted(touchdowns, "touchdown", "touchdowns"),
+                counted(strides, "stride", "strides")
             ),
             Some(steps as f64),
             "1",
@@ -389,12 +390,6 @@ impl ThreeStepMeter {
             targets.push(Target::new(id, what, peak(range), "N", None, None).info());
         }
     }
-}
-
-/// A count with its word.
-fn counted(count: usize, word: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {word}{plural}")
 }
 
 fn delays(targets: &mut Vec<Target>, robot: &RobotConfig, analysis: &Analysis) {

@@ -4,21 +4,16 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::StudyError;
-use wheeleg_report::output::{ensure_no_input, is_there};
+use wheeleg_report::output::{ensure_no_input, free_place, is_there};
 
-/// The first of `FILE.previous`, `FILE.previous-2`, … that does not exist.
-fn free_place(path: &Path) -> PathBuf {
-    let named = |suffix: &str| {
+/// `FILE.previous`, or the first of `FILE.previous-2`, … that does not exist.
+fn free_place_beside(path: &Path) -> PathBuf {
+    free_place(|previous| {
         let mut name = path.as_os_str().to_owned();
-        name.push(suffix);
+        name.push(".");
+        name.push(previous);
         PathBuf::from(name)
-    };
-    let numbered = (2_u32..).map(|n| format!(".previous-{n}"));
-    std::iter::once(".previous".to_owned())
-        .chain(numbered)
-        .map(|suffix| named(&suffix))
-        .find(|place| !is_there(place))
-        .unwrap_or_else(|| named(".previous"))
+    })
 }
 
 /// Writes a file. One of the same name that says something else is set aside first, as the results
@@ -76,7 +71,7 @@ pub fn make_room(path: &Path, reads: &[&Path]) -> Result<(), StudyError> {
         Ok(about) if !about.is_file() => Some(std::io::Error::other("it is not a file")),
         // A file, or a link that leads nowhere.
         Ok(_) | Err(_) => {
-            let previous = free_place(path);
+            let previous = free_place_beside(path);
             std::fs::rename(path, &previous)
                 .map_err(|e| StudyError::output("set aside", path, e))?;
             let told = format!("earlier {} moved to {}", path.display(), previous.display());

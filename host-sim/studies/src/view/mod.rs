@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use wheeleg_config::{Drawing, builtin};
-pub use wheeleg_report::plain::{acts, plain};
+pub use wheeleg_report::plain::plain;
 use wheeleg_report::results::COMPARED_PAGE;
 
 use self::content::{Content, Span};

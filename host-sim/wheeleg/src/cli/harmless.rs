@@ -1,6 +1,6 @@
 //! What the program says, on a terminal: it fits its width, and texts of files and of servers stand in it.
 
-use wheeleg_studies::view::acts;
+use wheeleg_report::plain::acts_in_lines;
 
 /// A text in which colours alone act on a terminal. All else that would, such as moving the cursor,
 /// setting the title or turning the direction of the text, becomes `�`.
@@ -10,7 +10,7 @@ pub(super) fn harmless(text: &str) -> String {
     while let Some(c) = rest.chars().next() {
         let length = colour(rest).unwrap_or(c.len_utf8());
         let (piece, after) = rest.split_at(length);
-        match length == c.len_utf8() && acts(c) && !matches!(c, '\n' | '\t') {
+        match length == c.len_utf8() && acts_in_lines(c) {
             true => out.push(char::REPLACEMENT_CHARACTER),
             false => out.push_str(piece),
         }
