@@ -171,6 +171,7 @@ fn scenarios_page() {
     for (kind, keys) in keys::MOTIONS {
         table(&mut body, &format!("[motion], kind {kind}"), keys);
     }
+    table(&mut body, "[behaviours]", &keys::BEHAVIOURS);
     table(&mut body, "[[events]]", &keys::EVENT);
     table(&mut body, "[[bars]]", &keys::BAR);
     body.push('\n');

@@ -307,7 +307,7 @@ arguments! {
     POLE = "pole", BYTE, "B of the lead filter.";
     GAIN = "gain", BYTE, "K of the lead filter.";
     BOARD = "board", ArgumentKind::Whole(Limits { min: 1, max: 8 }), "Bus address: joint boards 1 to 6, wheel boards 7 and 8.";
-    BEHAVIOURS = "mask", ArgumentKind::Whole(Limits { min: 0, max: 2047 }), "Sum of the bits of those that may act: 1 overload, 2 tip-guard, 4 touchdown, 8 search, 16 bump, 32 lost-contact, 64 slip, 128 hook, 256 stuck, 512 load-share, 1024 stroke-governor.";
+    BEHAVIOURS = "mask", ArgumentKind::Whole(Limits { min: 0, max: 2047 }), "Sum of the bits of those that may act: 1 overload, 2 tip-guard, 4 touchdown, 8 search, 16 bump, 32 lost-contact, 64 slip, 128 hook (reserved: does nothing yet), 256 stuck, 512 load-share, 1024 stroke-governor.";
     PARAMETER = "parameter", ArgumentKind::Parameter, "Parameter of the board, by its name in the tables of the boards.";
     VALUE = "value", ArgumentKind::Raw, "Value in the unit of the parameter; the board checks it.";
     STEPS = "steps", ArgumentKind::Whole(Limits { min: 1, max: 10_000 }), "Number of steps.";

@@ -123,6 +123,13 @@ pub const MOTIONS: [(&str, &[Key]); 4] = [
     ("walk", &WALK),
 ];
 
+/// `[behaviours]`.
+pub const BEHAVIOURS: [Key; 1] = [key(
+    "off",
+    "list of names, as in the command `SetBehaviours`",
+    "behaviours that may not act",
+)];
+
 /// `[[events]]`, beside the arguments of a command.
 pub const EVENT: [Key; 3] = [
     key(

@@ -328,7 +328,7 @@ fn behaviours(r: &mut Reader) -> Behaviours {
     let Some(entry) = r.table("behaviours") else {
         return Behaviours::ALL;
     };
-    r.reject_misplaced(&entry, &["off"], &TOP);
+    r.reject_misplaced(&entry, &keys::names(&keys::BEHAVIOURS), &TOP);
     let off = r.texts(&entry, "off", |text| {
         Behaviour::of_name(text).ok_or_else(|| {
             let names = Behaviour::ALL.map(Behaviour::name).join(", ");

@@ -65,7 +65,7 @@ pub struct Recording {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Keep {
     /// Bit i: the channel with index i in the registry.
-    channels: u32,
+    channels: u64,
     /// Every so many milliseconds of the channels that have 1 kHz.
     period_ms: u64,
     /// Times in which they are kept whole, ns.
@@ -86,7 +86,7 @@ impl Keep {
     #[must_use]
     pub fn everything() -> Self {
         Self {
-            channels: u32::MAX,
+            channels: u64::MAX,
             period_ms: 1,
             whole_ns: Vec::new(),
             events: usize::MAX,

@@ -510,6 +510,9 @@ const FAST_HZ: u32 = 500;
 /// One sample per bus cycle.
 const CYCLE_HZ: u32 = 100;
 
+// `Keep` has a bit for each.
+const _: () = assert!(CHANNELS.len() <= u64::BITS as usize);
+
 static CHANNELS: [ChannelDef; 28] = [
     channel::<JointSample>("/joint/1", FAST_HZ, "Left yaw cylinder (b2)"),
     channel::<JointSample>("/joint/2", FAST_HZ, "Left horizontal cylinder (b5)"),

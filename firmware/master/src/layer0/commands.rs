@@ -197,7 +197,14 @@ impl Layer0 {
                 self.ask(accepted, to, proto::ParamSave {}.into())
             }
             // The E-stop does not queue, and commands of layer 1 are never routed here.
-            _ => Err(Refusal::NotMoving),
+            Command::EmergencyStop
+            | Command::Stand
+            | Command::Hold
+            | Command::StartGait
+            | Command::StopGait
+            | Command::Walk(_)
+            | Command::SetGait(_)
+            | Command::FootTrajectory { .. } => Err(Refusal::NotMoving),
         }
     }
 

@@ -94,7 +94,27 @@ impl Layer1 {
                 self.mode = Mode::Foot(trajectory);
             }
             // Commands of layer 0 are never routed here.
-            _ => return Err(Refusal::NotMoving),
+            Command::JointReference { .. }
+            | Command::TransmitPosition { .. }
+            | Command::OpenAllValves { .. }
+            | Command::BlowThrough { .. }
+            | Command::EmergencyBrake { .. }
+            | Command::SelectCorrection { .. }
+            | Command::WheelReference { .. }
+            | Command::WheelSpeed { .. }
+            | Command::WheelAcceleration { .. }
+            | Command::WheelFilter { .. }
+            | Command::Commission
+            | Command::ReadParameter { .. }
+            | Command::WriteParameter { .. }
+            | Command::SaveParameters { .. }
+            | Command::Arm
+            | Command::Disarm
+            | Command::ClearFault
+            | Command::EmergencyStop
+            | Command::TakeControl
+            | Command::ReleaseControl
+            | Command::SetBehaviours(_) => return Err(Refusal::NotMoving),
         }
         self.active = Some(accepted.ticket);
         Ok(false)

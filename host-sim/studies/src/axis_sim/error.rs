@@ -5,7 +5,7 @@ use wheeleg_control::joint::ConfigError;
 use wheeleg_plant::PlantError;
 
 /// An experiment could not be made.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[derive(Debug, Clone, thiserror::Error, miette::Diagnostic)]
 pub enum AxisSimError {
     /// The plant left the range of its model.
     #[error("{what}")]

@@ -111,6 +111,8 @@ pub struct Cases<'a> {
     pub(crate) cases: &'a [Row],
     /// What the random combinations say, one object per axis and controller.
     pub(crate) judged: &'a [Judged],
+    /// What made cases fail that could be simulated no further; they are not among `cases`.
+    pub(crate) failure: Option<String>,
 }
 
 impl study::Summary for Cases<'_> {
@@ -146,8 +148,8 @@ pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Compar
     let axes = options.axes.iter().map(Path::new);
     let reads: Vec<&Path> = axes.chain(options.against.as_deref()).collect();
     let job = Job::begin("compare", settings, &reads)?;
-    let comparison = Comparison::play(options, configs, before, &job.progress)?;
-    Ok(comparison.write(job))
+    let (comparison, unplayed) = Comparison::play(options, configs, before, &job.progress)?;
+    Ok(comparison.write(job, unplayed))
 }
 
 /// Reads the axes of a comparison.
@@ -179,18 +181,20 @@ impl Comparison {
     /// Plays all cases, as far as it is not stopped.
     ///
     /// # Errors
-    /// [`StudyError`] if an axis cannot be read or used.
+    /// [`StudyError`] if an axis cannot be read or used, or a case leaves the plant's model.
     pub fn run(options: &Options, progress: &Progress) -> Result<Self, StudyError> {
         let before = judged::read(options)?;
-        Self::play(options, configs(options)?, before, progress)
+        let (comparison, unplayed) = Self::play(options, configs(options)?, before, progress)?;
+        unplayed.map_or(Ok(comparison), Err)
     }
 
+    /// The comparison, and what is to be told of cases that could not be played: they cost none of the others.
     fn play(
         options: &Options,
         configs: Vec<AxisConfig>,
         before: Option<Before>,
         progress: &Progress,
-    ) -> Result<Self, StudyError> {
+    ) -> Result<(Self, Option<StudyError>), StudyError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(options.threads)
             .stack_size(STACK)
@@ -206,7 +210,7 @@ impl Comparison {
         configs: Vec<AxisConfig>,
         before: Option<Before>,
         progress: &Progress,
-    ) -> Result<Self, StudyError> {
+    ) -> Result<(Self, Option<StudyError>), StudyError> {
         let planned: Vec<(usize, Variation, u64)> = plan(options, &configs);
         let cases_of = |variation| options.kinds.len() * moves_of(options, variation).len();
         let of: usize = planned.iter().map(|&(_, v, _)| cases_of(v)).sum();
@@ -233,27 +237,39 @@ impl Comparison {
         let played = progress.map(&planned, |&(i, variation, seed)| {
             play_case(options, &axes[i], variation, seed, progress)
         })?;
-        let played = played.into_iter().flatten().flatten();
-        let (rows, overlays): (Vec<Row>, Vec<Option<Overlay>>) = played.unzip();
-        Ok(Self {
+        let (mut rows, mut overlays, mut unplayed) = (Vec::new(), Vec::new(), Vec::new());
+        for case in played.into_iter().flatten().flatten() {
+            match case {
+                Ok((row, overlay)) => {
+                    rows.push(row);
+                    overlays.extend(overlay);
+                }
+                Err(error) => unplayed.push(error),
+            }
+        }
+        let done = (rows.len() + unplayed.len()) as u64;
+        let comparison = Self {
             options: options.clone(),
             axes,
             before,
-            stopped: progress.stopped(rows.len() as u64, of as u64, "cases"),
+            stopped: progress.stopped(done, of as u64, "cases"),
             rows,
-            overlays: overlays.into_iter().flatten().collect(),
-        })
+            overlays,
+        };
+        Ok((comparison, unplayed_error(&unplayed, done)))
     }
 
     /// Writes report, figures, tables and `summary.json`.
-    fn write(self, job: Job) -> Finished<Self> {
+    fn write(self, job: Job, unplayed: Option<StudyError>) -> Finished<Self> {
         let stopped = self.stopped.clone();
         let judged = self.judged();
         let cases = Cases {
             cases: &self.rows,
             judged: &judged,
+            failure: unplayed.as_ref().map(ToString::to_string),
         };
         let summary = json(&cases, stopped.as_ref());
+        job.keep::<()>(unplayed.map_or(Ok(()), Err));
         job.finish(self, summary, stopped, |job, comparison| {
             let folder = job.subfolder(CSV);
             job.keep(folder.and_then(|folder| table(&folder.join("cases.csv"), &comparison.rows)));
@@ -263,8 +279,39 @@ impl Comparison {
     }
 }
 
-/// Plays the cases of a case, as far as the comparison is not stopped. One is played after
-/// its start-up rather than after those of all cases, so that there are rows from the
+/// A case that was played, or why it could not be.
+type PlayedCase = Result<(Row, Option<Overlay>), Unplayed>;
+
+/// A case that left the model of the plant.
+#[derive(Debug)]
+struct Unplayed {
+    /// Its name.
+    id: String,
+    /// When and how.
+    error: AxisSimError,
+}
+
+/// What is to be told of them, if there are any: how many, and all of the first.
+fn unplayed_error(unplayed: &[Unplayed], of: u64) -> Option<StudyError> {
+    let first = unplayed.first()?;
+    let cases = if unplayed.len() == 1 { "case" } else { "cases" };
+    let help = match &first.error {
+        AxisSimError::Unphysical { help, .. } => help,
+        _ => "change the axis file so that its variations can be simulated",
+    };
+    Some(StudyError::refused(
+        format!(
+            "{} {cases} of {of} could not be played and are counted nowhere; the first is `{}`: {}",
+            unplayed.len(),
+            first.id,
+            first.error
+        ),
+        help,
+    ))
+}
+
+/// Plays the cases of a variation, as far as the comparison is not stopped. They are played after
+/// its start-up rather than after those of all variations, so that there are rows from the
 /// beginning on.
 fn play_case(
     options: &Options,
@@ -272,19 +319,43 @@ fn play_case(
     variation: Variation,
     seed: u64,
     progress: &Progress,
-) -> Result<Vec<(Row, Option<Overlay>)>, StudyError> {
-    let failed = |e: AxisSimError| axis_error(&axis.config.name, &e);
-    let case = Case::new(&axis.config.name, &axis.config.axis, variation, seed);
-    let case = case.map_err(failed)?;
+) -> Result<Vec<PlayedCase>, StudyError> {
     let moves = moves_of(options, variation);
     let cases: Vec<(Kind, Move)> = options
         .kinds
         .iter()
         .flat_map(|kind| moves.iter().map(move |motion| (*kind, *motion)))
         .collect();
+    let name = &axis.config.name;
+    let unplayed = |kind, motion, error| Unplayed {
+        id: CaseId {
+            axis: name.clone(),
+            kind,
+            motion,
+            variation,
+            seed,
+        }
+        .to_string(),
+        error,
+    };
+    let case = match Case::new(name, &axis.config.axis, variation, seed) {
+        Ok(case) => case,
+        // Its start-up is that of all its cases.
+        Err(error) => {
+            let all = cases
+                .iter()
+                .map(|&(kind, motion)| Err(unplayed(kind, motion, error.clone())));
+            return Ok(all.collect());
+        }
+    };
     let nominal = variation == Variation::Nominal;
     let rows = progress.map(&cases, |&(kind, motion)| {
-        let played = case.play(kind, motion).map_err(failed)?;
+        let played = case.play(kind, motion);
+        progress.step();
+        let played = match played {
+            Ok(played) => played,
+            Err(error) => return Ok(Err(unplayed(kind, motion, error))),
+        };
         let bound_s = match motion {
             Move::Step100 if nominal => axis.bound_s[0],
             Move::Step20 if nominal => axis.bound_s[1],
@@ -295,8 +366,7 @@ fn play_case(
         let overlay = played
             .filter(|_| shown)
             .map(|p| Overlay::of(&case, kind, motion, &p));
-        progress.step();
-        Ok::<_, StudyError>((row, overlay))
+        Ok::<_, StudyError>(Ok((row, overlay)))
     })?;
     Ok(rows.into_iter().flatten().collect())
 }
@@ -420,4 +490,47 @@ fn record<T: Serialize>(value: &T) -> Result<[csv::StringRecord; 2], StudyError>
     let mut lines = reader.records();
     let mut next = || lines.next().unwrap_or_else(|| Ok(csv::StringRecord::new()));
     Ok([next().map_err(failed)?, next().map_err(failed)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_that_leave_the_plants_model_cost_none_of_the_others() {
+        let options = Options {
+            axes: Vec::new(),
+            kinds: vec![Kind::PwmP],
+            moves: Some(vec![Move::Step20, Move::SCurve]),
+            seeds: 1,
+            seed: 1,
+            combinations: 0,
+            root: 0,
+            against: None,
+            quick: true,
+            threads: 1,
+        };
+        let sound = AxisConfig::load("bench-vq110u").expect("built in");
+        // So light that the step cannot follow its bristles: on reading this would be refused.
+        let mut light = sound.clone();
+        light.name = "light".to_owned();
+        light.axis.moving_mass_kg = 0.005;
+        let played = |configs| {
+            let progress = Progress::silent();
+            Comparison::play(&options, configs, None, &progress).expect("played")
+        };
+        let (alone, none) = played(vec![sound.clone()]);
+        assert!(none.is_none() && !alone.rows.is_empty(), "{none:?}");
+        let (both, unplayed) = played(vec![sound, light]);
+        let of_sound = both.rows.iter().filter(|row| row.case.axis != "light");
+        assert!(of_sound.eq(&alone.rows));
+        assert!(both.stopped.is_none());
+        let told = unplayed.expect("cases left the model").to_string();
+        let missing = 2 * alone.rows.len() - both.rows.len();
+        assert!(
+            missing > 0 && told.starts_with(&format!("{missing} case")),
+            "{told}"
+        );
+        assert!(told.contains("light/pwm-p/"), "{told}");
+    }
 }
