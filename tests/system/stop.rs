@@ -231,6 +231,8 @@ fn every_long_command_can_be_stopped_at_any_time() {
     let commands = inputs.commands(false);
     let signals = [("TERM", 143), ("HUP", 129), ("INT", 130)];
     let (mut stopped, mut started) = (0, 0);
+    // Within this each is signalled; shorter for one that has turned out to be over sooner.
+    let mut within = vec![Duration::from_millis(1500); commands.len()];
     for round in 0..tries(1, 20) {
         for (number, tried) in commands.iter().enumerate() {
             let (name, code) = signals[(number + round) % signals.len()];
@@ -240,16 +242,18 @@ fn every_long_command_can_be_stopped_at_any_time() {
             command.stdin(Stdio::null()).stdout(Stdio::piped());
             let mut child = command.stderr(Stdio::piped()).spawn().expect("start");
             started += 1;
-            let instant = 30 + 350 * (number % 4) + 75 * round;
-            std::thread::sleep(Duration::from_millis(instant as u64));
+            let share = ((7 * (number + round)) % 20) as f64 / 20.0;
+            let instant = within[number].mul_f64(0.02 + 0.97 * share);
+            std::thread::sleep(instant);
             let over = child.try_wait().expect("status").is_some();
-            if !over {
-                signal(&child, name);
+            match over {
+                true => within[number] = instant,
+                false => signal(&child, name),
             }
             let asked = Instant::now();
             let output = end(child);
             let stderr = String::from_utf8_lossy(&output.stderr);
-            let told = format!("{:?} {instant} ms {name}: {stderr}", tried.arguments);
+            let told = format!("{:?} {instant:?} {name}: {stderr}", tried.arguments);
             assert!(asked.elapsed() < PROMPT, "{:?}, {told}", asked.elapsed());
             let left = files_below(folder.path());
             if output.status.signal().is_some() {
