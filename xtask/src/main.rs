@@ -1,4 +1,4 @@
-//! The one door for developers: `cargo xtask <command>`.
+//! The one entry point for developers: `cargo xtask <command>`.
 //!
 //! `cargo xtask test` is the whole test suite; the other commands are its
 //! parts, so that what fails in one place can be repeated alone. A step either

@@ -17,7 +17,7 @@
 //! # Glossary
 //!
 //! * **semihosting**: an instruction by which a program on an emulator calls the host
-//! * **hil**: hardware in the loop: an image on a bench board, with sensors and valves simulated
+//! * **HIL**: hardware in the loop: an image on a bench board, with sensors and valves simulated
 //! * **simulator**: the program that sends requests and gets one reply each
 #![no_std]
 #![allow(

@@ -2,12 +2,12 @@
 //!
 //! | folder | what |
 //! |---|---|
-//! | [`observer`] | what an axis without a pressure sensor knows: valves, chamber pressures, motion, load, mass |
+//! | [`observer`] | estimates without a pressure sensor: valves, chamber pressures, motion, load, mass |
 //! | [`law`] | the predictive law on top: reference, prediction, switching curve, allocation, pulses, standstill |
 //! | [`tuning`] | all gains and thresholds of these two, each with unit, reason and the test that guards it |
-//! | [`axis`] | what a board is told of its axis, and the coefficients made of it |
+//! | [`axis`] | the axis data of a board, and the coefficients computed from them |
 //! | [`paper`] | the paper's fuzzy inference with its rules, and the estimate of ė |
-//! | [`joint`] | the controller of a joint board: one of six laws, the paper's by default |
+//! | [`joint`] | the controller of a joint board: one of six laws, the paper's by default (with one of two corrections) |
 //! | [`valve`], [`pwm`] | from a signed duty to the on-times of four on/off valves, for the laws without a plan of their own |
 //! | [`wheel`] | the HCTL-1100's lead filter and its four modes |
 //!
@@ -28,16 +28,16 @@
 //! * **observer**: estimate of pressures, motion and load from the potentiometer and the valve
 //!   commands
 //! * **told**: given by the axis data, not learnt
-//! * **external**: sent by somebody other than the law: exhaust, precharge, hold
+//! * **external**: of valve commands: sent by the board and not by the law, as in exhaust, precharge, hold
 //! * **choked speed**: C ρ0 R T0 / A: speed of the piston at which an open outlet holds the pressure of its chamber
 //! * **power**: in the observer, of a valve or of the piston over its area: pressure times speed
-//! * **period**: four ticks, in the last of which observer and predictive law work; pulses are planned for
-//!   the next one
-//! * **moment**: the time in a period for which the observer's estimates hold
-//! * **dead time**: from the moment until a pulse of the next period acts at its chamber
+//! * **law period**, in [`law`] and [`observer`] **period**: four ticks, in the last of which observer and
+//!   predictive law work and plan the pulses of the next one; in [`pwm`], a period is that of the valve PWM
+//! * **moment**: the instant in a law period at which the observer's estimates hold
+//! * **dead time**: from the moment until a pulse of the next law period acts at its chamber
 //! * **nimble mass**: the heaviest mass that the valves can still move as the dead time would allow
 //! * **pressure swap**: the drive chamber makes up for a counter chamber that cannot vent any faster
-//! * **patience**: how long the servo acts near a target before a wider band of rest is accepted
+//! * **patience**: time for which the law acts near a target before it accepts a wider band of rest
 //! * **break-away ramp**: a force that grows while the piston sticks: the integral term of this law
 //! * **committed**: opening that cannot be taken back, of pulses that are under way
 //! * **expected**: at the end of the dead time, with the pulses that are under way

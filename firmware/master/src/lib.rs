@@ -15,7 +15,7 @@
 //! * **RT-FIFO**: bounded queue between two layers that neither side waits for
 //! * **SYNC**: the frame that begins a bus cycle, with one slot of set-points for each node
 //! * **slot**: place of a node in SYNC, and the time in which it replies
-//! * **reflex**: a reaction of layer 0 to what the robot feels, without layer 1
+//! * **reflex**: a reaction of layer 0 to what the robot senses, without layer 1
 //! * **behaviour**: a reflex of a walk, with a name, a place in an order of priority, a switch and a
 //!   counter
 //! * **look-ahead**: the next command of a joint, announced before it holds

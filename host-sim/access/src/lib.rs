@@ -1,16 +1,16 @@
-//! Who may command a live robot, and what a client can ask: keys, frames, and the one place of who is
-//! in control. It opens no socket; the console serves it over the network, and the fault matrix drives
-//! it in simulated time. The contract with clients is `host-sim/console/PROTOCOL.md`.
+//! Who may command a live robot, and what a client can ask: keys, frames, and the register of the
+//! client in control. It opens no socket; the console serves it over the network, and the fault matrix
+//! drives it in simulated time. The contract with clients is `host-sim/console/PROTOCOL.md`.
 //!
 //! # Glossary
 //!
-//! * **key**: a secret of 32 bytes; whoever has it may drive, or may watch
+//! * **key**: a secret of 32 bytes that permits driving, or watching and stopping
 //! * **MAC**: message authentication code, which proves that the sender has the key
 //! * **frame**: one message of a client, with its MAC
-//! * **door**: lets in the frames of one session: authentic, each once, in order, not too many
+//! * **door**: check of the frames of one session: authentic, each once, in order, not too many
 //! * **session**: one client's connection, from handshake to close
 //! * **control**: the right to give commands; a lease of the master, held by one client
-//! * **desk**: who of the clients is in control
+//! * **desk**: register of the client that is in control or has asked for it
 //! * **host command**: a command that acts on the simulation or on who is in control, not on the robot
 
 pub mod arguments;

@@ -4,10 +4,11 @@
 //! # Glossary
 //!
 //! * **robot**: a file with every parameter of the simulated robot and its boards
-//! * **axis**: the same of one cylinder on a test bench
-//! * **scenario**: what happens in a run: robot, start pose, events by time, targets, faults
+//! * **axis**: a file with every parameter of one cylinder on a test bench
+//! * **scenario**: a file that defines a run: robot, motion, terrain, events, faults, and the targets and
+//!   limits that judge it
 //! * **terrain**: the ground of a scenario, in parts; each has a kind and a material
-//! * **source**: where a value is from: PAPER, DATASHEET, ASSUMED, IDENTIFIED
+//! * **source**: where a value is from: PAPER, DATASHEET, DERIVED, ASSUMED, IDENTIFIED
 //! * **plan**: a file of a campaign: a scenario, and what differs from case to case
 //! * **factor**: one of these differences: a list of values, or a distribution
 //! * **fingerprint**: hash of names, values and units of a robot; equal files of other layout

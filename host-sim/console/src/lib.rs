@@ -4,13 +4,14 @@
 //! # Glossary
 //!
 //! * **robot thread**: owns the simulated robot and its clock, and waits for nobody
-//! * **hub**: takes what the robot thread tells, encodes it once, and hands it to all clients
+//! * **hub**: takes samples and events from the robot thread, encodes them once, and hands them to all
+//!   clients
 //! * **session**: one client's connection, from handshake to close
 //! * **control**: the right to give commands; a lease of the master, held by one client
-//! * **beat**: what keeps the control: the holder has seen the robot as it was at a master time
-//! * **outbox**: what waits for one client
-//! * **viewer**: a client by the protocol of Foxglove and Lichtblick: looks, and may stop
-//! * **recording**: a folder with the log of a live robot and all that it was given, in which it can be repeated
+//! * **beat**: message that keeps the control: the holder has seen the robot as it was at a master time
+//! * **outbox**: messages that wait for one client
+//! * **viewer**: a client with the protocol of Foxglove and Lichtblick: watches, and may stop
+//! * **recording**: a folder with the log of a live robot and all its inputs, from which `replay` repeats it
 
 mod api;
 mod catalogue;

@@ -1,7 +1,7 @@
-//! In what two interface definitions differ, told from their hashes.
+//! The differences between two interface definitions, found by their hashes.
 //!
-//! Master and boards exchange hashes alone, because a board has no room for more. What
-//! stands behind a hash is looked up here:
+//! Master and boards exchange hashes alone, because a board has no room for more. The
+//! definition behind a hash is here:
 //!
 //! * [`archive`]: the definitions so far;
 //! * [`difference`]: lines in which two of them differ.

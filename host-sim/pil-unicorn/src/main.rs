@@ -3,16 +3,16 @@
 //!
 //!     wheeleg-pil-unicorn [--awake] IMAGE.elf…
 //!
-//! hosts one board per image, numbered from 0, and answers the requests of the
-//! simulator (crate `wheeleg-remote-link`) that come on standard input on standard
+//! This form hosts one board per image, numbered from 0. It reads the requests of the
+//! simulator (crate `wheeleg-remote-link`) from standard input and answers them on standard
 //! output, in order. Nothing here reads a clock or a random number: equal
 //! requests get equal replies. `--awake` is for a process with a processor core of
 //! its own: it does not sleep between requests that follow each other closely.
 //!
 //!     wheeleg-pil-unicorn --bench IMAGE.elf
 //!
-//! runs an image for a bench board with its second serial port on a pseudo-terminal,
-//! whose name it prints, until it is killed.
+//! This form runs an image for a bench board with its second serial port on a
+//! pseudo-terminal, whose name it prints, until it is killed.
 //!
 //! # Glossary
 //!

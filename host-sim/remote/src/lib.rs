@@ -1,13 +1,13 @@
-//! Boards elsewhere: the flashed images on an emulated STM32G431 ([`unicorn`]), the same
+//! Remote boards: the flashed images on an emulated STM32G431 ([`unicorn`]), the same
 //! applications on QEMU ([`qemu`]), or on a bench board behind a serial port ([`serial`]).
-//! Every board elsewhere has a native twin beside it, with which it is compared at every tick
-//! and frame.
+//! Every remote board has a native twin, with which it is compared at every tick and frame.
 //!
 //! # Glossary
 //!
 //! * **SIL**: software in the loop: the application compiled for the host
 //! * **PIL**: processor in the loop: the flashed image on an emulated processor
 //! * **HIL**: hardware in the loop: an image on a bench board
+//! * **remote board**: a board outside the simulator: PIL, QEMU or HIL
 //! * **twin**: the native application beside a remote board, with the same inputs
 //! * **lock-step**: the board waits for the simulator, the simulator for the board
 

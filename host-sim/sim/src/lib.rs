@@ -10,11 +10,12 @@
 //!
 //! * **session**: one simulated robot that somebody drives
 //! * **board**: application, hardware model, memory and clock at one address
-//! * **operator**: the user of the paper: gets the robot ready, sends the commands of the
+//! * **operator**: the simulated person at the controls: arms the robot and gives the commands of the
 //!   scenario
 //! * **line**: a serial port or pipe between a master here and boards elsewhere, or the other way
 //!   round
-//! * **observer**: samples the robot for the record
+//! * **observer**: samples the robot for the recorder; not the observer of `control`, which estimates
+//!   pressures
 //! * **rogue node**: a node on the bus that should not be there
 //! * **down**: a board without power, or one that hangs
 

@@ -2,20 +2,19 @@
 //!
 //! * [`run`]: one scenario with log, targets and report; [`analysis`] judges it;
 //! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
-//! * [`matrix`]: every fault, and what must come of it;
+//! * [`matrix`]: every fault, and the required response;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`axis_sim`]);
 //! * [`identify`]: a user's cylinder from measurements;
 //! * [`figures`]: the paper's figures and misprints;
-//! * [`study`]: what all of them do in the same way;
+//! * [`study`]: the parts that all of them share;
 //! * [`view`]: a log, or two, as a page;
 //! * [`check`], [`export`]: the model against others' numbers, and for others' programs.
 //!
 //! # Glossary
 //!
 //! * **target**: one number of a run with the band it must lie in, and whether it is required
-//! * **row**: one fault of the matrix, with its instant and what must come of it
+//! * **row**: one fault of the matrix, with its instant and the required response
 //! * **case**: one move of one controller on one cylinder
-//! * **corner**: one set of deviations of a cylinder from its data sheet
 //! * **baseline**: the same run without the fault
 //! * **job**: folder, progress and stop signal of a study
 

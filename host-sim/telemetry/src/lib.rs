@@ -16,9 +16,11 @@
 //! * **sample**: the values of a channel at one instant
 //! * **event**: something that happened, with cause and time
 //! * **sink**: a place where samples go
-//! * **provenance**: what went into a run: program, robot, scenario, seed
-//! * **derived channel**: one of the log that follows from others, in the words of other programs
-//! * **hash**: BLAKE3 over channel, time and value of all samples at full rate
+//! * **provenance**: origin of a run: program, robot, scenario, seed
+//! * **derived channel**: a channel of the log that is computed from others, in a format that other
+//!   programs know
+//! * **hash**: BLAKE3 over channel, time and value of all samples at full rate, except `/server`,
+//!   `/session` and the texts of the terrain in `/run`
 
 mod attachments;
 mod contact;

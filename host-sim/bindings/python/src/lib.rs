@@ -1,5 +1,5 @@
-//! The Python package `wheeleg`: the simulator's own plant and the robot's own firmware, with
-//! numpy arrays in and out.
+//! The Python package `wheeleg`: the simulator's plant and the boards' firmware, from the same
+//! source, with numpy arrays in and out.
 //!
 //! Nothing is modelled here. A class holds what a crate below has, checks what comes in, and
 //! turns rows into arrays. The interpreter lock is released while anything is simulated.
