@@ -631,6 +631,43 @@ fn a_longer_stroke_is_told_to_the_boards_too() {
     assert_eq!(ready.status.code(), Some(0), "{said}");
 }
 
+/// A reservoir that begins empty is waited for; one that never fills is named, with what decides it.
+#[test]
+fn a_robot_that_begins_without_air_waits_for_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let robot = include_str!("../../host-sim/robots/wheeleg.toml");
+    let scenario = folder.path().join("stand.toml");
+    let stand = "name = \"s\"\ndescription = \"d\"\nrobot = \"robot.toml\"\nduration = \"0.2 s\"\n\
+                 seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n";
+    fs::write(&scenario, stand).expect("written");
+    let out = folder.path().join("out");
+    let run = |changes: &[(&str, f64, &str)]| {
+        let path = folder.path().join("robot.toml");
+        fs::write(path, changed(robot, changes)).expect("written");
+        let output = wheeleg(&["run", "--out", out.to_str().expect("UTF-8")], &scenario);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), said)
+    };
+    let empty = ("supply.initial_pressure", 1.01, "bar");
+    let (code, said) = run(&[empty]);
+    assert_eq!(code, Some(0), "{said}");
+    // The start pose is reached within 5 s of air, and not with a thousand times the volume.
+    let (code, said) = run(&[
+        empty,
+        ("supply.reservoir", 900.0, "dm3"),
+        ("start_up.limit", 5.0, "s"),
+    ]);
+    assert_eq!(code, Some(2), "{said}");
+    for part in [
+        "waiting for air",
+        "`supply.switch_on`",
+        "`supply.initial_pressure`",
+        "`start_up.limit`",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
 /// A section of a file, up to the remarks before the next one.
 fn section(text: &str, name: &str) -> std::ops::Range<usize> {
     let begin = text.find(&format!("[{name}]\n")).expect("the section");

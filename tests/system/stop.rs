@@ -232,7 +232,7 @@ fn every_long_command_can_be_stopped_at_any_time() {
     let signals = [("TERM", 143), ("HUP", 129), ("INT", 130)];
     let (mut stopped, mut started) = (0, 0);
     // Within this each is signalled; shorter for one that has turned out to be over sooner.
-    let mut within = vec![Duration::from_millis(1500); commands.len()];
+    let mut within = vec![Duration::from_millis(1100); commands.len()];
     for round in 0..tries(1, 20) {
         for (number, tried) in commands.iter().enumerate() {
             let (name, code) = signals[(number + round) % signals.len()];

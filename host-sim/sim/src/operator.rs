@@ -4,7 +4,7 @@
 use wheeleg_master::Master;
 use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::contact::Side;
-use wheeleg_master::dispatcher::{Reject, Ticket};
+use wheeleg_master::dispatcher::{Refusal, Reject, Ticket};
 use wheeleg_master::event::Event;
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_protocol::{LinkRecord, Node};
@@ -69,13 +69,22 @@ fn moves(robot: &RobotConfig, leg: LegChoice) -> [String; 6] {
     })
 }
 
+/// Between two looks at a reservoir that is not full yet, ns.
+const FILLING_NS: u64 = 100_000_000;
+
 /// How far the start-up has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Enumerating,
     Arming,
+    /// The reservoir is not full yet.
+    Filling {
+        until_ns: u64,
+    },
     Homing,
-    Settling { until_ns: u64 },
+    Settling {
+        until_ns: u64,
+    },
 }
 
 impl Stage {
@@ -84,6 +93,7 @@ impl Stage {
         match self {
             Self::Enumerating => "finding the boards",
             Self::Arming => "arming",
+            Self::Filling { .. } => "waiting for air",
             Self::Homing => "moving to the start pose",
             Self::Settling { .. } => "settling in the start pose",
         }
@@ -109,6 +119,8 @@ pub(super) struct Operator {
     late_remedy: String,
     /// The same where a board refuses to be armed.
     arming_remedy: String,
+    /// The same where the reservoir does not fill.
+    air_remedy: String,
 }
 
 /// Side of a leg as the master names it.
@@ -144,6 +156,16 @@ impl Operator {
                  (`[sensor.*]`, `cylinder.stroke`) and its parameters (`[node.*]`) must agree",
                 robot.file
             ),
+            air_remedy: format!(
+                "the robot {} is armed once its reservoir has `supply.switch_on` = {:.2} bar; it begins with \
+                 `supply.initial_pressure` = {:.2} bar, and is filled through its `[regulator]` up to \
+                 `supply.set_pressure` = {:.2} bar: begin with more, or allow more than `start_up.limit` = {:.2} s",
+                robot.file,
+                robot.plant.supply.switch.on_pa * 1e-5,
+                robot.plant.supply.initial_pressure_pa * 1e-5,
+                robot.plant.supply.set_pressure_pa * 1e-5,
+                robot.start_up.limit_s
+            ),
         }
     }
 
@@ -157,6 +179,9 @@ impl Operator {
         let now_us = now_ns / 1000;
         while let Some((time_us, event)) = world.master().take_event() {
             let cause = Cause::Master(event);
+            if self.waits_for_air(event, now_ns) {
+                continue;
+            }
             // Counters and logs are no part of the story, but for what is to be mended.
             let routine = matches!(event, Event::Link { .. } | Event::Log { .. });
             if !routine || cause.kind() == EventKind::Fault {
@@ -202,6 +227,10 @@ impl Operator {
             Stage::Settling { until_ns } if now_ns >= until_ns && now_ns <= self.limit_ns => {
                 return Ok(true);
             }
+            Stage::Filling { .. } if now_ns > self.limit_ns => {
+                return Err(self.not_ready(now_ns, &self.air_remedy));
+            }
+            Stage::Filling { until_ns } if now_ns >= until_ns => (Command::Arm, Stage::Arming),
             Stage::Homing | Stage::Settling { .. } if now_ns > self.limit_ns => {
                 return Err(self.not_ready(now_ns, &self.late_remedy));
             }
@@ -218,6 +247,23 @@ impl Operator {
             .map_err(|why| refused(&command, &why))?;
         self.stage = next;
         Ok(false)
+    }
+
+    /// Whether arming is refused for want of air, which the reservoir may get: it is asked for again.
+    fn waits_for_air(&mut self, event: Event, now_ns: u64) -> bool {
+        let no_air = matches!(
+            event,
+            Event::Refused {
+                reason: Refusal::NoAir,
+                ..
+            }
+        );
+        let waits = no_air && self.stage == Stage::Arming;
+        if waits {
+            let until_ns = now_ns + FILLING_NS;
+            self.stage = Stage::Filling { until_ns };
+        }
+        waits
     }
 
     /// The remedy, with what the joint is asked for that reported last.
