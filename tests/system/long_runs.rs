@@ -77,8 +77,8 @@ fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     ensure_disk_is_told(&stderr, out);
     let summary = json(&output);
-    let code = i32::from(!missed(&summary).is_empty());
-    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    // A missed target is told, and is no failure without `--strict`.
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
     (peak, summary)
 }
 
