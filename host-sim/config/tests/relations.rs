@@ -17,6 +17,7 @@ use wheeleg_config::{
 };
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
+const WALKER: &str = include_str!("../../robots/wheeleg.toml");
 const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
 
 /// A path, its value as it is written, and its unit.
@@ -201,6 +202,13 @@ const EXAMPLES: &[Example] = &[
     example("measured stroke", ROBOT, &[], ("node.joint.sensor_full_scale", "{}", "mm"), [190.0, 200.0], &["node.joint.sensor_full_scale + node.joint.sensor_zero"]),
     example("steps of the converter", ROBOT, &[], ("node.joint.settle_band", "{}", "mm"), [0.1, 0.5], &["sensor.adc.bits", "node.joint.settle_band"]),
     example("stop of a joint", ROBOT, PRESSING, ("node.joint.stroke_max", "{}", "mm"), [178.0, 178.6], &["node.joint.stroke_max", "gait.stroke"]),
+    example("reach of the yaw boards", WALKER, &[], ("node.yaw.stroke_max", "{}", "mm"), [86.9, 87.1], &["node.yaw.stroke_max"]),
+    example("reach of the horizontal boards", WALKER, &[], ("node.horizontal.stroke_min", "{}", "mm"), [3.1, 2.9], &["node.horizontal.stroke_min"]),
+    example("reach of the vertical boards", WALKER, &[("node.joint.precharge", "0.0", "bar")], ("node.vertical.stroke_max", "{}", "mm"), [150.0, 178.0], &["node.vertical.stroke_max"]),
+    example("speed of the yaw boards", WALKER, &[], ("node.yaw.sensor_rate", "{}", "mm/s"), [249.9, 250.0], &["node.yaw.sensor_rate", "node.joint.slew_rate"]),
+    example("speed of the horizontal boards", WALKER, &[], ("node.horizontal.sensor_rate", "{}", "mm/s"), [349.9, 350.0], &["node.horizontal.sensor_rate", "node.horizontal.slew_rate"]),
+    example("speed of the vertical boards", WALKER, &[], ("node.vertical.sensor_rate", "{}", "mm/s"), [249.9, 250.0], &["node.vertical.sensor_rate", "node.joint.slew_rate"]),
+    example("samples of the wheel boards", ROBOT, &[], ("node.wheel.sample_timer", "{}", "16 clocks"), [14.0, 15.0], &["node.wheel.sample_timer"]),
     example("board's full scale", AXIS, &[("sensor.potentiometer.electrical_stroke", "1800.0", "mm"), ("sensor.potentiometer.offset", "20.0", "mm"), ("sensor.adc.bits", "16", "bit")], ("sensor.potentiometer.gain", "{}", "1"), [0.899, 0.9], &[]),
     example("board's volume A", AXIS, &[], ("cylinder.dead_volume_a", "{}", "cm3"), [499.0, 400.0], &[]),
     example("board's volume B", AXIS, &[], ("cylinder.dead_volume_b", "{}", "cm3"), [499.0, 400.0], &[]),
@@ -260,7 +268,9 @@ fn ensure_told(relation: &Relation, example: &Example, value: f64, error: &Confi
         let listed = match line(&text, field) {
             Some(line) => format!(" (line {line})"),
             // A board's parameter may be left at its default.
-            None if field.starts_with("node.") => String::new(),
+            None if field.starts_with("node.joint.") || field.starts_with("node.wheel.") => {
+                String::new()
+            }
             None => continue,
         };
         let (_, after) = said
@@ -300,8 +310,12 @@ fn ensure_held(relation: &Relation, example: &Example) {
     if let Err(error) = example.read(sound) {
         panic!("{name} at {sound}: {}", report(&error));
     }
-    // Of values on both sides of 0 the sign is what matters.
-    while broken * sound > 0.0 && (broken - sound).abs() > 1e-3 * sound.abs() {
+    // A timer counts whole clocks. Of values on both sides of 0 the sign is what matters.
+    let near = match example.field.2 {
+        "16 clocks" => 1.0,
+        _ => 1e-3,
+    };
+    while broken * sound > 0.0 && (broken - sound).abs() > near * sound.abs() {
         let middle = 0.5 * (broken + sound);
         match example.read(middle) {
             Ok(()) => sound = middle,

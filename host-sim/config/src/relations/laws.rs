@@ -659,6 +659,89 @@ pub(super) fn seat(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
+/// The field that decides what boards of a kind have, their own or that of all boards, and its value.
+fn decides<'a>(f: &Facts<'_>, own: &'a str, all: &'a str) -> Option<(&'a str, f64)> {
+    let found = |path| f.si(path).map(|value| (path, value));
+    found(own).or_else(|| found(all))
+}
+
+/// Where the gait needs its pistons is within what their boards are told, to what counts as settled.
+pub(super) fn reach(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    reached(f, it, &[])
+}
+
+/// The same of those that the gait also draws in.
+pub(super) fn reach_from_home(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    reached(f, it, &[0.0])
+}
+
+fn reached(f: &Facts<'_>, it: &Relation, home_mm: &[f64]) -> Option<Broken> {
+    let (most, most_mm) = decides(f, it.fields[0], it.fields[2])?;
+    let (least, least_mm) = decides(f, it.fields[1], it.fields[3])?;
+    let tolerance_mm = f.si(it.fields[4])? * 1e3;
+    let gait = it.fields[5..]
+        .iter()
+        .map(|path| f.si(path).map(|m| m * 1e3));
+    let mut needed_mm = gait.collect::<Option<Vec<f64>>>()?;
+    needed_mm.extend(home_mm);
+    let low_mm = needed_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let high_mm = needed_mm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut offers = Vec::new();
+    if least_mm > low_mm + tolerance_mm {
+        offers.push(Offer::new(f, least, Bound::UpTo, low_mm));
+    }
+    if most_mm < high_mm - tolerance_mm {
+        offers.push(Offer::new(f, most, Bound::From, high_mm));
+    }
+    if offers.is_empty() {
+        return None;
+    }
+    let figures = format!(
+        "{} to {} mm are needed, and {} to {} mm allowed",
+        pretty(low_mm),
+        pretty(high_mm),
+        pretty(least_mm),
+        pretty(most_mm)
+    );
+    // Both ends where both are wrong.
+    Some(Broken {
+        figures,
+        offers: vec![offers],
+        words: String::new(),
+    })
+}
+
+/// A board believes its piston to be as fast as it leads it.
+pub(super) fn credible(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let (rate, rate_mm_s) = decides(f, it.fields[0], it.fields[1])?;
+    let (slew, slew_mm_s) = decides(f, it.fields[2], it.fields[3])?;
+    if rate_mm_s >= slew_mm_s {
+        return None;
+    }
+    offered(
+        String::new(),
+        vec![
+            Offer::new(f, rate, Bound::From, slew_mm_s).which_is(&format!("`{slew}`")),
+            Offer::new(f, slew, Bound::UpTo, rate_mm_s).which_is(&format!("`{rate}`")),
+        ],
+    )
+}
+
+/// The least timer with which a wheel board makes profiles (HCTL-1100 data sheet, sample timer).
+const PROFILE_TIMER: f64 = 15.0;
+
+/// A wheel board that makes its own profiles has time for it.
+pub(super) fn profiles(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let (timer, streamed) = (f.si(it.fields[0])?, f.si(it.fields[1])?);
+    if timer >= PROFILE_TIMER || streamed != 0.0 {
+        return None;
+    }
+    offered(
+        String::new(),
+        vec![Offer::new(f, it.fields[0], Bound::From, PROFILE_TIMER)],
+    )
+}
+
 /// A joint that is drawn in, and one that stands out for the gait, measure as settled.
 pub(super) fn measured(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;

@@ -64,6 +64,8 @@ const TOO_SMALL: &str = "no body of this mass is so small";
 const FRICTION: &str = "the step is too long for so much friction on so little mass";
 const STOP: &str = "the step is too long for this end stop and this mass";
 const FLOW: &str = "the step is too long for so much flow into so little volume";
+const REACH: &str = "a board would not let its piston go where the gait needs it";
+const TOO_FAST: &str = "a board would take its own reference for a fault of the sensor: it moves faster than its piston is told to be able to";
 const VOLUME: &str = "the piston would press the air before it to nothing in its stop";
 
 /// Every relation between fields of robot and axis files.
@@ -158,6 +160,13 @@ pub const RELATIONS: &[Relation] = &[
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
     law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
     law("stop of a joint", &["cylinder.stroke", "node.joint.stroke_max", "gait.stroke", "node.joint.precharge", "node.joint.law"], "a joint board would press its piston beyond the stroke that it is told, and never take it for settled", laws::seat),
+    law("reach of the yaw boards", &["node.yaw.stroke_max", "node.yaw.stroke_min", "node.joint.stroke_max", "node.joint.stroke_min", "homing.tolerance", "gait.yaw_s2"], REACH, laws::reach),
+    law("reach of the horizontal boards", &["node.horizontal.stroke_max", "node.horizontal.stroke_min", "node.joint.stroke_max", "node.joint.stroke_min", "homing.tolerance", "gait.held_leg_s5", "gait.stroke"], REACH, laws::reach_from_home),
+    law("reach of the vertical boards", &["node.vertical.stroke_max", "node.vertical.stroke_min", "node.joint.stroke_max", "node.joint.stroke_min", "homing.tolerance", "gait.held_leg_s6", "gait.stroke"], REACH, laws::reach),
+    law("speed of the yaw boards", &["node.yaw.sensor_rate", "node.joint.sensor_rate", "node.yaw.slew_rate", "node.joint.slew_rate"], TOO_FAST, laws::credible),
+    law("speed of the horizontal boards", &["node.horizontal.sensor_rate", "node.joint.sensor_rate", "node.horizontal.slew_rate", "node.joint.slew_rate"], TOO_FAST, laws::credible),
+    law("speed of the vertical boards", &["node.vertical.sensor_rate", "node.joint.sensor_rate", "node.vertical.slew_rate", "node.joint.slew_rate"], TOO_FAST, laws::credible),
+    law("samples of the wheel boards", &["node.wheel.sample_timer", "gait.stream_wheels"], "wheels that are not led by the master follow profiles of their own, for which a board needs more time between its samples", laws::profiles),
     // What the board of an axis can hold; of one field it is the field's own range.
     board_limits("board's full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
     board_limits("board's volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),

@@ -10,10 +10,15 @@ pub(crate) const SHORT: &[(&str, &str, &str)] = &[
     ("node.joint.sensor_max", "95.0", "mm"),
 ];
 
-/// A file with other values; a key that its section has not got is put below the heading.
+/// A file with other values; a key that its section has not got is put below the heading, a section that
+/// the file has not got at its end.
 pub(crate) fn with(text: &str, path: &str, value: &str, unit: &str) -> String {
     let (section, key) = path.rsplit_once('.').expect("a section and a key");
     let heading = format!("[{section}]\n");
+    let text = match text.contains(&heading) {
+        true => text.to_owned(),
+        false => format!("{text}\n{heading}"),
+    };
     let begin = text.find(&heading).expect("the section") + heading.len();
     let field = format!("{key} = {{ value = {value}, unit = \"{unit}\", source = \"ASSUMED\" }}");
     let end = text[begin..]
@@ -23,7 +28,7 @@ pub(crate) fn with(text: &str, path: &str, value: &str, unit: &str) -> String {
         let (name, _) = line.split_once('=').unwrap_or_default();
         name.trim() == key
     });
-    let mut changed = text.to_owned();
+    let mut changed = text.clone();
     match line {
         Some(line) => {
             let at = begin + text[begin..].find(line).expect("it stands there");
