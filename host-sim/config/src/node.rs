@@ -104,16 +104,24 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
         let shown = |raw: i32| format!("{}{}", pretty(in_unit(info, raw)), suffix(info.unit));
         let side = if *raw > info.default { "up to" } else { "from" };
         let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
+        // Far from it no other value alone may be enough.
+        let just_refused = limit + (*raw - limit).signum();
         // What is printed has fewer digits than a fine format: a thousandth inwards.
         let limit = match scale(info.format) == 1.0 {
             true => limit,
             false => limit + (info.default - limit) / 1000,
         };
-        let others = params_at(address.raw()).iter().filter(|other| {
-            other.id != info.id
-                && [other.min, other.max]
-                    .into_iter()
-                    .any(|raw| with(other, raw))
+        let mends = |other: &ParamInfo, beside: i32| {
+            [other.min, other.max].into_iter().any(|raw| {
+                let mut stored = stored.clone();
+                set(&mut stored, info.id, beside);
+                set(&mut stored, other.id, raw);
+                accepts(address, &stored)
+            })
+        };
+        let all = params_at(address.raw()).iter();
+        let others = all.filter(|other| {
+            other.id != info.id && (mends(other, *raw) || mends(other, just_refused))
         });
         let section = if node.is_joint() { "joint" } else { "wheel" };
         let others: Vec<String> = others
