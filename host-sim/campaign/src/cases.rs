@@ -1,6 +1,6 @@
 //! Any case of a plan from its index.
 
-use wheeleg_config::plan::{Plan, Resolved, Resolver, Value};
+use wheeleg_config::plan::{Plan, Resolved, Resolver, Sets, Value};
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
@@ -119,7 +119,7 @@ impl<'a> Cases<'a> {
         let resolved = self.resolver.resolve(&values);
         let (id, seed) = identity(self.plan, &values, place, resolved.as_ref().ok());
         let setup = match resolved {
-            Ok(resolved) => checked(resolved),
+            Ok(resolved) => checked(self.plan, resolved),
             Err(error) => Err(problems(&error)),
         };
         Case {
@@ -132,13 +132,21 @@ impl<'a> Cases<'a> {
     }
 }
 
-/// What the simulator, too, asks of the faults.
-fn checked(resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
+/// What the simulator, too, asks of the faults; those that the plan adds stand in no other file.
+fn checked(plan: &Plan, resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
     let Resolved {
         scenario, robot, ..
     } = resolved;
     match faults::check(&scenario, &robot, &Nodes::default()) {
         Ok(()) => Ok((scenario, robot)),
-        Err(error) => Err(why(&error)),
+        Err(error) => {
+            let added = plan.factors.iter();
+            let added = added.filter(|factor| matches!(factor.sets, Sets::Fault(_)));
+            let names: Vec<String> = added.map(|f| format!("`factor.{}`", f.name)).collect();
+            Err(match names.as_slice() {
+                [] => why(&error),
+                _ => format!("{} (with {})", why(&error), names.join(" and ")),
+            })
+        }
     }
 }

@@ -492,6 +492,22 @@ fn all_bad_factors_are_told_at_once() {
         twice[0].contains("both set `robot.supply.droop`"),
         "{twice:?}"
     );
+    // A list holds its elements.
+    let listed = refused(
+        "[factor.a]\nparameter = \"robot.body.p4\"\nscale = true\ngrid = [1.01]\n\
+         [factor.b]\nparameter = \"robot.body.p4[0]\"\nscale = true\ngrid = [1.01]\n",
+    );
+    assert!(
+        listed[0].contains("both set `robot.body.p4[0]`"),
+        "{listed:?}"
+    );
+    let alone = refused(
+        "[factor.a]\nparameter = [\"robot.body.p4\", \"robot.body.p4[0]\"]\nscale = true\ngrid = [1.01]\n",
+    );
+    assert!(
+        alone[0].contains("`factor.a` sets `robot.body.p4[0]` twice"),
+        "{alone:?}"
+    );
 }
 
 #[test]

@@ -79,23 +79,31 @@ fn set_by(factor: &Factor) -> Vec<String> {
     }
 }
 
-/// Two factors that set one field: the later would win, unseen. `earlier` knows who sets what so far.
+/// Whether two paths are of one value: a list holds its elements.
+fn overlap(a: &str, b: &str) -> bool {
+    let (list, one) = if a.len() < b.len() { (a, b) } else { (b, a) };
+    let rest = one.strip_prefix(list);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+}
+
+/// One field that is set twice, by two factors or by one: the later would win, unseen. `earlier` knows who
+/// sets what so far.
 fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, &'a str>) {
-    let own = set_by(factor);
-    let found = own
-        .iter()
-        .find_map(|path| Some((path, *earlier.get(path)?)));
-    if let Some((path, other)) = found {
-        let span = span_of(r, factor);
-        let message = format!(
-            "`factor.{other}` and `factor.{}` both set `{path}`",
-            factor.name
-        );
-        r.problem(span, message, "set twice", None);
-    }
-    for path in own {
+    let mut found = None;
+    for path in set_by(factor) {
+        let mut both = earlier.iter();
+        let set = both.find(|(other, _)| overlap(other, &path));
+        found = found.or(set.map(|(_, name)| (path.clone(), *name)));
         earlier.entry(path).or_insert(&factor.name);
     }
+    let Some((path, other)) = found else { return };
+    let span = span_of(r, factor);
+    let name = &factor.name;
+    let message = match other == name {
+        true => format!("`factor.{name}` sets `{path}` twice"),
+        false => format!("`factor.{other}` and `factor.{name}` both set `{path}`"),
+    };
+    r.problem(span, message, "set twice", None);
 }
 
 /// One field that a factor sets, in all files that have it; what is wrong in one is not told of
