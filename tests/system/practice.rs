@@ -92,6 +92,9 @@ fn found_worse(summary: &Value) -> Vec<String> {
     let tests = summary["tests"].as_array().expect("a list");
     assert!(tests.len() >= 5, "{summary}");
     let mut worse = Vec::new();
+    if tests.iter().all(|test| test["after"]["stopped"] == true) {
+        worse.push("every move is stopped".to_owned());
+    }
     for test in tests {
         let motion = test["move"].as_str().expect("a name");
         let [before, after] = ["before", "after"].map(|when| &test[when]);
@@ -176,6 +179,12 @@ fn tuning_never_makes_an_axis_worse() {
     let size = [32.0, 16.0, 50.0];
     slow.extend(cylinder(size, 6.0, [25.0, 40.0], 5.0, [60.0, 5.0]));
     assert_eq!(tuned(HEAVY, &slow), 1, "slow valves");
+    // So much noise that the supervision stops every move, before and after.
+    let noisy = vec![
+        ("sensor.adc.bits", 8.0, "bit"),
+        ("sensor.adc.noise", 100.0, "LSB"),
+    ];
+    assert_eq!(tuned(BENCH, &noisy), 1, "noise");
     // These may come out either way, but never worse.
     tuned(HEAVY, &wide(30.0));
     tuned(

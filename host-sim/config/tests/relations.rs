@@ -121,9 +121,9 @@ const SMALL_RESERVOIR: &[Set] = &[("supply.reservoir", "10.0", "cm3")];
 #[rustfmt::skip]
 const EXAMPLES: &[Example] = &[
     example("hysteresis of the supply's contact", AXIS, &[], ("supply.switch_off", "{}", "Pa"), [551_326.0, 551_325.0], &["supply.switch_off", "supply.switch_on"]),
-    example("supply's contact", AXIS, &[], ("supply.switch_on", "{}", "Pa"), [701_326.0, 701_325.0], &["supply.switch_on", "supply.set_pressure"]),
+    example("supply's contact", AXIS, &[], ("supply.switch_on", "{}", "Pa"), [701_325.0, 701_324.0], &["supply.switch_on", "supply.set_pressure"]),
     example("hysteresis of the source's contact", ROBOT, &[], ("source_switch.off", "{}", "Pa"), [821_326.0, 821_325.0], &["source_switch.off", "source_switch.on"]),
-    example("source's contact", ROBOT, &[], ("source_switch.on", "{}", "bar"), [11.01326, 11.01325], &["source_switch.on", "supply.source_pressure"]),
+    example("source's contact", ROBOT, &[], ("source_switch.on", "{}", "bar"), [11.01325, 11.01324], &["source_switch.on", "supply.source_pressure"]),
     example("regulator", AXIS, &[], ("supply.set_pressure", "{}", "bar"), [11.01326, 11.01325], &["supply.set_pressure", "supply.source_pressure"]),
     example("filled reservoir", ROBOT, &[], ("supply.initial_pressure", "{}", "bar"), [11.01326, 11.01325], &["supply.initial_pressure", "supply.source_pressure"]),
     example("droop", AXIS, &[], ("supply.droop", "{}", "bar"), [6.0, 5.9999], &["supply.droop", "supply.set_pressure"]),
@@ -136,6 +136,7 @@ const EXAMPLES: &[Example] = &[
     example("trapped air A, vertical", ROBOT, &[], ("start.vertical.pressure_a", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_a", "supply.set_pressure"]),
     example("trapped air B, vertical", ROBOT, &[], ("start.vertical.pressure_b", "{}", "Pa"), [701_326.0, 701_325.0], &["start.vertical.pressure_b", "supply.set_pressure"]),
     example("density of the gas", AXIS, &[], ("gas.reference_density", "{}", "kg/m3"), [0.3, 1.185], &["gas.reference_density", "gas.gas_constant"]),
+    example("exponent", AXIS, &[], ("cylinder.exponent", "{}", "1"), [1.401, 1.4], &["cylinder.exponent", "gas.heat_capacity_ratio"]),
     example("rod", AXIS, &[], ("cylinder.rod", "{}", "mm"), [18.001, 18.0], &["cylinder.rod", "cylinder.bore"]),
     example("cushion", AXIS, &[("cylinder.stroke", "45.0", "mm")], ("end_stop.cushion_length", "{}", "mm"), [45.001, 45.0], &["end_stop.cushion_length", "cylinder.stroke"]),
     example("break-away", AXIS, &[], ("friction.static", "{}", "N"), [9.999, 10.0], &["friction.static", "friction.coulomb"]),

@@ -742,23 +742,25 @@ pub(super) fn profiles(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// A joint that is drawn in, and one that stands out for the gait, measure as settled.
+/// A joint that is drawn in, and one that stands out for the gait, measure as where they are.
 pub(super) fn measured(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);
     let out_mm = f.si(it.fields[6])? * 1e3;
     let tolerance_mm = f.si(it.fields[7])? * 1e3;
-    if measured[0] <= tolerance_mm && measured[1] >= out_mm - tolerance_mm {
+    let share = out_mm * 1e-3 / sensor.stroke_m;
+    let out = measured[0] + share * (measured[1] - measured[0]);
+    if measured[0].abs() <= tolerance_mm && (out - out_mm).abs() <= tolerance_mm {
         return None;
     }
     Some(Broken {
         figures: sensor.format(measured, "mm"),
         offers: vec![sensor.calibrated(f, it)],
         words: format!(
-            "allowed are up to {} mm with the rod in and from {} mm with it out, `homing.tolerance` \
-             from the pose",
+            "allowed are up to {} mm beside 0 with the rod in and beside {} mm in the pose, \
+             `homing.tolerance`",
             pretty(tolerance_mm),
-            pretty(out_mm - tolerance_mm)
+            pretty(out_mm)
         ),
     })
 }

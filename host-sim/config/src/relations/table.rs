@@ -73,9 +73,9 @@ const VOLUME: &str = "the piston would press the air before it to nothing in its
 pub const RELATIONS: &[Relation] = &[
     // Pressures fall from the source over the regulator to the surroundings.
     at_most("hysteresis of the supply's contact", &["supply.switch_off", "supply.switch_on"], HYSTERESIS),
-    at_most("supply's contact", &["supply.switch_on", "supply.set_pressure"], NO_CONTACT),
+    below("supply's contact", &["supply.switch_on", "supply.set_pressure"], NO_CONTACT),
     at_most("hysteresis of the source's contact", &["source_switch.off", "source_switch.on"], HYSTERESIS),
-    at_most("source's contact", &["source_switch.on", "supply.source_pressure"], NO_CONTACT),
+    below("source's contact", &["source_switch.on", "supply.source_pressure"], NO_CONTACT),
     at_most("regulator", &["supply.set_pressure", "supply.source_pressure"], REGULATOR),
     at_most("filled reservoir", &["supply.initial_pressure", "supply.source_pressure"], REGULATOR),
     law("droop", &["supply.droop", "supply.set_pressure", "gas.ambient_pressure"], "a regulator that would be fully open below the surroundings alone", laws::droop),
@@ -89,6 +89,7 @@ pub const RELATIONS: &[Relation] = &[
     at_most("trapped air B, vertical", &["start.vertical.pressure_b", "supply.set_pressure"], PRESSURE),
     law("density of the gas", &["gas.reference_density", "gas.reference_pressure", "gas.gas_constant", "gas.reference_temperature"], "no gas has this density at this pressure and temperature", laws::density),
     // A cylinder and its sensor.
+    at_most("exponent", &["cylinder.exponent", "gas.heat_capacity_ratio"], "air that is compressed would give more heat to the wall than it gets, or take it from a colder one"),
     relation("rod", &["cylinder.rod", "cylinder.bore"], "the air of chamber B acts on what the rod leaves of the piston", Rule::AtMost(ROD_MOST)),
     at_most("cushion", &["end_stop.cushion_length", "cylinder.stroke"], "a piston that begins in both cushions is braked everywhere"),
     relation("break-away", &["friction.static", "friction.coulomb"], "the force to break away is below that of sliding", Rule::AtLeast),

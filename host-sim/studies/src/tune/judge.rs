@@ -13,7 +13,8 @@
 //! | it settles at all | yes |
 //! | settling time, of a board that settles and rests | 0.25 s |
 //!
-//! A tuning that made any of them worse is refused: its parameters are not written.
+//! A tuning that made any of them worse is refused: its parameters are not written. So is one with which the
+//! supervision still stops every move.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -96,11 +97,22 @@ impl Worse {
     }
 }
 
-/// Everything that is worse after than before.
+/// Everything that is worse after than before, or as bad as can be.
 pub(super) fn worse(tests: &[Test]) -> Vec<Worse> {
+    let all_stopped = tests.iter().all(|test| test.after.stopped == Some(true));
     tests
         .iter()
-        .flat_map(|test| worse_of(test.motion, &test.before, &test.after))
+        .flat_map(|test| {
+            let still = all_stopped && test.before.stopped == Some(true);
+            let still = still.then_some(Worse {
+                motion: test.motion,
+                figure: Figure::Stopped,
+                before: 1.0,
+                after: 1.0,
+            });
+            let worse = worse_of(test.motion, &test.before, &test.after);
+            still.into_iter().chain(worse)
+        })
         .collect()
 }
 
