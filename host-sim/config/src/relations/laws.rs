@@ -538,11 +538,23 @@ fn reading_error(f: &Facts<'_>, [nonlinearity, noise, bits]: [&str; 3]) -> Optio
     Some(f.si(nonlinearity)? + NOISE_PEAKS * f.si(noise)? / f.si(bits)?.exp2())
 }
 
+/// So much noise that a reading is off by a share of the track at most, if any is little enough.
+fn less_noise(
+    f: &Facts<'_>,
+    [nonlinearity, noise, bits]: [&str; 3],
+    share: f64,
+) -> Option<Vec<Offer>> {
+    let most = (share - f.si(nonlinearity)?) * f.si(bits)?.exp2() / NOISE_PEAKS;
+    let most = (most * 1e3).floor() * 1e-3;
+    (most >= 0.0).then(|| f.offer(noise, Bound::UpTo, most))
+}
+
 /// What a joint board reads at both stops are codes that it allows.
 pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let (least, most) = (f.si(it.fields[4])?, f.si(it.fields[5])?);
-    let off = reading_error(f, [6, 7, 8].map(|i| it.fields[i]))?;
+    let reading = [6, 7, 8].map(|i| it.fields[i]);
+    let off = reading_error(f, reading)?;
     let codes = sensor.shares().map(|share| share * CODES);
     let beside = off * CODES;
     let is_held = [codes[0] - beside >= least, codes[1] + beside <= most];
@@ -551,7 +563,8 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     }
     // Of the track what the board allows, less what it may read beside.
     let (low, high) = (least / CODES + off, most / CODES - off);
-    let mut offers = Vec::new();
+    let room = f64::min(codes[0] - least, most - codes[1]) / CODES;
+    let mut offers: Vec<Vec<Offer>> = less_noise(f, reading, room).into_iter().collect();
     if !is_held[0] {
         offers.push(vec![Offer::new(
             f,
@@ -598,14 +611,18 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);
     let (least, most) = (f.si(it.fields[6])?, f.si(it.fields[7])?);
-    let off_mm = f.si(it.fields[4])? * reading_error(f, [8, 9, 10].map(|i| it.fields[i]))?;
+    let reading = [8, 9, 10].map(|i| it.fields[i]);
+    let full_scale_mm = f.si(it.fields[4])?;
+    let off_mm = full_scale_mm * reading_error(f, reading)?;
     if measured[0] - off_mm >= least && measured[1] + off_mm <= most {
         return None;
     }
     let range = format!("{} to {} mm", pretty(least), pretty(most));
     let mut offers = vec![sensor.calibrated(f, it)];
+    let room = f64::min(measured[0] - least, most - measured[1]) / full_scale_mm;
+    offers.extend(less_noise(f, reading, room));
     // Rounded to what people write; from a stop that is measured too low nothing follows.
-    let stroke_m = sensor.stroke_at(most - off_mm, f.si(it.fields[4])?, f.si(it.fields[5])?);
+    let stroke_m = sensor.stroke_at(most - off_mm, full_scale_mm, f.si(it.fields[5])?);
     let stroke_m = (stroke_m * 1e4).floor() * 1e-4;
     if stroke_m > 0.0 && stroke_m < sensor.stroke_m {
         offers.push(vec![Offer::new(f, it.fields[3], Bound::UpTo, stroke_m)]);
