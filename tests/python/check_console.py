@@ -429,7 +429,7 @@ def events_alone(page):
         return [...view.root.querySelectorAll("li")].map((line) => `${line.textContent.slice(4)}${line.hidden ? " (hidden)" : ""}${line.className === "bad" ? "" : " (plain)"}`).reverse();
     }""")
     wanted = ["first", "second", "third", "fourth"]
-    wanted += [f"{who} says why: first fault, {s} s ago: it is hot" for who, s in (("joints 1–2", "0.01"), ("joint 3", "0.25"))]
+    wanted += [f"{who} says why: first fault, {s} s ago: it is hot" for who, s in (("joints 1–2", "0.01"), ("joint 3 (left vertical)", "0.25"))]
     wanted += ["hold (tablet, revoked by owner)", "wheel 7 (left): faults cleared (plain)", "left foot leaves the ground (hidden) (plain)"]
     wanted += ["joints 1–2 says why: first fault, 0.004 s ago: it is hot", "stop (by “ctl”)"]
     expect(lines == wanted, f"the list of events: {lines}")
@@ -438,8 +438,8 @@ def events_alone(page):
     table = list(csv.DictReader(Path(download.value.path()).read_text().splitlines()))
     expect(len(table) == 12 and table[7]["holder"] == "tablet" and table[7]["revoked_by"] == "owner" and table[-1]["stopped_by"] == "“ctl”", f"the table of events: {table}")
     page.evaluate("document.getElementById('alone').remove()")
-    names = page.evaluate("import('/boards.js').then(({ titled }) => [[3], [7], [8], [1, 2]].map(titled))")
-    expect(names == ["Left vertical (board 3)", "Left wheel (board 7)", "Right wheel (board 8)", "Boards 1, 2"], f"boards by name: {names}")
+    names = page.evaluate("import('/boards.js').then(({ titled }) => [[3], [7], [8], [2, 1], [1, 2, 3, 4, 5, 6, 8]].map(titled))")
+    expect(names == ["Joint 3 (left vertical)", "Wheel 7 (left)", "Wheel 8 (right)", "Joints 1–2", "Joints 1–6, wheel 8 (right)"], f"boards by name: {names}")
 
 
 def board_table(page):
@@ -528,7 +528,7 @@ def space_fails(browser, console):
 
 def slider(page):
     """The slider of a joint asks for a stroke."""
-    knob = page.get_by_role("slider", name="Left vertical, stroke to ask for, mm")
+    knob = page.get_by_role("slider", name="Joint 3 (left vertical), stroke to ask for, mm")
     expect(becomes_ready(page), f"Ready before the slider: {page.inner_text('.answer')!r}")
     before = float(knob.input_value())
     knob.focus()
@@ -536,7 +536,7 @@ def slider(page):
         page.keyboard.press("ArrowLeft")
     wanted = float(knob.input_value())
     expect(abs(wanted - before) == 10, f"the slider went from {before} to {wanted}")
-    page.get_by_role("button", name="Send the stroke to Left vertical").click()
+    page.get_by_role("button", name="Send the stroke to Joint 3 (left vertical)").click()
     shown = f"asked {wanted:.1f}"
     try:
         page.wait_for_function("shown => document.querySelectorAll('.joint')[2].textContent.includes(shown)", arg=shown, timeout=5000)
@@ -699,6 +699,7 @@ def server_is_gone(page):
     for part in [".control", ".drive", ".try", ".form", "section[aria-label=Recording]", ".joints"]:
         count = page.locator(f"{part} :is(button, input, select):not([disabled]):visible").count()
         expect(count == 0, f"{count} things of {part} can be pressed without a server")
+    expect(page.locator(".fault p:visible").count() == 0, f"without a server a card asks for what cannot be pressed: {page.inner_text('.faults')!r}")
     page.keyboard.press("Space")
     expect("no connection" in page.inner_text(".answer"), f"Space without a server: {page.inner_text('.answer')!r}")
     page.keyboard.press("Escape")
@@ -760,9 +761,9 @@ def journey(browser, console, folder):
     page.select_option("select[aria-label=Target]", "joint3")
     expect(page.locator("input[aria-label=Value]").is_hidden(), "a fault without a value asks for one")
     inject = page.get_by_role("button", name="Inject")
-    done_until_seen(page, inject.click, ".fault:has-text('Board 3')", 5000)
+    done_until_seen(page, inject.click, ".fault:has-text('Joint 3')", 5000)
     remedy = page.inner_text(".faults")
-    expect("Left vertical (board 3)" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
+    expect("Joint 3 (left vertical)" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
     expect("Injected by you: pot-open:joint3. Press End" in remedy, f"what is in the way: {remedy!r}")
     told = page.inner_text(".try .answer")
     expect("Inject: done" in told, f"beside Inject: {told!r}")
@@ -783,7 +784,7 @@ def journey(browser, console, folder):
     expect(waits(page, "State", ["STOPPED"]), f"after Esc: {cell(page, 'State')}")
     page.wait_for_timeout(300)
     told = page.inner_text(".faults")
-    expect("Boards 1, 2, 3" in told, "equal faults of all boards are not one line")
+    expect("Joints 1–6, wheels 7–8" in told, "equal faults of all boards are not one line")
     expect(re.search(r"Stopped by you, at [0-9.]+ s", told) and "Remove the cause" not in told, f"who stopped: {told!r}")
     events(page)
     events_alone(page)
@@ -853,7 +854,7 @@ def lost_again(page):
     done_until_seen(page, lose, ".fault:has-text('You lost control')", 3000)
     done_until_seen(page, lose, ".fault:has-text('You lost control again')", 3000)
     told = page.inner_text(".faults")
-    expect(re.search(r"[0-9.]+ s after you had taken it", told) and "Left vertical (board 3)" in told, f"control that was lost again: {told!r}")
+    expect(re.search(r"[0-9.]+ s after you had taken it", told) and "Joint 3 (left vertical)" in told, f"control that was lost again: {told!r}")
     press(page, "Clear fault")
     page.wait_for_function("() => document.querySelector('.answer').textContent.includes('ClearFault: refused')", timeout=5000)
     told = page.inner_text(".answer")
@@ -896,7 +897,7 @@ def stopped_by_another(page, viewer):
     expect(answers(page, "Stand", READY_S) and waits(page, "State", ["ARMED"]), f"Ready after a stop: {page.inner_text('.answer')!r}")
 
 
-def air_is_lost(page):
+def air_is_lost(page, robot):
     """Who has no air is told how much there is, and what to look at."""
     expect(becomes_ready(page), f"Ready before air is lost: {page.inner_text('.answer')!r}")
     page.select_option("select[aria-label=Fault]", "tube-burst")
@@ -905,6 +906,8 @@ def air_is_lost(page):
         page.wait_for_selector(".fault:has-text('Supply pressure lost')", timeout=30000)
         told = page.inner_text(".faults")
         expect(re.search(r"Supply pressure lost: [0-9.]+ of 6.6 bar absolute", told) and "Check compressor" in told, f"lost air: {told!r}")
+        words = {one["hold"]: one for one in robot.get("faults")["holds"]}["supply_lost"]
+        expect(words["cause"] in told and words["remedy"] in told, f"a hold is not told in the words of the server: {told!r}, {words}")
         events = page.inner_text(".events")
         expect("fault tube-burst begins" in events, f"the event of a fault: {events[:300]!r}")
     except PageTimeout:
@@ -988,7 +991,7 @@ def main(program, folder, axe):
                 viewer.wait_for_selector(".joint")
                 undisturbed(page, robot, stopped_by_another, viewer)
                 viewer.context.close()
-                undisturbed(page, robot, air_is_lost)
+                undisturbed(page, robot, air_is_lost, robot)
             operator_leaves(page)
             console.end()
             repeats(program, console)

@@ -89,6 +89,8 @@ def tables(browser, report, name):
         return gone;
     }).map((box) => box.querySelector('th').textContent)""")
     expect(not lost, f"{name}: the first column scrolls away: {lost}")
+    first = page.evaluate("() => { const head = document.querySelector('header').firstElementChild; return [head.tagName, head.textContent]; }")
+    expect(first[0] == "H1" and first[1].rstrip().endswith("."), f"{name}: no verdict stands above the title, but {first}")
     words = page.inner_text("main")
     expect(not re.search(r"(^|\D)1 axes", words) and "≤ –" not in words, f"{name}: a count or a bound without sense")
     page.context.close()

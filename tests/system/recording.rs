@@ -107,6 +107,24 @@ fn a_server_that_does_not_start_leaves_the_keys_as_they_are() {
     served.end("TERM");
 }
 
+/// Whoever asks how the robot is reads of a stop first, and who pressed it.
+#[test]
+fn the_status_of_a_stopped_robot_begins_with_the_stop() {
+    let served = Served::new("");
+    served.until("ready", |state| state["ready"] == true);
+    assert_eq!(served.ctl(&["stop"]).status.code(), Some(0));
+    served.until("stopped", |state| state["emergency_stop"] == true);
+    let told = served.ctl(&["status"]);
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(told.starts_with("STOPPED, wheeleg, "), "{told}");
+    assert!(
+        told.contains("stopped by a program, over the HTTP API"),
+        "{told}"
+    );
+    assert!(told.contains("joint 3 (left vertical)"), "{told}");
+    assert_eq!(served.end("TERM").0, Some(143));
+}
+
 fn replay(folder: &Path) -> (Option<i32>, Value) {
     let output = Command::new(program::path())
         .args(["replay", "--json"])

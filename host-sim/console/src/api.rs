@@ -456,8 +456,9 @@ async fn events(
 async fn faults(State(server): State<Arc<Server>>) -> Response {
     let hub = &server.context.hub;
     let (injectable, active) = (&hub.catalogue.faults_json, json!(hub.active_faults()));
+    let holds = &hub.catalogue.holds_json;
     json_text(format!(
-        r#"{{"injectable":{injectable},"active":{active}}}"#
+        r#"{{"injectable":{injectable},"active":{active},"holds":{holds}}}"#
     ))
 }
 

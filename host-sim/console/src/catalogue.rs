@@ -7,6 +7,7 @@ use wheeleg_config::faults::KINDS;
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits};
 use wheeleg_master::command::{CommandCode, TABLE};
 use wheeleg_telemetry::channels;
+use wheeleg_telemetry::event::holds;
 
 /// What the arguments of a command usually are, for who leaves some of them out: forms begin with it. Few
 /// commands have such values: a slow walk straight ahead on level ground.
@@ -43,6 +44,8 @@ pub(crate) struct Catalogue {
     pub(crate) commands_json: String,
     /// The faults that can begin in a robot that runs.
     pub(crate) faults_json: String,
+    /// Why all axes may hold, in words.
+    pub(crate) holds_json: String,
 }
 
 impl Catalogue {
@@ -56,6 +59,7 @@ impl Catalogue {
             channels_json: json!({ "layout": layout, "channels": channels }).to_string(),
             commands_json: json!({ "hash": hash, "commands": commands }).to_string(),
             faults_json: Value::Array(fault_list()).to_string(),
+            holds_json: Value::Array(hold_list()).to_string(),
             layout,
             commands: hash,
         }
@@ -180,6 +184,18 @@ fn fault_list() -> Vec<Value> {
             "value": row.value.map(|v| json!({
                 "unit": v.unit, "min": v.min, "max": v.max, "default": v.default, "description": v.doc,
             })),
+        })
+    });
+    list.collect()
+}
+
+fn hold_list() -> Vec<Value> {
+    let list = holds().map(|(name, words)| {
+        json!({
+            "hold": name,
+            "cause": words.cause,
+            "consequence": words.consequence,
+            "remedy": words.remedy,
         })
     });
     list.collect()

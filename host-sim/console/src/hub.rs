@@ -20,7 +20,7 @@ use wheeleg_config::faults::FaultSpec;
 use wheeleg_telemetry::channels;
 
 use self::history::{History, Reader};
-use self::stops::Stopped;
+use self::stops::{AskedStops, Stopped};
 use crate::catalogue::Catalogue;
 use crate::close::Close;
 use crate::foxglove::Viewers;
@@ -81,6 +81,8 @@ struct Client {
     subscriptions: BTreeMap<u16, Subscription>,
     /// It is on the robot's own computer.
     is_local: bool,
+    /// It writes parameters for a viewer, and asks nobody to make room for it.
+    writes: bool,
 }
 
 /// A request that is not at its end.
@@ -153,8 +155,8 @@ struct Inner {
     clients: BTreeMap<ClientId, Client>,
     viewers: Viewers,
     desk: Desk,
-    /// When the holder of the control was told last that somebody asks for it.
-    asked: Option<Instant>,
+    /// The holder of the control that was told last that somebody asks for it, and when.
+    asked: Option<(ClientId, Instant)>,
     /// Name of the client that was in control last.
     last_holder: String,
     /// Its connection has ended while it was in control.
@@ -169,6 +171,7 @@ struct Inner {
     faults: Vec<(FaultSpec, u64)>,
     /// The stop that is latched, or has just been asked for.
     stopped: Option<Stopped>,
+    asked_stops: AskedStops,
     status: Option<Status>,
     failure: Option<String>,
     state_due: Instant,
@@ -195,6 +198,7 @@ pub(crate) struct Hub {
     pub(crate) robot_name: String,
     recordings: Arc<record::Shared>,
     stops: watch::Sender<Stops>,
+    asked_stops: AskedStops,
 }
 
 /// How far stops have come.
@@ -216,6 +220,7 @@ impl Hub {
         viewers: Viewers,
     ) -> (Arc<Self>, std::thread::JoinHandle<()>) {
         let now = Instant::now();
+        let asked_stops = AskedStops::default();
         let hub = Self {
             inner: Mutex::new(Inner {
                 robot: Channels {
@@ -238,6 +243,7 @@ impl Hub {
                 events: VecDeque::with_capacity(EVENTS),
                 faults: Vec::new(),
                 stopped: None,
+                asked_stops: asked_stops.clone(),
                 status: None,
                 failure: None,
                 state_due: now,
@@ -248,6 +254,7 @@ impl Hub {
             robot_name,
             recordings,
             stops: watch::Sender::new(Stops::default()),
+            asked_stops,
         };
         (Arc::new(hub), robot.thread)
     }
@@ -298,6 +305,7 @@ impl Hub {
                 outbox: Arc::clone(outbox),
                 subscriptions: BTreeMap::new(),
                 is_local,
+                writes: false,
             },
         );
         let now_us = inner.status.map_or(0, |status| status.now_us);
@@ -370,9 +378,9 @@ impl Hub {
 
     /// Stops the robot; the master time at which it was confirmed, or `None` after 200 ms.
     pub(crate) async fn stop(&self, by: StopBy) -> Option<u64> {
-        // First the stop, which waits for no lock, and then its name.
-        let number = self.signals.stop();
-        self.inner().stopped_by(by, number);
+        // The stop waits for nothing that takes long.
+        let number = self.asked_stops.stop(&self.signals, by);
+        self.inner().name_stops();
         let mut stops = self.stops.subscribe();
         let confirmed = stops.wait_for(|stops| stops.taken >= number && stops.sent);
         let confirmed = tokio::time::timeout(Duration::from_millis(200), confirmed).await;
@@ -434,6 +442,7 @@ impl Hub {
     pub(crate) fn turn(&self) {
         let now = Instant::now();
         let mut inner = self.inner();
+        inner.name_stops();
         let mut newest_status = None;
         while let Ok(report) = inner.robot.reports.pop() {
             match report {

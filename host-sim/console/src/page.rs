@@ -112,7 +112,51 @@ fn on_disk(
 
 #[cfg(test)]
 mod tests {
+    use wheeleg_master::dispatcher::{Refusal, Reject};
+    use wheeleg_telemetry::PLACES;
+    use wheeleg_telemetry::event::reject_name;
+    use wheeleg_telemetry::messages::reject;
+
     use super::*;
+
+    fn text(name: &str) -> String {
+        let page = Page::new(None).expect("built in");
+        let (_, bytes) = page.get(name).expect("a file of the page");
+        String::from_utf8(bytes.to_vec()).expect("text")
+    }
+
+    /// What is at the boards is written in the page once more: as everywhere else.
+    #[test]
+    fn the_page_has_the_boards_where_the_program_has_them() {
+        let places: Vec<String> = PLACES.iter().map(|place| format!("{place:?}")).collect();
+        let line = format!("const PLACES = [{}];", places.join(", "));
+        assert!(text("boards.js").contains(&line), "{line}");
+    }
+
+    /// The page says what to press where a terminal names commands; why, both say in the same words.
+    #[test]
+    fn the_page_gives_the_same_reasons_as_a_terminal() {
+        let words = text("words.js");
+        for refusal in [
+            Refusal::NotArmed,
+            Refusal::NotDisarmed,
+            Refusal::Moving,
+            Refusal::NotMoving,
+            Refusal::Latched,
+            Refusal::NoAir,
+            Refusal::Interrupted,
+        ] {
+            let refusal = Reject::Refused(refusal);
+            let name = reject_name(&refusal);
+            let line = words
+                .lines()
+                .find(|line| line.trim_start().starts_with(&format!("{name}: (")));
+            let line = line.unwrap_or_else(|| panic!("words.js has no words for {name}"));
+            let told = reject(&refusal);
+            let why = told.split([':', ';']).next().unwrap_or_default();
+            assert!(line.contains(why), "{why}: {line}");
+        }
+    }
 
     #[test]
     fn names_of_the_table_and_nothing_else() {

@@ -2,16 +2,40 @@
 import { html, say, sign } from "./dom.js";
 
 export const LINKS = [1, 2, 3, 4, 5, 6, 7, 8].map((board) => `/link/${board}`);
-const NAMES = ["left yaw", "left horizontal", "left vertical", "right yaw", "right horizontal", "right vertical", "left wheel", "right wheel"];
+/** Where the boards are; a test holds it against the list of the program. */
+const PLACES = ["left yaw", "left horizontal", "left vertical", "right yaw", "right horizontal", "right vertical", "left", "right"];
+const FIRST_WHEEL = 7;
 
 /** What is at a board. @param {number} board */
-export const named = (board) => NAMES[board - 1];
+export const place = (board) => PLACES[board - 1];
 
-/** Boards at the begin of a sentence: one by its name, more by their numbers. @param {number[]} boards */
+/** A board as texts of events name it. @param {number} board */
+export const called = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
+
+/** The same, and where it is. @param {number} board */
+export const named = (board) => `${called(board)} (${place(board)})`;
+
+/** Boards as a person would list them: "joints 1–6, wheel 7 (left)". @param {number[]} boards */
+export function listed(boards) {
+  const runs = (of) => {
+    /** @type {number[][]} */
+    const found = [];
+    for (const board of of) {
+      const last = found[found.length - 1];
+      if (last && board === last[1] + 1) last[1] = board;
+      else found.push([board, board]);
+    }
+    return found.map(([a, b]) => (a === b ? `${a}` : `${a}–${b}`)).join(", ");
+  };
+  const several = (kind, of) => (of.length > 1 ? `${kind} ${runs(of)}` : of.map(named).join());
+  const sorted = [...boards].sort((a, b) => a - b);
+  return [several("joints", sorted.filter((b) => b < FIRST_WHEEL)), several("wheels", sorted.filter((b) => b >= FIRST_WHEEL))].filter(Boolean).join(", ");
+}
+
+/** Boards at the begin of a sentence. @param {number[]} boards */
 export function titled(boards) {
-  if (boards.length > 1) return `Boards ${boards.join(", ")}`;
-  const name = named(boards[0]);
-  return `${name[0].toUpperCase()}${name.slice(1)} (board ${boards[0]})`;
+  const text = listed(boards);
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
 }
 /** What makes a frame unsound, each counted by the board. */
 const UNSOUND = ["overflow", "truncated", "short", "version", "length", "address"];
@@ -20,9 +44,9 @@ const HEADS = ["Board", "Mode", "Faults", "Sound frames", "CRC errors", "Other e
 /** Chips and table. */
 export function boardsView() {
   const chips = html("ol", { class: "boards" });
-  const rows = NAMES.map((name, i) => {
+  const rows = PLACES.map((_, i) => {
     const cells = HEADS.slice(1).map(() => html("td", { class: "num" }, "–"));
-    return { cells, root: html("tr", {}, html("th", { scope: "row" }, `${i + 1} ${name}`), cells) };
+    return { cells, root: html("tr", {}, html("th", { scope: "row" }, named(i + 1)), cells) };
   });
   const table = html("table", { class: "boardtable" }, html("thead", {}, html("tr", {}, HEADS.map((head) => html("th", { scope: "col" }, head)))), html("tbody", {}, rows.map((row) => row.root)));
   const more = html("details", {}, html("summary", {}, "Table"), html("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of boards" }, table));
@@ -37,7 +61,7 @@ export function boardsView() {
       chips.replaceChildren(
         ...state.boards.map((b) => {
           const bad = !b.present || b.faults.length > 0;
-          return html("li", { class: bad ? "bad" : "", title: NAMES[b.address - 1] }, html("b", {}, String(b.address), sign(bad ? "alarm" : "met")), html("span", {}, b.present ? b.mode : "missing"));
+          return html("li", { class: bad ? "bad" : "", title: named(b.address) }, html("b", {}, String(b.address), sign(bad ? "alarm" : "met")), html("span", {}, b.present ? b.mode : "missing"));
         }),
       );
       for (const b of state.boards) {

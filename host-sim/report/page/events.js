@@ -1,6 +1,7 @@
 // The events of the robot, the newest on top: sieved by kind, board and text, and saved as they were
 // recorded. What several boards tell of one cause is one line, as on a terminal.
 import { html, say, fixed } from "./dom.js";
+import { called, listed, named } from "./boards.js";
 import { save } from "./save.js";
 import { E_STOP, stopper } from "./words.js";
 
@@ -18,32 +19,7 @@ const CONTACT = "contact";
 /** A board's own account of a stop tells no more than the stop itself. */
 const DIAGNOSIS = "diagnosis";
 const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
-const FIRST_WHEEL = 7;
 const COLUMNS = ["t_ns", "kind", "code", "detail", "board", "fault", "command", "holder", "revoked_by", "stopped_by", "text"];
-
-/** A board as texts of events name it. @param {number} board */
-const name = (board) => `${board < FIRST_WHEEL ? "joint" : "wheel"} ${board}`;
-
-/** On which side a wheel is; a joint has a name of its own. @param {number} board */
-const side = (board) => (board < FIRST_WHEEL ? "" : board === FIRST_WHEEL ? " (left)" : " (right)");
-
-/** Boards as a person would list them: "joints 1–6, wheel 7". @param {number[]} boards */
-function named(boards) {
-  const listed = (one, several, of) => {
-    /** @type {number[][]} */
-    const runs = [];
-    for (const board of of) {
-      const last = runs[runs.length - 1];
-      if (last && board === last[1] + 1) last[1] = board;
-      else runs.push([board, board]);
-    }
-    const text = runs.map(([a, b]) => (a === b ? `${a}` : `${a}–${b}`)).join(", ");
-    return of.length > 0 && `${of.length > 1 ? several : one} ${text}${of.length === 1 ? side(of[0]) : ""}`;
-  };
-  const sorted = [...boards].sort((a, b) => a - b);
-  const split = [listed("joint", "joints", sorted.filter((b) => b < FIRST_WHEEL)), listed("wheel", "wheels", sorted.filter((b) => b >= FIRST_WHEEL))];
-  return split.filter(Boolean).join(", ");
-}
 
 /** A field of a table, in quotes where it needs them. @param {any} value */
 function cell(value) {
@@ -65,12 +41,12 @@ export function eventsView(own = () => "") {
   const missing = html("p", { class: "effect bad", role: "status", hidden: true });
   const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
   const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_LOG }, "all but logs, contacts"), html("option", { value: "" }, "every kind"));
-  const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, `${name(b)}${side(b)}`)));
+  const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, named(b))));
   const words = html("input", { type: "search", "aria-label": "Events whose text has", placeholder: "text", size: 8, oninput: sieve });
   const count = html("span", { class: "effect", role: "status" });
   const table = html("button", { class: "btn", type: "button", onclick: () => save("wheeleg-events.csv", "text/csv", csv()) }, "Save events as CSV");
 
-  const shown = (line) => `${line.before}${line.boards.length > 0 ? named(line.boards) : ""}${line.after}`;
+  const shown = (line) => `${line.before}${listed(line.boards)}${line.after}`;
   function fits(line) {
     const { kind } = line.events[0];
     const wanted = words.value.trim().toLowerCase();
@@ -98,9 +74,9 @@ export function eventsView(own = () => "") {
     newest = event.number;
     if (![...kinds.options].some(({ value }) => value === event.kind)) kinds.append(html("option", { value: event.kind }, event.kind));
     // Where its text names the board, the same of another board differs in the name alone.
-    const at = event.board > 0 ? event.text.indexOf(name(event.board)) : -1;
+    const at = event.board > 0 ? event.text.indexOf(called(event.board)) : -1;
     const before = at < 0 ? event.text : event.text.slice(0, at);
-    const after = at < 0 ? "" : event.text.slice(at + name(event.board).length);
+    const after = at < 0 ? "" : event.text.slice(at + called(event.board).length);
     /** @param {Line} line */
     const alike = (line) => {
       const [other] = line.events;

@@ -1,21 +1,11 @@
 // Faults on the console's page: what is wrong with the robot, and what to do about it; and faults that
 // somebody tries on a simulated one.
 import { html, say, sign, fixed } from "./dom.js";
-import { named, titled } from "./boards.js";
+import { place, titled } from "./boards.js";
 import { E_STOP, filled, stopper } from "./words.js";
 
 /** Boards by their address from 1 on, as the target of a fault names them. */
 const BOARDS = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8"];
-const GO_ON = "press Clear fault and Ready";
-/** Why all axes hold although no board has a fault, and what to do. @type {Object<string, [string, string]>} */
-const HOLDS = {
-  operator_lost: ["Operator lost: the robot holds.", "Press Take control, Clear fault and Ready."],
-  supply_lost: ["Supply pressure lost", `Check compressor, hose and regulator; once the air is back, ${GO_ON}.`],
-  board_lost: ["A board does not answer: the robot holds.", `Check its cable and its power, then ${GO_ON}.`],
-  board_disarmed: ["A board has restarted: the robot holds.", `Check its power, then ${GO_ON}.`],
-  layer_one_stalled: ["The gait sent nothing for 0.1 s: a walk is brought to a stand, all else holds.", `To go on, ${GO_ON}.`],
-  layer_one_gone: ["The gait does not come back: the robot holds.", `To go on, ${GO_ON}.`],
-};
 const LOST = "You saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
 /** Who loses control again so soon has a computer that is too slow for it. */
 const TOO_SLOW = "Close other programs, or drive from another computer.";
@@ -57,10 +47,10 @@ export class Pauses {
   }
 }
 
-/** A target by the name that the page has for it. @param {string} place */
-function placed(place) {
-  const board = BOARDS.indexOf(place) + 1;
-  return board === 0 ? place : `${place}: ${named(board)}`;
+/** A target, and where it is. @param {string} target */
+function placed(target) {
+  const board = BOARDS.indexOf(target) + 1;
+  return board === 0 ? target : `${target}: ${place(board)}`;
 }
 
 /** Injected faults that act on one of these boards, or on no board of its own. @param {string[]} faults @param {number[]} boards */
@@ -81,8 +71,14 @@ function told({ holder, revoked_by, gone }) {
  * @typedef {{at_ms: number, kept_ms: number, times: number, why: string}} Loss */
 /** @typedef {{session: string, looks: boolean, air_bar: number, full_bar: number, lost: Loss | null}} Here of this page, and what it knows of the air */
 
+/** Why all axes may hold, in the words of the server. @typedef {{hold: string, cause: string, consequence: string | null, remedy: string | null}} Hold */
+
 /** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault */
 export function faultsView(ours) {
+  /** @type {Map<string, Hold>} */
+  let holds = new Map();
+  /** The newest event of a hold, with the board that it is about, if it is about one. */
+  let newest = { number: 0, detail: "", board: 0 };
   const list = html("ul", { class: "faults" });
   /** The newest loss of an operator. @type {import("./events.js").RobotEvent | null} */
   let loss = null;
@@ -100,13 +96,13 @@ export function faultsView(ours) {
   }
   /** A robot that holds, and no board says why. @param {any} state @param {Here} here @param {boolean} alone nothing else is told */
   function held(state, here, alone) {
-    const [cause, remedy] = HOLDS[state.hold] ?? [`All axes hold: ${state.hold.replaceAll("_", " ")}.`, `Fix what the boards and events report, then ${GO_ON}.`];
+    const { cause, consequence, remedy } = holds.get(state.hold) ?? { cause: `All axes hold: ${state.hold.replaceAll("_", " ")}`, consequence: null, remedy: null };
     const lost = state.hold === "operator_lost";
-    const missing = state.boards.filter((b) => !b.present).map((b) => b.address);
-    let title = cause;
-    if (state.hold === "supply_lost") title = `${cause}${filled(here) && `: ${filled(here)}`}. The robot holds.`;
-    if (state.hold === "board_lost" && missing.length > 0) title = `${titled(missing)}: no answer. The robot holds.`;
-    const next = here.looks ? `Whoever has the control key must go on. ${WATCHING}` : remedy;
+    const missing = state.hold === "board_lost" ? state.boards.filter((b) => !b.present).map((b) => b.address) : [];
+    const of = missing.length > 0 || newest.board === 0 || newest.detail !== state.hold ? missing : [newest.board];
+    const more = consequence ?? (state.hold === "supply_lost" ? filled(here) : "");
+    const title = `${of.length > 0 ? `${titled(of)}: ` : ""}${cause}${more && `: ${more}`}. The robot holds.`;
+    const next = here.looks ? `Whoever has the control key must go on. ${WATCHING}` : `${remedy ? `${remedy} Then press` : "To go on, press"} Clear fault and Ready.`;
     return card(title, lost ? `${whyLost(here)} ${next}` : next, alone && !lost ? state.faults : []);
   }
   /** A stop that somebody pressed. @param {any} state @param {Here} here @param {number[]} boards */
@@ -119,8 +115,21 @@ export function faultsView(ours) {
   }
   return {
     root: html("section", { class: "panel faultlist", "data-live": true }, html("h2", {}, "Faults"), list),
+    /** @param {Hold[]} all */
+    know(all) {
+      holds = new Map(all.map((one) => [one.hold, one]));
+      shown = "";
+    },
+    /** Nothing can be pressed any more. */
+    end() {
+      for (const remedy of list.querySelectorAll("p")) remedy.hidden = true;
+    },
     /** @param {import("./events.js").RobotEvent} event */
     event(event) {
+      if (event.code === "hold" && event.number > newest.number) {
+        newest = { number: event.number, detail: event.detail, board: event.board };
+        shown = "";
+      }
       if (event.code !== "hold" || event.detail !== "operator_lost" || event.number <= (loss?.number ?? 0)) return;
       loss = event;
       shown = "";
@@ -164,7 +173,7 @@ export function faultsToTry(command, next) {
   function choose() {
     const { places, value: number, effect: what } = chosen();
     const before = target.value;
-    target.replaceChildren(...places.map((place) => html("option", { value: place, selected: place === before }, placed(place))));
+    target.replaceChildren(...places.map((one) => html("option", { value: one, selected: one === before }, placed(one))));
     target.hidden = places.length === 0;
     value.hidden = !number;
     value.value = "";

@@ -10,8 +10,8 @@ const NO_READING = new Set([32, 33]);
 /** Whether a board says that its sensor gives no reading. @param {any} about of the state */
 export const isBlind = (about) => (about?.faults ?? []).some((f) => NO_READING.has(f.number));
 
-/** @param {string} name @param {number} board @param {(stroke_mm: number) => void} ask gives the command */
-export function jointCard(name, board, ask) {
+/** @param {string} name @param {(stroke_mm: number) => void} ask gives the command */
+export function jointCard(name, ask) {
   const picture = svg("svg", { viewBox: "0 0 260 48", class: "cyl", role: "img" });
   const title = svg("title", {}, picture);
   svg("rect", { x: 14, y: 9, width: 200, height: 22, class: "bed" }, picture);
@@ -36,7 +36,7 @@ export function jointCard(name, board, ask) {
     touched = true;
     say(wanted, `${slider.value} mm`);
   });
-  const root = html("article", { class: "panel joint", "data-live": true }, html("h2", {}, `${name} `, html("small", {}, `board ${board}`)), html("p", {}, value, side), picture, html("div", { class: "ask-for" }, slider, wanted, send));
+  const root = html("article", { class: "panel joint", "data-live": true }, html("h2", {}, name), html("p", {}, value, side), picture, html("div", { class: "ask-for" }, slider, wanted, send));
   return {
     root,
     /** Whether who looks may drive. @param {boolean} drives */

@@ -125,7 +125,7 @@ export class Link {
     });
     socket.onclose = (close) => this.end(ENDS[close.code] ?? "The connection has ended");
     socket.onmessage = (message) => (typeof message.data === "string" ? this.told(JSON.parse(message.data)) : this.samples(message.data));
-    return { robot, commands: commands.commands, faults: faults.injectable };
+    return { robot, commands: commands.commands, faults: faults.injectable, holds: faults.holds };
   }
 
   /** One message of the handshake; true when it is over. */

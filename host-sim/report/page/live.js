@@ -4,7 +4,7 @@ import { reliefHeights } from "./ground.js";
 import { sideView, topView, footView } from "./robot.js";
 import { Link, Refused } from "./link.js";
 import { HZ, Scope } from "./scope.js";
-import { LINKS, boardsView } from "./boards.js";
+import { LINKS, boardsView, titled } from "./boards.js";
 import { Pauses, faultsToTry, faultsView } from "./faults.js";
 import { driver } from "./drive.js";
 import { isBlind, jointCard } from "./joint.js";
@@ -34,7 +34,7 @@ const AIR_MS = 90000;
 const ASK_AIR_MS = 2000;
 /** In a list of plain questions and answers: how often it is looked at. */
 const LOOK_MS = 100;
-const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
+const JOINTS = [1, 2, 3, 4, 5, 6].map((board) => titled([board]));
 const WHEELS = ["/wheel/7", "/wheel/8"];
 const AIR = "/supply";
 
@@ -142,15 +142,21 @@ async function getReady() {
 // ---- stop ----
 /** A stop that is not answered for so long is not confirmed. */
 const UNCONFIRMED_MS = 200;
+/** How often STOP was pressed. */
+let pressed = 0;
 const stopButton = html("button", { class: "stop", type: "button", onclick: stop }, html("b", {}, "STOP"), html("kbd", { class: "key" }, "Esc"));
 async function stop() {
   byHand.letGo();
   commanded += 1;
+  pressed += 1;
+  const turn = pressed;
   if (!link) return unconfirmed();
   const timer = setTimeout(unconfirmed, UNCONFIRMED_MS);
   const given = await link.stop();
   clearTimeout(timer);
   if (given.status !== "done") return unconfirmed();
+  // It says nothing of one that was pressed after it.
+  if (turn !== pressed) return;
   alarm.hidden = true;
   tell("STOP", given);
 }
@@ -236,7 +242,7 @@ async function toggleSpace() {
 }
 
 // ---- joints ----
-const joints = JOINTS.map((name, i) => jointCard(name, i + 1, (stroke) => command("JointReference", { joint: i + 1, stroke })));
+const joints = JOINTS.map((name, i) => jointCard(name, (stroke) => command("JointReference", { joint: i + 1, stroke })));
 
 // ---- faults, boards, events ----
 const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]), () => clear);
@@ -397,7 +403,7 @@ addEventListener("pagehide", leaves);
 addEventListener("beforeunload", (event) => mine() && stepping() && event.preventDefault());
 
 // ---- the page ----
-function build({ robot, commands: list, faults: injectable }) {
+function build({ robot, commands: list, faults: injectable, holds }) {
   ({ drawing, relief } = robot);
   full_bar = robot.full_bar ?? NaN;
   views = { side: sideView(pictures.side, robot.drawing, relief ? reliefHeights(relief) : undefined), top: topView(pictures.top, robot.drawing), feet: [footView(pictures.left, "Left"), footView(pictures.right, "Right")] };
@@ -411,6 +417,7 @@ function build({ robot, commands: list, faults: injectable }) {
   which.value = "JointReference";
   showFields();
   toTry.offer(injectable);
+  faults.know(holds);
   byHand.begin(list.find((c) => c.name === "Walk")?.arguments ?? []);
   page.replaceChildren(
     html(
@@ -583,6 +590,7 @@ const listener = {
     lost = `${why}. What is shown is old, and nothing is sent any more; reload the page to look again.`;
     link = null;
     permit();
+    faults.end();
   },
 };
 

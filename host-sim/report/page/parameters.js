@@ -1,5 +1,6 @@
 // Parameters of the boards: a table of one board. A value is written, read back, and then shown; to save is apart.
 import { html, say } from "./dom.js";
+import { titled } from "./boards.js";
 
 /** @typedef {(name: string, args: Object<string, any>) => Promise<boolean>} Command */
 
@@ -9,7 +10,7 @@ const number = (value) => String(value).replace("-", "−");
 /** @param {Command} command gives a command, and says whether it was done
  *  @param {() => Promise<any>} look what the server knows of the parameters */
 export function parametersView(command, look) {
-  const which = html("select", { "aria-label": "Board", onchange: build }, [1, 2, 3, 4, 5, 6, 7, 8].map((n) => html("option", { value: n }, `Board ${n}`)));
+  const which = html("select", { "aria-label": "Board", onchange: build }, [1, 2, 3, 4, 5, 6, 7, 8].map((n) => html("option", { value: n }, titled([n]))));
   const sieve = html("input", { type: "search", "aria-label": "Parameters whose name has", placeholder: "name", size: 8, oninput: filter });
   const read = html("button", { class: "btn", type: "button", onclick: readShown }, "Read");
   const save = html("button", { class: "btn", type: "button", onclick: () => command("SaveParameters", { board: board() }) }, "Save on the board");

@@ -48,8 +48,8 @@ function showMotion(place, motion, player) {
   };
   const read = {
     phase: reading("Phase"),
-    horizontal: reading("Left horizontal"),
-    vertical: reading("Left vertical"),
+    horizontal: reading("Joint 2 (left horizontal)"),
+    vertical: reading("Joint 3 (left vertical)"),
     travel: reading("Travelled"),
     air: reading("Air, absolute"),
   };

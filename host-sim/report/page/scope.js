@@ -1,6 +1,7 @@
 // Plots of a live robot: any signals, over the last seconds. A cursor is linked over all of them; a
 // drag zooms, a double click shows everything again; frozen, they stay as they are while the robot
 // goes on. A signal is kept from the instant at which its plot was added.
+import { titled } from "./boards.js";
 import { html, say } from "./dom.js";
 import { Player } from "./player.js";
 import { picture } from "./picture.js";
@@ -23,7 +24,7 @@ const ASKED = "#0072B2";
 /** @typedef {{topic: string, field: string, label: string, colour: string}} Trace */
 /** @typedef {{name: string, unit: string, least: [number, number], traces: Trace[]}} Choice */
 
-const JOINTS = ["Left yaw", "Left horizontal", "Left vertical", "Right yaw", "Right horizontal", "Right vertical"];
+const JOINTS = [1, 2, 3, 4, 5, 6].map((board) => titled([board]));
 
 /** What is usually looked at. @returns {Choice[]} */
 function usual() {
@@ -115,7 +116,7 @@ export class Scope {
     this.list.addEventListener("pointerenter", () => (this.hovered = true));
     this.list.addEventListener("pointerleave", () => (this.hovered = false));
     this.root = html("section", { class: "panel scope", "data-live": true, "aria-label": "Plots" }, html("header", {}, html("h2", {}, "Plots"), add, span, this.freeze, table, drawn, this.note), this.list);
-    this.add(known.find(({ name }) => name === "Left vertical, stroke") ?? known[0]);
+    this.add(known.find(({ name }) => name === `${JOINTS[2]}, stroke`) ?? known[0]);
   }
 
   chosen(select) {

@@ -4,7 +4,8 @@
 use serde::Serialize;
 use wheeleg_master::event::HoldReason;
 use wheeleg_protocol::{Address, Fault};
-use wheeleg_telemetry::event::hold_name;
+use wheeleg_telemetry::event::{hold_name, hold_words_of};
+use wheeleg_telemetry::messages::within;
 use wheeleg_telemetry::{Event, EventCode, EventKind, finding_of_name};
 
 /// What comes so soon after a fault may follow from it, ns.
@@ -80,49 +81,11 @@ pub(crate) struct Cause {
     pub(crate) headline: String,
     /// What the robot does because of it, where that is not what every fault of a board does.
     pub(crate) consequence: Option<&'static str>,
-    pub(crate) remedy: Option<&'static str>,
+    pub(crate) remedy: Option<String>,
 }
 
 /// What the robot does when the master holds.
 const ALL_HOLD: &str = "all axes hold";
-
-/// Headline, consequence and remedy of a HOLD that no board has given, by its name in the log.
-fn hold(name: &str) -> Option<(&'static str, &'static str, Option<&'static str>)> {
-    let known = [
-        (
-            HoldReason::SupplyLost,
-            "Supply pressure lost",
-            ALL_HOLD,
-            Some("Check compressor, hose and regulator, then clear and arm."),
-        ),
-        (
-            HoldReason::LayerOneStalled,
-            "Layer 1 gave nothing for 100 ms",
-            "a walk is brought to a stand by its behaviours",
-            Some("Clear and arm."),
-        ),
-        (
-            HoldReason::LayerOneGone,
-            "Layer 1 does not come back",
-            "no leg answers the ground any more",
-            Some("Clear and arm."),
-        ),
-        (
-            HoldReason::OperatorLost,
-            "The operator in control is gone",
-            ALL_HOLD,
-            Some("Reconnect, take the control, then clear and arm."),
-        ),
-        (
-            HoldReason::EmergencyStop,
-            "Emergency stop",
-            ALL_HOLD,
-            Some("Remove the cause, then clear and arm."),
-        ),
-    ];
-    let found = known.into_iter().find(|row| hold_name(&row.0) == name);
-    found.map(|(_, headline, consequence, remedy)| (headline, consequence, remedy))
-}
 
 impl Cause {
     fn of(event: &FaultEvent) -> Self {
@@ -133,14 +96,21 @@ impl Cause {
             consequence,
             remedy,
         };
+        let of_boards = |what: &str| match event.boards.is_empty() {
+            true => what.to_owned(),
+            false => format!("{}: {}", names(&event.boards), within(what)),
+        };
         let row = match event.code {
             Some(EventCode::Stuck) => {
-                let remedy = Some("Turn it, or lead it another way.");
+                let remedy = Some("Turn it, or lead it another way.".to_owned());
                 return told("The robot got stuck and gave up".to_owned(), None, remedy);
             }
             Some(EventCode::Hold) => {
-                if let Some((headline, consequence, remedy)) = hold(&event.detail) {
-                    return told(headline.to_owned(), Some(consequence), remedy);
+                let words = hold_words_of(&event.detail);
+                // What a board reports is in the text.
+                if let Some(words) = words.filter(|_| event.fault.is_none()) {
+                    let consequence = Some(words.consequence.unwrap_or(ALL_HOLD));
+                    return told(of_boards(words.cause), consequence, Some(words.way_on()));
                 }
                 None
             }
@@ -153,13 +123,10 @@ impl Cause {
             _ => None,
         };
         let headline = match row {
-            Some((sentence, _)) if event.boards.is_empty() => stem(sentence),
-            Some((sentence, _)) => {
-                format!("{}: {}", names(&event.boards), within(&stem(sentence)))
-            }
+            Some((sentence, _)) => of_boards(&stem(sentence)),
             None => stem(&event.text),
         };
-        told(headline, None, row.map(|(_, remedy)| remedy))
+        told(headline, None, row.map(|(_, remedy)| remedy.to_owned()))
     }
 
     /// In a sentence without its end; `count`: how many there are.
@@ -186,22 +153,6 @@ pub(crate) fn capital(text: &str) -> String {
     })
 }
 
-/// A sentence as it stands behind a colon; what is all in capitals, or a symbol, stays so.
-pub(crate) fn within(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    match (letters.next(), letters.next()) {
-        (Some(first), Some(second))
-            if !second.is_uppercase() && !second.is_numeric() && second != '-' =>
-        {
-            first
-                .to_lowercase()
-                .chain(sentence.chars().skip(1))
-                .collect()
-        }
-        _ => sentence.to_owned(),
-    }
-}
-
 /// Causes of what went wrong; events in their order. Most runs have none, and what they have is told
 /// one by one.
 pub(crate) fn causes(events: impl Iterator<Item = FaultEvent>) -> Vec<Cause> {
@@ -224,7 +175,7 @@ pub(crate) struct Wrong {
     /// Time on the clock of the page, s.
     t: f64,
     text: String,
-    remedy: Option<&'static str>,
+    remedy: Option<String>,
 }
 
 /// The first causes, for the list of a page; `clock`: from their time to that of the page.
@@ -233,7 +184,7 @@ pub(crate) fn listed(causes: &[Cause], clock: impl Fn(f64) -> f64) -> Vec<Wrong>
     let wrong = listed.map(|cause| Wrong {
         t: clock(cause.t_s),
         text: cause.sentence(1),
-        remedy: cause.remedy,
+        remedy: cause.remedy.clone(),
     });
     wrong.collect()
 }
@@ -298,7 +249,8 @@ mod tests {
             hold(3_020, HoldReason::NodeFault { node: 3, faults: 1 }),
         ];
         let found = causes(one.clone().into_iter());
-        assert_eq!((found.len(), found[0].remedy), (1, Some(fault.remedy())));
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].remedy.as_deref(), Some(fault.remedy()));
         assert_eq!(
             first_sentence(&found).expect("a cause"),
             "Joint 3: the position sensor reads outside its range at 3.00 s"
@@ -328,7 +280,11 @@ mod tests {
             let text = "master: all axes hold: so";
             let hold = event(3_050, EventCode::Hold, hold_name(&reason), None, None, text);
             let found = causes([hold].into_iter());
-            (found[0].sentence(1), found[0].sentence(2), found[0].remedy)
+            (
+                found[0].sentence(1),
+                found[0].sentence(2),
+                found[0].remedy.clone(),
+            )
         };
         let (one, several, remedy) = told(HoldReason::SupplyLost);
         assert_eq!(one, "Supply pressure lost at 3.05 s: all axes hold");
@@ -344,8 +300,19 @@ mod tests {
             let (one, ..) = told(reason);
             assert!(!one.contains("master"), "{one}");
         }
-        let (other, ..) = told(HoldReason::NodeLost(3));
-        assert_eq!(other, "Master: all axes hold: so at 3.05 s");
+        let of_board = event(
+            3_050,
+            EventCode::Hold,
+            hold_name(&HoldReason::NodeLost(3)),
+            None,
+            Some(3),
+            "",
+        );
+        let found = causes([of_board].into_iter());
+        assert_eq!(
+            found[0].sentence(1),
+            "Joint 3: missed three cycles at 3.05 s: all axes hold"
+        );
     }
 
     /// It is no fault of a board, but what the run failed of.
@@ -382,7 +349,7 @@ mod tests {
         };
         let sentence = finding.sentence().trim_end_matches('.');
         let cause = found(Some(2));
-        assert_eq!(cause.remedy, Some(finding.remedy()));
+        assert_eq!(cause.remedy.as_deref(), Some(finding.remedy()));
         assert_eq!(cause.headline, format!("Joint 2: {}", within(sentence)));
         assert_eq!(found(None).headline, sentence);
     }

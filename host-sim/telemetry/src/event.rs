@@ -1,6 +1,7 @@
 //! Events: what happened in a run, as data. Its text is made last, by [`messages`](crate::messages).
 
 pub(crate) mod code;
+mod holds;
 mod names;
 
 use wheeleg_config::faults::FaultSpec;
@@ -14,6 +15,7 @@ use wheeleg_protocol::{
 
 use crate::samples::EventSample;
 pub use code::{EventCode, EventKind};
+pub use holds::{HoldWords, hold_words, hold_words_of, holds};
 pub(crate) use names::parameter_name;
 pub use names::{finding_of_name, hold_name, reject_name};
 use names::{master_board, master_code, master_detail, master_kind, side_name, snake_case};

@@ -17,7 +17,7 @@ use wheeleg_protocol::param::params_at;
 use wheeleg_protocol::{Address, DisarmReason, Fault, FaultBits, FaultRecord, LinkQuality};
 
 use crate::event::{
-    Act, Answer, BadRequest, BoardChange, Cause, Event, ServiceOutcome, parameter_name,
+    Act, Answer, BadRequest, BoardChange, Cause, Event, ServiceOutcome, hold_words, parameter_name,
 };
 use refusal::refusal;
 pub use refusal::reject;
@@ -329,35 +329,40 @@ fn board(address: u8) -> String {
 }
 
 fn hold_reason(reason: &HoldReason) -> String {
-    match *reason {
-        HoldReason::NodeLost(node) => format!("{} missed three cycles", board(node)),
+    let words = hold_words(reason);
+    let what = match *reason {
         HoldReason::NodeFault { node, faults } => {
-            let words: Vec<&str> = FaultBits::from_raw(faults)
-                .iter()
-                .map(|fault| fault.sentence())
-                .collect();
-            format!("{} reports: {}", board(node), words.join(" "))
+            let faults = FaultBits::from_raw(faults);
+            let told: Vec<&str> = faults.iter().map(Fault::sentence).collect();
+            return format!("{} reports: {}", board(node), told.join(" "));
         }
-        HoldReason::NodeDisarmed(node) => {
-            format!("{} is no longer armed: it has restarted", board(node))
+        HoldReason::NodeLost(node) | HoldReason::NodeDisarmed(node) => {
+            format!("{}: {}", board(node), within(words.cause))
         }
-        HoldReason::SupplyLost => {
-            "supply pressure lost. Check compressor, hose and regulator, then clear and arm."
-                .to_owned()
+        _ => within(words.cause),
+    };
+    let consequence = words.consequence.map(|what| format!("; {what}"));
+    format!(
+        "{what}{}. {}",
+        consequence.unwrap_or_default(),
+        words.way_on()
+    )
+}
+
+/// A sentence as it stands behind a colon; what is all in capitals, or a symbol, stays so.
+#[must_use]
+pub fn within(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    match (letters.next(), letters.next()) {
+        (Some(first), Some(second))
+            if !second.is_uppercase() && !second.is_numeric() && second != '-' =>
+        {
+            first
+                .to_lowercase()
+                .chain(sentence.chars().skip(1))
+                .collect()
         }
-        HoldReason::LayerOneStalled => {
-            "layer 1 gave nothing for 100 ms; a walk is brought to a stand by its behaviours"
-                .to_owned()
-        }
-        HoldReason::LayerOneGone => {
-            "layer 1 does not come back: no leg answers the ground any more. Clear and arm."
-                .to_owned()
-        }
-        HoldReason::OperatorLost => {
-            "the operator in control is gone. Reconnect, take the control, then clear and arm."
-                .to_owned()
-        }
-        HoldReason::EmergencyStop => "E-stop".to_owned(),
+        _ => sentence.to_owned(),
     }
 }
 

@@ -1,12 +1,13 @@
 //! The page.
 
 use serde::Serialize;
+use wheeleg_report::number::{counted, fixed};
 use wheeleg_report::plot::{Colour, Content, Figure, Panel, colour, line};
 use wheeleg_report::{page, pictures};
 
 use super::Merged;
 use super::cells;
-use super::findings::Findings;
+use super::findings::{Findings, Rate};
 use super::pairs::Pairs;
 use super::shares;
 use crate::CampaignError;
@@ -21,6 +22,7 @@ const POINTS: usize = 400;
 struct Page<'a> {
     stopped: Option<String>,
     name: &'a str,
+    verdict: String,
     program: &'a str,
     file: String,
     cases: u64,
@@ -48,6 +50,7 @@ pub(super) fn render(
     let values = Page {
         stopped: None,
         name: &plan.name,
+        verdict: verdict(findings),
         program: &merged.program,
         file: merged.path.display().to_string(),
         cases: merged.plan.cases,
@@ -56,6 +59,32 @@ pub(super) fn render(
         figures: pictures(&figures),
     };
     Ok(page(TEMPLATE, values)?)
+}
+
+/// The page's first sentence: how many cases met everything, and in which cell the fewest.
+fn verdict(findings: &Findings) -> String {
+    let rates = || findings.passed.iter().map(|(_, rate)| rate);
+    let all = Rate::of(rates().map(|r| r.met).sum(), rates().map(|r| r.of).sum());
+    if all.of == 0 {
+        return "No case has a result.".to_owned();
+    }
+    let percent = |share: f64| fixed(1e2 * share, 1);
+    let [low, high] = all.exact;
+    let share = |rate: &Rate| rate.met as f64 / rate.of.max(1) as f64;
+    let cells = findings.passed.iter();
+    let fewest = cells.min_by(|(_, a), (_, b)| share(a).total_cmp(&share(b)));
+    let fewest = fewest.filter(|_| findings.passed.len() > 1 && all.met < all.of);
+    let fewest =
+        fewest.map(|(name, rate)| format!("; the fewest with {name}: {} of {}", rate.met, rate.of));
+    format!(
+        "All required targets are met in {} of {}: {} % (95 % interval {} to {} %){}.",
+        all.met,
+        counted(all.of as usize, "case", "cases"),
+        percent(share(&all)),
+        percent(low),
+        percent(high),
+        fewest.unwrap_or_default()
+    )
 }
 
 /// Of each target the share of cases below a value, a curve for each cell, its limits marked.

@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use super::outbox::status;
 use super::request::Setting;
 use super::viewers::ViewerId;
-use crate::hub::{Asking, Hub, Role};
+use crate::hub::{Asking, Hub};
 use crate::outbox::Outbox;
 use wheeleg_access::hex;
 use wheeleg_access::request::{Body, Spoken};
@@ -55,7 +55,7 @@ async fn write_all(hub: &Arc<Hub>, settings: Vec<Setting>) -> Result<(), String>
     let mut session = Session::open(hub)?;
     session.carry_out("TakeControl", json!({})).await?;
     let written = session.write_all(writes).await;
-    let released = session.carry_out("ReleaseControl", json!({})).await;
+    let released = session.release().await;
     written.and(released)
 }
 
@@ -65,6 +65,8 @@ struct Session {
     asking: Asking,
     outbox: Arc<Outbox>,
     n: u64,
+    /// Who asks for the control: name and session.
+    heir: Option<(String, String)>,
 }
 
 impl Session {
@@ -73,13 +75,14 @@ impl Session {
         getrandom::fill(&mut number).map_err(|e| e.to_string())?;
         let outbox = Arc::new(Outbox::default());
         let session = hex::encode(&number);
-        let entered = hub.enter(Role::Control, (NAME, &session), false, &outbox);
-        let (asking, _) = entered.ok_or("all client slots of the console are taken")?;
+        let entered = hub.enter_writer((NAME, &session), &outbox);
+        let asking = entered.ok_or("all client slots of the console are taken")?;
         Ok(Self {
             hub: Arc::clone(hub),
             asking,
             outbox,
             n: 0,
+            heir: None,
         })
     }
 
@@ -89,9 +92,29 @@ impl Session {
             if self.hub.is_armed() {
                 return Err("the robot is armed: disarm it first".to_owned());
             }
+            // A viewer writes as long as nobody wants to drive.
+            if let Some((by, _)) = &self.heir {
+                return Err(format!(
+                    "{by} asks for the control: write again once it is free"
+                ));
+            }
             self.carry_out("WriteParameter", args).await?;
         }
         Ok(())
+    }
+
+    /// Gives the control to whoever has asked for it, and else to nobody.
+    async fn release(&mut self) -> Result<(), String> {
+        if let Some((_, session)) = self.heir.take()
+            && self
+                .carry_out("HandOver", json!({ "to": session }))
+                .await
+                .is_ok()
+        {
+            return Ok(());
+        }
+        // Whoever asked may be gone by now.
+        self.carry_out("ReleaseControl", json!({})).await
     }
 
     /// Gives a command and waits for its end.
@@ -129,6 +152,12 @@ impl Session {
                 let seen_us = message["master_us"].as_u64().unwrap_or_default();
                 let beat = Body::Beat { seen_us };
                 self.hub.ask(&self.asking, 0, beat, false).await;
+            }
+            if message["op"] == "asked"
+                && let (Some(by), Some(session)) =
+                    (message["by"].as_str(), message["session"].as_str())
+            {
+                self.heir = Some((by.to_owned(), session.to_owned()));
             }
             if message["op"] != "answer" || message["n"] != self.n {
                 continue;

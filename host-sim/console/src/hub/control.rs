@@ -70,13 +70,16 @@ impl Inner {
                         return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
                     }
                     Err(Denied::Held) => {
-                        let told = self.asked.is_some_and(|told| now - told < ASKED);
                         // Nobody is told for a holder who has ended; the next one is.
                         let holder = self.desk.holder().filter(|h| h.ended.is_none());
-                        if let Some(holder) = holder.filter(|_| !told) {
-                            self.asked = Some(now);
+                        let holder = holder.map(|holder| holder.client);
+                        let told = self
+                            .asked
+                            .is_some_and(|(told, at)| holder == Some(told) && now - at < ASKED);
+                        if let Some(holder) = holder.filter(|_| !told && !client.writes) {
+                            self.asked = Some((holder, now));
                             let asked = json!({ "op": "asked", "by": client.name, "session": client.session });
-                            self.tell(holder.client, &asked);
+                            self.tell(holder, &asked);
                         }
                         return self.tell(id, &self.held(n, now));
                     }

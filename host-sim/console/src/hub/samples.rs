@@ -48,6 +48,9 @@ impl Inner {
             let Ok(moving) = self.robot.samples.pop() else {
                 break;
             };
+            if matches!(moving.sample, OwnedSample::Event(_)) {
+                self.name_stops();
+            }
             let channel = usize::from(moving.channel);
             let arrived = &mut self.arrived[channel];
             let gap = moving.number - arrived.number - 1;

@@ -1,5 +1,6 @@
 //! Who has stopped the robot, as everybody is told.
 
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -9,7 +10,7 @@ use wheeleg_telemetry::event::hold_name;
 use wheeleg_telemetry::{EventCode, EventSample};
 
 use super::Inner;
-use crate::live::Status;
+use crate::live::{Signals, Status};
 use wheeleg_access::desk::ClientId;
 
 /// A stop is in SYNC after so long, or never.
@@ -23,6 +24,25 @@ pub(crate) enum StopBy {
     Api,
     /// Foxglove's protocol.
     Foxglove,
+}
+
+/// Stops that were asked for and are not looked at yet. Nobody keeps this lock but for a moment, so a
+/// stop does not wait for it.
+#[derive(Clone, Default)]
+pub(super) struct AskedStops(Arc<Mutex<Vec<(StopBy, u64)>>>);
+
+impl AskedStops {
+    /// Asks for a stop, and gives its number. Whoever sees what comes of it finds here who asked.
+    pub(super) fn stop(&self, signals: &Signals, by: StopBy) -> u64 {
+        let mut asked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let number = signals.stop();
+        asked.push((by, number));
+        number
+    }
+
+    fn take(&self) -> Vec<(StopBy, u64)> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
 }
 
 /// Who asks for a stop, as everybody is told.
@@ -82,8 +102,15 @@ impl Stopped {
 }
 
 impl Inner {
+    /// Gives the stops that were asked for their names.
+    pub(super) fn name_stops(&mut self) {
+        for (by, number) in self.asked_stops.take() {
+            self.stopped_by(by, number);
+        }
+    }
+
     /// Somebody has asked for a stop: remembers the first.
-    pub(super) fn stopped_by(&mut self, by: StopBy, number: u64) {
+    fn stopped_by(&mut self, by: StopBy, number: u64) {
         let first = self.stopped.as_ref();
         // While the clock stands, one that was taken is in no record yet.
         let status = self.status.as_ref();
@@ -124,5 +151,32 @@ impl Inner {
         if over {
             self.stopped = None;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However soon the robot takes a stop, it is known who asked for it.
+    #[test]
+    fn who_has_stopped_is_known_before_the_stop_is_seen() {
+        const STOPS: u64 = 20_000;
+        let (asked, signals) = (AskedStops::default(), Arc::new(Signals::default()));
+        let stops = {
+            let (asked, signals) = (asked.clone(), Arc::clone(&signals));
+            std::thread::spawn(move || {
+                (0..STOPS).for_each(|_| {
+                    asked.stop(&signals, StopBy::Api);
+                });
+            })
+        };
+        let mut named = 0;
+        while named < STOPS {
+            let seen = signals.stops();
+            named += asked.take().len() as u64;
+            assert!(named >= seen, "{seen} seen, {named} named");
+        }
+        stops.join().expect("it ends");
     }
 }

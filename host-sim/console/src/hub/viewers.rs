@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::extract::ws::Message;
 use serde_json::{Value, json};
 
-use super::{CLIENTS, Hub, StopBy, StopsUnderWay};
+use super::{Asking, CLIENTS, Hub, Role, StopBy, StopsUnderWay};
 use crate::foxglove::{self, Call, Outbox, Request, Setting, ViewerId, status};
 use crate::foxglove::{STOP_SERVICE, URDF};
 
@@ -29,6 +29,19 @@ impl Hub {
         let mut inner = self.inner();
         let free = inner.taken_places() < CLIENTS - 1;
         free.then(|| inner.viewers.enter(outbox))
+    }
+
+    /// A session that writes parameters for a viewer, if there is a place for it.
+    pub(crate) fn enter_writer(
+        &self,
+        who: (&str, &str),
+        outbox: &Arc<crate::outbox::Outbox>,
+    ) -> Option<Asking> {
+        let (asking, _) = self.enter(Role::Control, who, false, outbox)?;
+        if let Some(client) = self.inner().clients.get_mut(&asking.id) {
+            client.writes = true;
+        }
+        Some(asking)
     }
 
     /// A viewer is gone.

@@ -324,6 +324,12 @@ impl Signals {
         self.stops.fetch_add(1, Ordering::SeqCst) + 1
     }
 
+    /// How many were asked for.
+    #[cfg(test)]
+    pub(crate) fn stops(&self) -> u64 {
+        self.stops.load(Ordering::SeqCst)
+    }
+
     /// The holder of the control has seen the robot.
     pub(crate) fn beat(&self, seen_us: u64) {
         self.seen_us.store(seen_us, Ordering::Release);

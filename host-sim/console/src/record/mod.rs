@@ -222,10 +222,26 @@ pub(crate) struct Recordings {
     pub(crate) thread: JoinHandle<()>,
 }
 
+/// Refuses a place that can never be a folder; one that is not there yet is made for the first recording.
+fn ensure_can_be_made(root: &Path) -> Result<(), ConsoleError> {
+    let there = root.ancestors().find(|path| path.exists());
+    match there.filter(|path| !path.is_dir()) {
+        None => Ok(()),
+        Some(file) => Err(ConsoleError::other(
+            format!(
+                "nothing can be recorded in {}: {} is not a folder",
+                root.display(),
+                file.display()
+            ),
+            "give a folder with --recordings DIR",
+        )),
+    }
+}
+
 /// Starts the thread that writes; with `at_once`, the first recording begins with the power.
 ///
 /// # Errors
-/// [`ConsoleError::Other`] if the first recording's folder cannot be made.
+/// [`ConsoleError::Other`] if no folder can be there, or the first recording's folder cannot be made.
 pub(crate) fn start(
     root: &Path,
     about: About,
@@ -233,6 +249,7 @@ pub(crate) fn start(
 ) -> Result<(Feed, Recordings), ConsoleError> {
     let shared = Arc::new(Shared::default());
     let (to, from) = rtrb::RingBuffer::new(NOTES);
+    ensure_can_be_made(root)?;
     let mut writer = writer::Writer::new(from, Arc::clone(&shared), root.to_owned(), about);
     if at_once {
         writer.begin(1, 0).map_err(|what| {
@@ -256,4 +273,28 @@ pub(crate) fn start(
         thread,
     };
     Ok((feed, recordings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_in_the_place_of_the_folder_is_refused_at_once() {
+        let home = tempfile::tempdir().expect("a folder");
+        let file = home.path().join("afile");
+        std::fs::write(&file, "").expect("written");
+        for fits in [home.path().to_owned(), home.path().join("new/deep")] {
+            assert!(ensure_can_be_made(&fits).is_ok(), "{}", fits.display());
+        }
+        assert!(ensure_can_be_made(Path::new("nothing-of-this-name")).is_ok());
+        for wrong in [file.clone(), file.join("below")] {
+            let told = ensure_can_be_made(&wrong).expect_err("refused").to_string();
+            let name = file.display().to_string();
+            assert!(
+                told.contains(&name) && told.contains("not a folder"),
+                "{told}"
+            );
+        }
+    }
 }

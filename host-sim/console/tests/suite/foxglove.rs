@@ -546,6 +546,47 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     );
 }
 
+/// A viewer that writes on and on makes room for whoever wants to drive.
+#[test]
+fn a_viewer_that_writes_hands_the_control_over_to_who_asks_for_it() {
+    let rig = TestRig::new();
+    rig.until("ready", |state| state["ready"] == true);
+    let mut writer = Viewer::open(&rig, &Ask::with(&rig.keys.control)).expect("let in");
+    let all = writer.values(json!({ "op": "getParameters", "parameterNames": [], "id": "all" }));
+    let of_boards = |p: &&Value| {
+        let name = p["name"].as_str().unwrap_or_default();
+        name.starts_with("/joint/") || name.starts_with("/wheel/")
+    };
+    let all: Vec<&Value> = all
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter(of_boards)
+        .collect();
+    assert!(all.len() > 100, "{}", all.len());
+    let set = json!({ "op": "setParameters", "parameters": all, "id": "all" });
+    writer.send(set);
+    let name = |state: &Value| state["control"]["holder"].clone();
+    rig.until("written", |state| name(state) == "foxglove");
+    let mut driver = rig.control("driver");
+    look(&mut driver, "state");
+    let why = refusal(&mut driver, "TakeControl", &json!({}));
+    assert_eq!(why, "control_held");
+    assert_eq!(look(&mut driver, "offered")["by"], "foxglove");
+    // Whoever writes waits for who was offered it.
+    let one = json!({ "op": "setParameters", "parameters": all[..1], "id": "one" });
+    writer.send(one);
+    done(&mut driver, "TakeControl");
+    driver.keep_control(true);
+    rig.until("driven", |state| name(state) == "driver");
+    let told = writer.until("end", |heard| match heard {
+        Heard::Json(v) if v["op"] == "status" && v["level"] == 2 => Some(v),
+        _ => None,
+    });
+    let text = told["message"].as_str().expect("a text");
+    assert!(text.contains("driver"), "{text}");
+}
+
 #[test]
 fn viewers_that_never_read_cost_nobody_anything_and_take_no_place_of_control() {
     let rig = TestRig::new();

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cause::within;
+use wheeleg_telemetry::messages::within;
 
 /// What is to be said of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

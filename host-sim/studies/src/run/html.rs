@@ -81,7 +81,7 @@ struct Page<'a> {
     verdict: String,
     /// What went wrong first.
     cause: Option<String>,
-    remedy: Option<&'static str>,
+    remedy: Option<String>,
     wrong: Vec<Wrong>,
     /// Causes beyond those listed.
     more_wrong: usize,
@@ -239,7 +239,7 @@ pub(super) fn render(
         summary,
         verdict: verdict(summary),
         cause: cause::first_sentence(&causes),
-        remedy: causes.first().and_then(|first| first.remedy),
+        remedy: causes.first().and_then(|first| first.remedy.clone()),
         wrong: cause::listed(&causes, |t_s| source.t(t_s)),
         more_wrong: causes.len().saturating_sub(cause::LISTED),
         scenario_text: &source.scenario.description,

@@ -14,7 +14,7 @@ use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_protocol::Address;
 use wheeleg_remote_host::PilSummary;
-use wheeleg_telemetry::{Cause, EventCode, EventKind, Recording};
+use wheeleg_telemetry::{Cause, Recording};
 
 /// Facts about a run that are not in its recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,12 +129,9 @@ fn cause(recording: &Recording) -> Vec<String> {
     let wrong = recording.events.iter();
     let wrong = wrong.filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
     let causes = cause::causes(wrong);
-    let remedy = causes.first().and_then(|first| first.remedy);
+    let remedy = causes.first().and_then(|first| first.remedy.clone());
     let sentence = cause::first_sentence(&causes).map(|told| format!("{told}."));
-    sentence
-        .into_iter()
-        .chain(remedy.map(str::to_owned))
-        .collect()
+    sentence.into_iter().chain(remedy).collect()
 }
 
 /// Faults, findings and refusals as the user reads them, with their time: the first twenty, and how
@@ -149,8 +146,8 @@ fn messages(recording: &Recording) -> Vec<String> {
     let mut more = 0_u64;
     for event in &recording.events {
         let refusal = refusal(&event.v.cause);
-        let gives_up = event.v.cause.code() == EventCode::Stuck;
-        if refusal.is_none() && !gives_up && event.v.cause.kind() != EventKind::Fault {
+        let (kind, code) = (event.v.cause.kind(), event.v.cause.code());
+        if refusal.is_none() && !cause::goes_wrong(Some(kind), Some(code)) {
             continue;
         }
         let known = refusals
@@ -304,6 +301,11 @@ mod tests {
             refused(6),
             refused(7),
             Cause::Master(MasterEvent::Homed),
+            // What is over has not gone wrong.
+            Cause::Board {
+                board: Address::joint(1).expect("a joint"),
+                change: BoardChange::FaultsCleared,
+            },
         ];
         let mut recording = Recording::default();
         for (ms, cause) in (1..).zip(causes) {
@@ -317,7 +319,7 @@ mod tests {
             "0.002 s: JointReference refused: the robot is moving",
             "0.003 s: joint 1: Emergency stop.",
             "0.005 s: joint 1: Emergency stop.",
-            "0.006 s: master: Arm ended early: a stop or another command came between",
+            "0.006 s: master: Arm ended early: a stop, a hold or another command came between",
         ];
         let times = [
             " (2 times)",

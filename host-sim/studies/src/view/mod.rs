@@ -299,7 +299,7 @@ mod tests {
         log(&other, "wheeleg-2003", 93.5, None);
         let told = viewed(&options(&[&one, &other])).expect("a page");
         assert!(told.verdict.contains("up to 3.500 mm"), "{}", told.verdict);
-        let parts = "part at 0.60 s, left yaw, and differ";
+        let parts = "part at 0.60 s, joint 1 (left yaw), and differ";
         assert!(told.verdict.contains(parts), "{}", told.verdict);
         assert_eq!(told.page, folder.path().join("compared.html"));
         let page = std::fs::read_to_string(&told.page).expect("written");
@@ -376,8 +376,8 @@ mod tests {
             let panel = &whole[begin..];
             panel[..panel.find("</script>").expect("its end")].to_owned()
         };
-        assert!(curves("Left yaw").contains("179.9"));
-        assert!(!curves("Left vertical").contains("179.9"));
+        assert!(curves("Joint 1 (left yaw)").contains("179.9"));
+        assert!(!curves("Joint 3 (left vertical)").contains("179.9"));
         let told = viewed(&options(&[&sound, &broken]))
             .expect("a page")
             .verdict;

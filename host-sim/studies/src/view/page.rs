@@ -82,7 +82,7 @@ struct DifferenceLine {
 struct Page<'a> {
     verdict: String,
     /// What to do about what the verdict says.
-    remedy: Option<&'static str>,
+    remedy: Option<String>,
     logs: Vec<About>,
     motion: Option<String>,
     drawn_as: Option<&'a str>,
@@ -278,7 +278,7 @@ pub(super) fn make(
     let verdict = verdict(logs, differences);
     let causes = logs[0].content.causes();
     let first = causes.first().filter(|_| logs.len() == 1);
-    let remedy = first.and_then(|cause| cause.remedy);
+    let remedy = first.and_then(|cause| cause.remedy.clone());
     let figures: Vec<(Figure, String)> = groups
         .iter()
         .map(|group| (figure(group, logs), String::new()))

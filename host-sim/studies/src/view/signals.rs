@@ -41,14 +41,14 @@ pub(super) struct Group {
     pub(super) plots: Vec<Plot>,
 }
 
-/// Names of joints 1 to 6.
+/// Joints 1 to 6 by their names in events, and where they are.
 pub(super) const JOINTS: [&str; 6] = [
-    "Left yaw",
-    "Left horizontal",
-    "Left vertical",
-    "Right yaw",
-    "Right horizontal",
-    "Right vertical",
+    "Joint 1 (left yaw)",
+    "Joint 2 (left horizontal)",
+    "Joint 3 (left vertical)",
+    "Joint 4 (right yaw)",
+    "Joint 5 (right horizontal)",
+    "Joint 6 (right vertical)",
 ];
 const SIDES: [&str; 2] = ["Left", "Right"];
 
@@ -209,6 +209,9 @@ fn named(name: &str) -> Result<Plot, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cause::capital;
+    use wheeleg_protocol::Address;
+    use wheeleg_telemetry::placed;
 
     #[test]
     fn every_signal_exists_and_has_numbers() {
@@ -224,6 +227,14 @@ mod tests {
             channels()[signal("/supply", "pressure_bar").channel].topic,
             "/supply"
         );
+    }
+
+    #[test]
+    fn joints_are_named_as_everywhere_else() {
+        for (address, name) in (1..).zip(JOINTS) {
+            let board = Address::new(address).expect("a joint");
+            assert_eq!(name, capital(&placed(board)));
+        }
     }
 
     #[test]

@@ -13,22 +13,22 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         Refusal::NotInControl => {
             "it needs the control, which an operator takes at the console: take it first".to_owned()
         }
-        Refusal::NotArmed => "it needs armed axes: give ClearFault if there was a stop, then Arm".to_owned(),
-        Refusal::NotDisarmed => "it needs disarmed axes: disarm first".to_owned(),
+        Refusal::NotArmed => "the robot is not armed: give ClearFault if there was a stop or a hold, then Arm".to_owned(),
+        Refusal::NotDisarmed => "the robot is armed: disarm it first".to_owned(),
         Refusal::Moving => {
             "the robot is moving: wait for the end of the motion, or give Hold, or StopGait in a gait"
                 .to_owned()
         }
-        Refusal::NotMoving => "no gait is under way; Hold ends any other motion".to_owned(),
+        Refusal::NotMoving => "the robot does not walk; Hold ends any other motion".to_owned(),
         Refusal::NotAtStart => {
             "the robot does not stand in the start pose (give Stand first), or this is not the \
              leg that steps first"
                 .to_owned()
         }
-        Refusal::Latched => "an E-stop or HOLD is latched: give ClearFault, then Arm once the reservoir is full".to_owned(),
+        Refusal::Latched => "a stop or a hold is latched: give ClearFault, then Arm once the reservoir is full".to_owned(),
         Refusal::NoAir => {
-            "the supply pressure switch is open: wait until the reservoir is full, then ask again; \
-             if it stays open, check compressor, hose and regulator"
+            "the reservoir is not full: wait until its pressure switch closes, then ask again; if it stays \
+             open, check compressor, hose and regulator"
                 .to_owned()
         }
         Refusal::NodeMissing { node } => {
@@ -83,7 +83,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
         }
         Refusal::Busy => "other requests are still under way: wait for their answers".to_owned(),
         Refusal::Interrupted => {
-            "a stop or another command came between: see what came before it, then give it again"
+            "a stop, a hold or another command came between: see what came before it, then give it again"
                 .to_owned()
         }
         Refusal::NotSettled { joint } => format!(

@@ -22,9 +22,11 @@ use wheeleg_console::keys::{CONTROL_FILE, VIEW_FILE};
 use wheeleg_console::unpack::unpack;
 use wheeleg_console::{EVENTS, usual};
 use wheeleg_master::command::CommandCode;
+use wheeleg_protocol::Address;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
-use wheeleg_telemetry::channels;
+use wheeleg_telemetry::event::hold_words_of;
+use wheeleg_telemetry::{channels, placed};
 
 use super::exit::{self, LOST};
 use super::{fitted, print, say, show, stop_on_signals, tell, tell_error, whole};
@@ -202,7 +204,8 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{}, {:.2} s after power-up, boards ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
+        "{}, {}, {:.2} s after power-up, boards ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
+        mode(&state),
         word(&state["robot"]),
         state["master_us"].as_f64().unwrap_or(0.0) * 1e-6,
         word(&state["ready"]),
@@ -214,6 +217,9 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
         pace,
         word(&state["pace"]["paused"]),
     );
+    if let Some(why) = why_held(&state) {
+        let _ = writeln!(text, "{why}");
+    }
     if let Value::Object(recording) = &state["recording"] {
         let _ = match &recording["failure"] {
             Value::Null => writeln!(text, "recording {}", word(&recording["id"])),
@@ -233,14 +239,60 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
         );
     }
     for board in state["boards"].as_array().into_iter().flatten() {
-        let (address, mode) = (word(&board["address"]), word(&board["mode"]));
-        let _ = writeln!(text, "board {address}  {mode}");
+        let name = address(board).map_or_else(|| word(&board["address"]), placed);
+        let _ = writeln!(text, "{name:26}{}", word(&board["mode"]));
         for fault in board["faults"].as_array().into_iter().flatten() {
             let (cause, remedy) = (word(&fault["cause"]), word(&fault["remedy"]));
             let _ = writeln!(text, "         {cause} {remedy}");
         }
     }
     Ok(show(&text)?)
+}
+
+/// The board that a part of the state is about.
+fn address(board: &Value) -> Option<Address> {
+    let address = u8::try_from(board["address"].as_u64()?).ok()?;
+    Address::new(address)
+}
+
+/// What the robot is, in the words of the page. A stop is more than the hold that it may have met.
+fn mode(state: &Value) -> String {
+    match (&state["emergency_stop"], &state["hold"], &state["armed"]) {
+        _ if state["alive"] == false => "MASTER IS DEAD".to_owned(),
+        (Value::Bool(true), ..) => "STOPPED".to_owned(),
+        (_, Value::String(why), _) => format!("HOLD: {}", plain(why).replace('_', " ")),
+        (.., Value::Bool(true)) => "ARMED".to_owned(),
+        _ => "disarmed".to_owned(),
+    }
+}
+
+/// How a robot goes on that was stopped, or holds.
+const GO_ON: &str = "To go on: `wheeleg ctl take -- ClearFault`, then `wheeleg ctl take -- Arm`";
+
+/// Who has stopped the robot, or why it holds, and how it goes on; none: it does neither.
+fn why_held(state: &Value) -> Option<String> {
+    if state["emergency_stop"] == true {
+        let stopped = &state["stopped"];
+        let by = match (stopped["via"].as_str(), stopped["name"].as_str()) {
+            (Some("api"), _) => " by a program, over the HTTP API".to_owned(),
+            (Some("foxglove"), _) => " by a Foxglove viewer".to_owned(),
+            (_, Some(name)) if stopped["role"] == "view" => {
+                format!(" by {:?}, with the view key", plain(name))
+            }
+            (_, Some(name)) => format!(" by {:?}", plain(name)),
+            _ => String::new(),
+        };
+        let at = stopped["at_us"].as_f64();
+        let at = at.map(|us| format!(", at {:.2} s", us * 1e-6));
+        return Some(format!("stopped{by}{}. {GO_ON}", at.unwrap_or_default()));
+    }
+    let words = hold_words_of(state["hold"].as_str()?)?;
+    let remedy = words.remedy.map(|remedy| format!(" {remedy}"));
+    Some(format!(
+        "{}.{} {GO_ON}",
+        words.cause,
+        remedy.unwrap_or_default()
+    ))
 }
 
 /// Prints the newest events that the server keeps.
@@ -272,9 +324,7 @@ fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     let (code, answer) = http(&url, "POST", "stop", key)?;
     match code {
         200 if reach.json => Ok(print(&format!("{answer}\n"))?),
-        200 => Ok(print(
-            "stopped. To go on: `wheeleg ctl take -- ClearFault`, then `wheeleg ctl take -- Arm`\n",
-        )?),
+        200 => Ok(print(&format!("stopped. {GO_ON}\n"))?),
         504 => Ok(not_confirmed()),
         403 => stop_by_session(reach, &url, key),
         _ => {
@@ -512,6 +562,26 @@ fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A stop that meets a robot that holds already is what the head tells, and who has stopped it.
+    #[test]
+    fn a_stop_is_told_before_the_hold_that_it_met() {
+        let mut state = json!({
+            "alive": true, "armed": true, "emergency_stop": true, "hold": "operator_lost",
+            "stopped": { "via": "console", "name": "browser", "session": "0", "role": "view", "at_us": 501_000_000 },
+        });
+        assert_eq!(mode(&state), "STOPPED");
+        let told = why_held(&state).expect("a stop");
+        let begin =
+            "stopped by \"browser\", with the view key, at 501.00 s. To go on: `wheeleg ctl";
+        assert!(told.starts_with(begin), "{told}");
+        state["emergency_stop"] = json!(false);
+        assert_eq!(mode(&state), "HOLD: operator lost");
+        let told = why_held(&state).expect("a hold");
+        assert!(told.starts_with("Operator lost. Take control. "), "{told}");
+        state["hold"] = Value::Null;
+        assert_eq!((mode(&state), why_held(&state)), ("ARMED".to_owned(), None));
+    }
 
     #[test]
     fn arguments_are_numbers_flags_or_words() {

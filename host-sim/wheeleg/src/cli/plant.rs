@@ -93,7 +93,16 @@ fn check(args: &CheckArgs) -> Result<ExitCode, StudyError> {
 
 /// The table of a check, and what it comes to.
 fn check_text(axis: &str, check: &PlantCheck) -> String {
-    let mut text = format!("Axis {axis}\n\n");
+    let open = check
+        .findings
+        .iter()
+        .filter(|f| f.verdict != Verdict::Holds)
+        .count();
+    let mut text = match (check.passed, open) {
+        (true, 0) => format!("Axis {axis}: all within limits.\n\n"),
+        (true, n) => format!("Axis {axis}: nothing is wrong; {n} could not be judged.\n\n"),
+        (false, _) => format!("Axis {axis}: BEYOND LIMITS.\n\n"),
+    };
     for finding in &check.findings {
         let (name, value, limit) = figures(finding);
         let verdict = match finding.verdict {
@@ -110,16 +119,6 @@ fn check_text(axis: &str, check: &PlantCheck) -> String {
         };
         text += &format!("{name:<34}{value:>12}  {limit}{verdict}\n");
     }
-    let open = check
-        .findings
-        .iter()
-        .filter(|f| f.verdict != Verdict::Holds)
-        .count();
-    text += &match (check.passed, open) {
-        (true, 0) => "\nAll within limits.\n".to_owned(),
-        (true, n) => format!("\nNothing is wrong; {n} could not be judged.\n"),
-        (false, _) => "\nBEYOND LIMITS.\n".to_owned(),
-    };
     text
 }
 

@@ -70,6 +70,9 @@ pub(super) struct RunOptions {
     /// Exit with code 1 if a required target is not met, not only if boards differ.
     #[arg(long)]
     strict: bool,
+    /// Print every target, not only the first 20 of each verdict.
+    #[arg(long)]
+    verbose: bool,
 }
 
 fn parse_seed(text: &str) -> Result<u64, String> {
@@ -112,7 +115,12 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     let stopped = finished.stopped.is_some();
     let failure = finished.result.failure.take();
     let report = finished.report.display().to_string();
-    let code = end(finished, args.json, run_text, passed)?;
+    let most = if args.verbose {
+        usize::MAX
+    } else {
+        TARGETS_SHOWN
+    };
+    let code = end(finished, args.json, |run| run_text(run, most), passed)?;
     if differ && !stopped {
         tell("boards differ from their native twins");
     }
@@ -214,7 +222,8 @@ fn messages_text(messages: &[String]) -> String {
     out
 }
 
-fn run_text(finished: &Finished<Run>) -> String {
+/// What came of a run; of each verdict at most so many targets.
+fn run_text(finished: &Finished<Run>, most: usize) -> String {
     let s = &finished.result.summary;
     let mut out = String::new();
     for (i, line) in s.cause.iter().enumerate() {
@@ -226,7 +235,7 @@ fn run_text(finished: &Finished<Run>) -> String {
         let required = s.targets.iter().filter(|t| t.required);
         let met = required.clone().filter(|t| t.pass).count();
         let _ = writeln!(out, "{met} of {} required targets met\n", required.count());
-        out.push_str(&target_table(&s.targets));
+        out.push_str(&target_table(&s.targets, most));
         out.push('\n');
     }
     if !s.complete {
@@ -268,23 +277,34 @@ fn run_text(finished: &Finished<Run>) -> String {
 /// Injected faults that are listed; of more there is the number.
 const FAULTS_SHOWN: usize = 20;
 
-/// Targets that are listed: more than a built-in scenario has, and not all of a file that has
-/// thousands of bars.
-const TARGETS_SHOWN: usize = 60;
+/// Targets of one verdict that are listed.
+const TARGETS_SHOWN: usize = 20;
 
-/// The table of the first targets, and of how many more there are, and are missed among them. What was
-/// missed comes first.
-fn target_table(targets: &[Target]) -> String {
-    let mut targets: Vec<&Target> = targets.iter().collect();
-    targets.sort_by_key(|target| target.judgement() != Judgement::Missed);
-    let (shown, more) = targets.split_at(targets.len().min(TARGETS_SHOWN));
-    let mut out = table_of(shown);
+/// The order in which targets are told: what was missed comes first.
+const ORDER: [Judgement; 4] = [
+    Judgement::Missed,
+    Judgement::Met,
+    Judgement::Outside,
+    Judgement::Value,
+];
+
+/// The table of the first targets of each verdict, and of how many more there are.
+fn target_table(targets: &[Target], most: usize) -> String {
+    let mut shown: Vec<&Target> = Vec::new();
+    let mut more: Vec<String> = Vec::new();
+    for judgement in ORDER {
+        let of = targets.iter().filter(|t| t.judgement() == judgement);
+        shown.extend(of.clone().take(most));
+        if let Some(left @ 1..) = of.count().checked_sub(most) {
+            more.push(format!("{left} {}", judgement.word()));
+        }
+    }
+    let mut out = table_of(&shown);
     if !more.is_empty() {
-        let missed = more.iter().filter(|t| t.required && !t.pass).count();
         let _ = writeln!(
             out,
-            "and {} more, of which {missed} required ones are missed: see report.html and summary.json",
-            more.len()
+            "and more: {} (see report.html, or give --verbose)",
+            more.join(", ")
         );
     }
     out
@@ -358,19 +378,20 @@ mod tests {
             pass: i % 25 != 24,
             required: true,
         };
-        let lines = |count: usize| {
+        let text = |count: usize, most: usize| {
             let targets: Vec<Target> = (0..count).map(target).collect();
-            let text = target_table(&targets);
-            (text.lines().count(), text)
+            target_table(&targets, most)
         };
-        let (all, text) = lines(TARGETS_SHOWN);
-        assert_eq!(all, 1 + TARGETS_SHOWN, "{text}");
-        let (some, text) = lines(2000);
-        assert_eq!(some, 2 + TARGETS_SHOWN, "{text}");
-        let told = "and 1940 more, of which 20 required ones are missed: see report.html and summary.json\n";
-        assert!(text.ends_with(told), "{text}");
-        // Of 80 the first 60 that were missed.
-        let missed = text.lines().filter(|line| line.starts_with("FAIL"));
-        assert_eq!(missed.count(), TARGETS_SHOWN, "{text}");
+        let some = text(2000, TARGETS_SHOWN);
+        let first: Vec<&str> = some.lines().collect();
+        assert_eq!(first.len(), 2 + 2 * TARGETS_SHOWN, "{some}");
+        let fails = |line: &&&str| line.starts_with("FAIL");
+        let missed = first[1..=TARGETS_SHOWN].iter().filter(fails).count();
+        assert_eq!(missed, TARGETS_SHOWN, "what was missed comes first: {some}");
+        let told = "and more: 60 FAIL, 1900 PASS (see report.html, or give --verbose)";
+        assert_eq!(first.last(), Some(&told), "{some}");
+        // Few are all listed, and so are all if they are asked for.
+        assert_eq!(text(20, TARGETS_SHOWN).lines().count(), 21);
+        assert_eq!(text(2000, usize::MAX).lines().count(), 2001);
     }
 }

@@ -7,14 +7,17 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::{Value, json};
 use wheeleg_access::Key;
+use wheeleg_access::reason::Reason;
 use wheeleg_access::request::FRAME_MAX;
 use wheeleg_console::client::{Client, KEYS, Outcome, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint};
 use wheeleg_master::command::CommandCode;
+use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Stop;
 use wheeleg_studies::view::plain;
+use wheeleg_telemetry::event::reject_name;
 
 use super::super::exit::{LOST, REFUSED};
 use super::super::{print, tell, tell_error};
@@ -167,7 +170,7 @@ impl Reach {
             print(&format!("{status}\n"))?;
         } else {
             let help = match end {
-                Outcome::Refused { .. } => "`wheeleg ctl status` tells in which state the robot is",
+                Outcome::Refused { reason, .. } => help(reason),
                 _ => ANSWERS,
             };
             // It may quote what was given.
@@ -202,6 +205,21 @@ fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
     Ok(())
 }
 
+/// What helps whoever was refused for this reason.
+fn help(reason: &str) -> &'static str {
+    if reason == reject_name(&Reject::Refused(Refusal::NoAir)) {
+        return "`wheeleg ctl watch /supply` prints the pressure in the reservoir";
+    }
+    let reason = Reason::ALL.into_iter().find(|known| known.name() == reason);
+    match reason {
+        Some(Reason::BadCommand | Reason::BadArgument) => {
+            "`wheeleg commands` lists the commands and their arguments, `wheeleg params` the parameters, `wheeleg faults list` the faults"
+        }
+        Some(Reason::UnknownChannel) => "`wheeleg channels` lists the channels",
+        _ => "`wheeleg ctl status` tells in which state the robot is",
+    }
+}
+
 /// What helps where nobody answers.
 const ANSWERS: &str = "`wheeleg ctl status` tells whether the server answers";
 
@@ -231,4 +249,25 @@ fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
         format!("the command has {bytes} bytes: allowed are {most}"),
         "`wheeleg commands` lists the commands of the robot, `wheeleg faults list` the faults",
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is misspelt is looked up in a list; what the robot cannot do now is asked of the robot.
+    #[test]
+    fn the_help_fits_the_reason() {
+        for (reason, part) in [
+            ("bad_argument", "wheeleg commands"),
+            ("bad_command", "wheeleg commands"),
+            ("unknown_channel", "wheeleg channels"),
+            ("no_air", "watch /supply"),
+            ("moving", "ctl status"),
+            ("not_in_control", "ctl status"),
+            ("of a later version", "ctl status"),
+        ] {
+            assert!(help(reason).contains(part), "{reason}: {}", help(reason));
+        }
+    }
 }

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 use wheeleg_access::Key as AccessKey;
 use wheeleg_console::client::{Client, Incoming};
+use wheeleg_protocol::Address;
 use wheeleg_sim::unmeasured;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Suspend;
 use wheeleg_studies::view::plain;
-use wheeleg_telemetry::channels;
+use wheeleg_telemetry::{PLACES, channels, listed};
 
 use super::super::{no_handler, stop_on_signals};
 use super::reach::{Reach, ended};
@@ -29,14 +30,6 @@ const UNCONFIRMED: Duration = Duration::from_millis(200);
 /// Events that are kept.
 const EVENTS: usize = 200;
 
-const JOINTS: [&str; 6] = [
-    "left yaw",
-    "left horizontal",
-    "left vertical",
-    "right yaw",
-    "right horizontal",
-    "right vertical",
-];
 const WHEELS: [(&str, &str); 2] = [("/wheel/7", "left wheel"), ("/wheel/8", "right wheel")];
 const FEET: [(&str, &str); 2] = [("/foot/left", "left foot"), ("/foot/right", "right foot")];
 
@@ -230,7 +223,7 @@ impl Seen {
         }
         put(false, String::new());
         put(false, self.joints_head());
-        for (n, name) in (1..).zip(JOINTS) {
+        for (n, name) in (1..=6).zip(PLACES) {
             put(false, self.joint(n, name));
         }
         put(false, String::new());
@@ -265,13 +258,7 @@ impl Seen {
     fn head(&self) -> String {
         let state = &self.state;
         let word = |value: &Value| plain(value.as_str().unwrap_or("-"));
-        let mode = match (&state["emergency_stop"], &state["hold"], &state["armed"]) {
-            _ if state["alive"] == false => "MASTER IS DEAD".to_owned(),
-            (Value::Bool(true), ..) => "STOPPED".to_owned(),
-            (_, Value::String(why), _) => format!("HOLD: {}", plain(why).replace('_', " ")),
-            (.., Value::Bool(true)) => "ARMED".to_owned(),
-            _ => "disarmed".to_owned(),
-        };
+        let mode = super::mode(state);
         let of = if state["simulated"] == false {
             "real boards"
         } else {
@@ -335,10 +322,12 @@ impl Seen {
 
     /// Each fault once, with all boards that have it.
     fn faults(&self) -> Vec<String> {
-        let mut faults: Vec<(&Value, Vec<String>)> = Vec::new();
+        let mut faults: Vec<(&Value, Vec<Address>)> = Vec::new();
         for board in self.state["boards"].as_array().into_iter().flatten() {
+            let Some(address) = super::address(board) else {
+                continue;
+            };
             for fault in board["faults"].as_array().into_iter().flatten() {
-                let address = board["address"].as_u64().unwrap_or_default().to_string();
                 match faults.iter_mut().find(|(known, _)| *known == fault) {
                     Some((_, boards)) => boards.push(address),
                     None => faults.push((fault, vec![address])),
@@ -346,10 +335,10 @@ impl Seen {
             }
         }
         let text = |value: &Value| plain(value.as_str().unwrap_or_default());
-        let line = |(fault, boards): (&Value, Vec<String>)| {
-            let boards = boards.join(", ");
+        let line = |(fault, boards): (&Value, Vec<Address>)| {
+            let boards = listed(&boards);
             let (cause, remedy) = (text(&fault["cause"]), text(&fault["remedy"]));
-            format!(" board {boards}: {cause} {remedy}")
+            format!(" {boards}: {cause} {remedy}")
         };
         faults.into_iter().map(line).collect()
     }
@@ -399,7 +388,7 @@ mod tests {
             }
             // Eight alike are one line.
             assert_eq!(text.matches("The sensor. Look.").count(), 1, "{text}");
-            assert!(text.contains("board 1, 2, 3, 4, 5, 6, 7, 8: "), "{text}");
+            assert!(text.contains(" joints 1–6, wheels 7–8: "), "{text}");
             assert!(text.contains("event 299"), "{text}");
             assert!(!text.contains("event 0\n"), "{text}");
             assert!(!text.contains("nothing new"), "{text}");
