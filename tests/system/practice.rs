@@ -668,7 +668,6 @@ fn a_robot_that_begins_without_air_waits_for_it() {
     ]);
     assert_eq!(code, Some(2), "{said}");
     for part in [
-        "waiting for air",
         "`supply.switch_on`",
         "`supply.initial_pressure`",
         "`start_up.limit`",

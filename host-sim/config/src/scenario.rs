@@ -325,10 +325,11 @@ fn read(r: &mut Reader, files: &Files<'_>, source: Origin<Arc<Source>>) -> Optio
 
 /// Those that are not switched off in the section `[behaviours]`.
 fn behaviours(r: &mut Reader) -> Behaviours {
-    let Some(entry) = r.table("behaviours") else {
+    let keys = keys::names(&keys::BEHAVIOURS);
+    let Some(entry) = r.optional_table("behaviours", &keys) else {
         return Behaviours::ALL;
     };
-    r.reject_misplaced(&entry, &keys::names(&keys::BEHAVIOURS), &TOP);
+    r.reject_misplaced(&entry, &keys, &TOP);
     let off = r.texts(&entry, "off", |text| {
         Behaviour::of_name(text).ok_or_else(|| {
             let names = Behaviour::ALL.map(Behaviour::name).join(", ");

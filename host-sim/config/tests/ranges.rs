@@ -100,7 +100,12 @@ fn what_contradicts_others_is_told_how_far_it_may_go() {
             "`node.joint.pwm_period` = 20000 us",
             "is allowed up to ",
         ),
-        ("duty_limit", 0.0, "other parameters", "is allowed from "),
+        (
+            "duty_limit",
+            0.0,
+            "`node.joint.dead_zone_duty` = 0.12",
+            "is allowed from ",
+        ),
     ] {
         let info = info(name);
         let Err(said) = read("node.joint", info, value) else {

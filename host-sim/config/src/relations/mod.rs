@@ -11,6 +11,7 @@ mod asked;
 mod board;
 mod laws;
 mod moved;
+mod reading;
 mod standing;
 mod table;
 

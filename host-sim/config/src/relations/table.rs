@@ -3,7 +3,7 @@
 use wheeleg_plant::cylinder::ROD_MOST;
 use wheeleg_protocol::param::JointParam;
 
-use super::{Facts, Relation, Rule, laws, moved, standing};
+use super::{Facts, Relation, Rule, laws, moved, reading, standing};
 
 type Fields = &'static [&'static str];
 
@@ -75,7 +75,7 @@ pub const RELATIONS: &[Relation] = &[
     at_most("hysteresis of the supply's contact", &["supply.switch_off", "supply.switch_on"], HYSTERESIS),
     below("supply's contact", &["supply.switch_on", "supply.set_pressure"], NO_CONTACT),
     at_most("hysteresis of the source's contact", &["source_switch.off", "source_switch.on"], HYSTERESIS),
-    below("source's contact", &["source_switch.on", "supply.source_pressure"], NO_CONTACT),
+    at_most("source's contact", &["source_switch.on", "supply.source_pressure"], NO_CONTACT),
     at_most("regulator", &["supply.set_pressure", "supply.source_pressure"], REGULATOR),
     at_most("filled reservoir", &["supply.initial_pressure", "supply.source_pressure"], REGULATOR),
     law("droop", &["supply.droop", "supply.set_pressure", "gas.ambient_pressure"], "a regulator that would be fully open below the surroundings alone", laws::droop),
@@ -156,10 +156,10 @@ pub const RELATIONS: &[Relation] = &[
     law("drawn chassis between the wheels", &["spatial.track", "spatial.wheel_width", "spatial.chassis_size"], "the wheels would be in the chassis as it is drawn", laws::drawn),
     law("ground below", &["body.gravity"], "the robot does not stand: its weight must point to the ground, at less than 45° from its normal", laws::gravity),
     // What its boards measure.
-    law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a broken wire", laws::codes),
-    law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a fault of the sensor", laws::calibration),
-    law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", laws::measured),
-    law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", laws::converter),
+    law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a broken wire", reading::codes),
+    law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a fault of the sensor", reading::calibration),
+    law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", reading::measured),
+    law("steps of the converter", &["sensor.adc.bits", "sensor.potentiometer.electrical_stroke", "node.joint.settle_band"], "a joint board would never come to rest: its band is a step of the converter, or little more", reading::converter),
     law("stop of a joint", &["cylinder.stroke", "node.joint.stroke_max", "gait.stroke", "node.joint.precharge", "node.joint.law"], "a joint board would press its piston beyond the stroke that it is told, and never take it for settled", laws::seat),
     law("reach of the yaw boards", &["node.yaw.stroke_max", "node.yaw.stroke_min", "node.joint.stroke_max", "node.joint.stroke_min", "homing.tolerance", "gait.yaw_s2"], REACH, laws::reach),
     law("reach of the horizontal boards", &["node.horizontal.stroke_max", "node.horizontal.stroke_min", "node.joint.stroke_max", "node.joint.stroke_min", "homing.tolerance", "gait.held_leg_s5", "gait.stroke"], REACH, laws::reach_from_home),
