@@ -102,7 +102,7 @@ fn a_walk_on_rocks_is_the_same_in_any_folder_on_one_thread_or_two() {
         let mut scenario = builtin::scenario_on_ground("rocks-20", seed).expect("built in");
         // The feet are on the rocks after 6 s, the wheels after 10 s.
         scenario.duration_s = 12.0;
-        let robot = builtin::robot_of(&scenario.robot, "rocks-20").expect("built in");
+        let robot = builtin::robot_of(&scenario, "rocks-20").expect("built in");
         hash(&scenario, &robot, 1)
     };
     let here = walk(1);

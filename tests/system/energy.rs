@@ -20,7 +20,7 @@ fn run(name: &str, accounted: bool) -> (Option<EnergyBalance>, String) {
     scenario.duration_s = scenario.duration_s.min(SHORT_S);
     let end_s = scenario.duration_s;
     scenario.events.retain(|event| event.at_s < end_s);
-    let robot = builtin::robot_of(&scenario.robot, name).expect("built in");
+    let robot = builtin::robot_of(&scenario, name).expect("built in");
     let mut recorder = Recorder::new(wheeleg_telemetry::Keep::nothing());
     let mut session = Session::new(Boards::default(), &scenario, &robot, 1).expect("it stands");
     if accounted {

@@ -91,13 +91,17 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
     RobotConfig::parse(&file, &text)
 }
 
-/// The robot that a scenario names. A relative path counts from the folder of
-/// the scenario's file, so that the two can be kept together.
+/// The robot that a scenario names, which has this name or path itself. A relative path counts from the
+/// folder of the scenario's file, so that the two can be kept together.
 ///
 /// # Errors
-/// As [`robot`].
-pub fn robot_of(robot_name_or_path: &str, scenario: &str) -> Result<RobotConfig, ConfigError> {
-    robot(&named_by(robot_name_or_path, scenario))
+/// As [`robot`]; one that is not there is told at its place in the scenario.
+pub fn robot_of(scenario: &Scenario, name_or_path: &str) -> Result<RobotConfig, ConfigError> {
+    let named = named_by(&scenario.robot, name_or_path);
+    robot(&named).map_err(|error| match find("robot", &named, ROBOTS) {
+        Err(missing) => scenario.refuse_robot(&missing).unwrap_or(error),
+        Ok(_) => error,
+    })
 }
 
 /// Name or path of the robot that a scenario names.

@@ -218,6 +218,19 @@ impl Scenario {
         Some(r.refusal(&what))
     }
 
+    /// A refusal of the robot that it names, which is not there; `None` if the file names none.
+    pub(crate) fn refuse_robot(&self, missing: &ConfigError) -> Option<ConfigError> {
+        let Source { file, text } = &*self.source.0;
+        let what = format!("the scenario file {file} is not usable");
+        let mut r = Reader::parse(&what, file, text, false).ok()?;
+        let top = r.table("")?;
+        let span = top.get("robot")?.1.span();
+        let help = missing.problems().first()?.help_text().map(str::to_owned);
+        let message = format!("`robot` = \"{}\": {missing}", self.robot);
+        r.problem(span, message, "is not there", help);
+        Some(r.refusal(&what))
+    }
+
     /// Reads a scenario from TOML text; `file` is its path, for messages and for the data files
     /// beside it.
     ///

@@ -347,7 +347,7 @@ fn a_walk_needs_the_strokes_that_it_is_planned_with() {
 fn built_in_scenarios_fit_their_robots() {
     for (name, ..) in builtin::SCENARIOS {
         let scenario = builtin::scenario(name).expect("built in");
-        let robot = builtin::robot_of(&scenario.robot, name).expect("built in");
+        let robot = builtin::robot_of(&scenario, name).expect("built in");
         if let Err(error) = scenario.check_with(&robot) {
             panic!("{name}: {}", report(&error));
         }

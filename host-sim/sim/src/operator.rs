@@ -266,8 +266,20 @@ impl Operator {
         waits
     }
 
-    /// The remedy, with what the joint is asked for that reported last.
+    /// The remedy, with what the joint is asked for that reported last, or with what leads a wheel.
     fn remedy_of_pose(&self) -> String {
+        let mut faults = self.start_up.iter().rev().map(|(_, cause)| cause);
+        let fault = faults.find(|cause| cause.kind() == EventKind::Fault);
+        if let Some(wheel) = fault
+            .and_then(Cause::board)
+            .filter(|board| !board.is_joint())
+        {
+            return format!(
+                "`[node.wheel]` and `[motor]` of the robot decide whether the loop of {wheel} is stable, which \
+                 reports this; {}",
+                self.remedy
+            );
+        }
         // A walk begins where the robot stands.
         if matches!(self.motion, Motion::Walk(_)) {
             return self.remedy.clone();

@@ -56,18 +56,30 @@ fn slips(params: &PlantParams, parts: Range<usize>) -> Option<[String; 2]> {
 /// Sections of the ground that are tried, nearest to the begin of the file first.
 const MOST_TRIED: usize = 200;
 
-/// The section of the scenario's ground without which the robot stands.
+/// The section of the scenario's ground without which the robot stands; of a plane or a map, with level
+/// ground in its place.
 fn culprit(ground: &Ground, params: &PlantParams) -> Option<(usize, Range<usize>)> {
-    let is_culprit = |parts: &Range<usize>| {
+    let without = |parts: &Range<usize>| {
         let mut without = params.clone();
         without.terrain.parts.drain(parts.clone());
         if without.terrain.parts.is_empty() {
             without.terrain = Terrain::default();
         }
-        stands(&without)
+        without
     };
-    let mut sections = ground.sections().take(MOST_TRIED);
-    sections.find(|(_, parts)| is_culprit(parts))
+    let levelled = |parts: &Range<usize>| {
+        let mut own = params.terrain.parts[parts.clone()].iter();
+        let is_ground = own.all(|part| matches!(part.shape, Shape::Plane(_) | Shape::HeightMap(_)));
+        let mut levelled = without(parts);
+        levelled.terrain.parts.push(Part {
+            shape: Shape::Plane(Plane::sloping(0.0, 0.0)),
+            material: Material::ROUGH,
+        });
+        is_ground && stands(&levelled)
+    };
+    let sections = || ground.sections().take(MOST_TRIED);
+    let alone = sections().find(|(_, parts)| stands(&without(parts)));
+    alone.or_else(|| sections().find(|(_, parts)| levelled(parts)))
 }
 
 /// Where wheels and soles are in the start pose, in words.
@@ -188,6 +200,29 @@ mod tests {
         assert!(said.contains("height = \"1 m\""), "{said}");
         let help = problem.help_text().expect("what is allowed");
         assert!(help.contains("wheels are at x = 0 and y = ±0.2"), "{help}");
+    }
+
+    /// Ground that is too steep is found beside another part, without which there is no ground at the start.
+    #[test]
+    fn a_slope_that_is_too_steep_is_named_beside_other_parts() {
+        const FAR: &str = "[[terrain]]\nkind = \"block\"\nx = { value = [3.0, 4.0], unit = \"m\" }\n\
+            y = { value = [0.1, 0.4], unit = \"m\" }\nheight = \"100 mm\"\n";
+        let head = "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
+            seed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n";
+        let steep = "[[terrain]]\nkind = \"plane\"\nslope = \"40 deg\"\n";
+        let ice = "[[terrain]]\nkind = \"plane\"\nslope = \"12 deg\"\nmaterial = \"ice\"\n";
+        for (plane, told) in [(steep, "nose uphill up to "), (ice, "a slope up to 5°")] {
+            for (text, place) in [
+                (format!("{head}{plane}{FAR}"), "`terrain[0]`"),
+                (format!("{head}{FAR}{plane}"), "`terrain[1]`"),
+            ] {
+                let problem = refused_on(&text);
+                let said = problem.summary();
+                assert!(said.contains(place) && said.contains("slope"), "{said}");
+                let help = problem.help_text().expect("what is allowed");
+                assert!(help.contains(told), "{help}");
+            }
+        }
     }
 
     /// What slips is told of its friction, and of the slope that this friction holds.

@@ -228,7 +228,7 @@ fn tried(
     stop: &study::Progress,
 ) -> Result<Option<Run>, StudyError> {
     let scenario = builtin::scenario_on_ground(name, seed)?;
-    let robot = builtin::robot_of(&scenario.robot, name)?;
+    let robot = builtin::robot_of(&scenario, name)?;
     let recorder = Recorder::new(Keep::nothing());
     let simulated = simulate(
         Boards::default(),

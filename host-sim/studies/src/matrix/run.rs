@@ -54,7 +54,7 @@ impl Robots {
     /// For these rows.
     fn new(rows: &[&Row], seed: u64) -> Result<Self, StudyError> {
         let scenario = builtin::scenario(DEFAULT_SCENARIO)?;
-        let plain = builtin::robot_of(&scenario.robot, DEFAULT_SCENARIO)?;
+        let plain = builtin::robot_of(&scenario, DEFAULT_SCENARIO)?;
         let mut reflex = plain.clone();
         reflex.gait.touchdown_reflex = true;
         let mut long = plain.clone();

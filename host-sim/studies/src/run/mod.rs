@@ -121,7 +121,7 @@ fn run_on(
     scenario.faults.extend_from_slice(&options.faults);
     let mut robot = match &options.robot {
         Some(robot) => builtin::robot(robot)?,
-        None => builtin::robot_of(&scenario.robot, &options.scenario)?,
+        None => builtin::robot_of(&scenario, &options.scenario)?,
     };
     if let Some(law) = options.law {
         robot.set_law(law);

@@ -34,7 +34,7 @@ pub(super) fn command(args: &BoardsArgs) -> Result<ExitCode, StudyError> {
     let scenario = builtin::scenario(&args.scenario)?;
     let robot = match &args.robot {
         Some(robot) => builtin::robot(robot)?,
-        None => builtin::robot_of(&scenario.robot, &args.scenario)?,
+        None => builtin::robot_of(&scenario, &args.scenario)?,
     };
     let mut boards = LineBoards::new(&scenario, &robot, scenario.seed)?;
     let mut pty = Pty::open().map_err(SimError::from)?;

@@ -134,7 +134,7 @@ impl Robot {
         let read = builtin::scenario(scenario).map_err(config)?;
         let robot = match robot {
             Some(robot) => builtin::robot(robot),
-            None => builtin::robot_of(&read.robot, scenario),
+            None => builtin::robot_of(&read, scenario),
         };
         Self::of(py, read, robot.map_err(config)?, seed)
     }
