@@ -5,7 +5,7 @@ use std::fs;
 use wheeleg_campaign::{Outcome, Status, merge, report};
 use wheeleg_studies::study::Stop;
 
-use crate::common::{computed, options, run_in, spread};
+use crate::common::{BASE, HEAD, computed, options, plan_of, run_in, spread};
 
 #[test]
 fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
@@ -94,6 +94,49 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     }
     assert!(html.contains("planted &lt;b&gt;") && !html.contains("planted <b>"));
     assert!(html.len() < 10_000_000);
+}
+
+/// The page begins with what came of it; of very many cells it shows the first twenty, and folds the others.
+#[test]
+fn the_page_begins_with_its_verdict_and_folds_what_is_long() {
+    let grid: Vec<String> = (0..25).map(|i| format!("0.{:02}", 20 + i)).collect();
+    let plan = plan_of(&format!(
+        "samples = 1\n{HEAD}{BASE}[factor.droop]\nparameter = \"robot.supply.droop\"\ngrid = [{}]\nunit = \"bar\"\n",
+        grid.join(", ")
+    ));
+    let folder = tempfile::tempdir().expect("a folder");
+    run_in(folder.path(), &plan, &options(2), &|case| {
+        let passed = Some(case.place.index != 7);
+        Some(Outcome {
+            passed,
+            ..computed(case)
+        })
+    })
+    .0
+    .expect("it runs");
+    let table = folder.path().join("cases.parquet");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let page = folder.path().join("cases.html");
+    let report = report::Report::of(&table, None).expect("a table");
+    report.write(&page).expect("a page");
+    let html = fs::read_to_string(&page).expect("there");
+    let verdict = "All required targets are met in 24 of 25 cases: 96.0 %";
+    let [verdict, title] = [verdict, ">Campaign test<"].map(|text| {
+        let place = html.find(text);
+        place.unwrap_or_else(|| panic!("the page has no {text}"))
+    });
+    assert!(verdict < title, "the verdict stands above the title");
+    assert!(html.contains("; the fewest with droop 0.27: 0 of 1."));
+    let others = html.find("<summary>The other 5 cells</summary>");
+    let others = others.expect("five cells are folded");
+    let cells = |part: &str| part.matches("<tr><td>droop 0.").count();
+    let end = html[others..].find("</details>").expect("its end") + others;
+    assert_eq!((cells(&html[..others]), cells(&html[others..end])), (20, 5));
+    let targets = format!(
+        "<summary>{} targets in 25 cells</summary>",
+        report.findings.targets.len()
+    );
+    assert!(html.contains(&targets), "{targets}");
 }
 
 /// Where all passed, those are listed that were nearest to a limit.

@@ -501,7 +501,7 @@ mod tests {
         let options = Options {
             axes: Vec::new(),
             kinds: vec![Kind::PwmP],
-            moves: Some(vec![Move::Step20, Move::SCurve]),
+            moves: Some(vec![Move::SCurve, Move::Hold]),
             seeds: 1,
             seed: 1,
             combinations: 0,
@@ -514,7 +514,7 @@ mod tests {
         // So light that the step cannot follow its bristles: on reading this would be refused.
         let mut light = sound.clone();
         light.name = "light".to_owned();
-        light.axis.moving_mass_kg = 0.005;
+        light.axis.moving_mass_kg = 0.02;
         let played = |configs| {
             let progress = Progress::silent();
             Comparison::play(&options, configs, None, &progress).expect("played")
