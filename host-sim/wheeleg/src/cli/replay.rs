@@ -84,9 +84,10 @@ pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
     };
     let whole = tell_unwritten(unwritten.into_iter().collect());
     if let Some(signal) = stop.signal().filter(|_| replayed.stopped) {
-        if replayed.compared > 0 {
-            tell("stopped; the part replayed so far was compared");
-        }
+        tell(match replayed.compared {
+            0 => "stopped before anything could be compared",
+            _ => "stopped; the part replayed so far was compared",
+        });
         return Ok(ExitCode::from(signal.exit_code()));
     }
     if !whole {
