@@ -13,6 +13,9 @@
 //! by itself. Where that brings it to its end stop, the side is given up, its chamber
 //! vented, and the search begins anew from the other one.
 //!
+//! A chamber that is full to begin with gives way to no pulse. A search without a result is repeated once, from a
+//! known state: each side then begins with both chambers open to the atmosphere for two seconds.
+//!
 //! t_off does not show this way. Both delays of a valve come from one coil and
 //! one spring: it is taken to differ from its data sheet by the same factor.
 
@@ -24,6 +27,8 @@ const PERIOD: u16 = 30;
 /// Standing still before pulses begin, ticks: a loaded, vented piston first runs
 /// to its end stop.
 const PAUSE: u16 = 200;
+/// For so long both chambers are open to the atmosphere before a side of the second search, ticks (2 s).
+const EMPTIES: u16 = 2000;
 /// Coarse and fine steps, µs.
 const COARSE: u16 = 200;
 const FINE: u16 = 50;
@@ -60,6 +65,8 @@ pub struct DelayProbe {
     pulse: u16,
     /// Pulse at which this side is given up.
     longest: u16,
+    /// Ticks for which both chambers still are to be open to the atmosphere; `None` in the first search.
+    empties: Option<u16>,
     /// Ticks since the pulse began, or of the pause.
     at: u16,
     /// Stroke at the start of the pause, or of the pulse before this one.
@@ -86,6 +93,7 @@ impl DelayProbe {
             rod_side: false,
             pulse: SHORTEST,
             longest: LONGEST,
+            empties: None,
             at: 0,
             base: None,
             begun: 0,
@@ -115,6 +123,11 @@ impl DelayProbe {
         let travel = position.saturating_sub(base);
         match self.phase {
             Phase::Done => [0; 4],
+            Phase::Pause if self.empties.is_some_and(|left| left > 0) => {
+                self.empties = self.empties.map(|left| left.saturating_sub(1));
+                self.base = None;
+                [0, 1000, 0, 1000]
+            }
             Phase::Pause => {
                 self.at = self.at.saturating_add(1);
                 if travel.saturating_abs() > MOVED >> 2 {
@@ -188,16 +201,25 @@ impl DelayProbe {
         if self.pulse <= self.longest {
             return;
         }
-        if self.rod_side {
-            self.phase = Phase::Done;
-        } else {
+        if !self.rod_side {
             // Against an end stop, or the load: the other way.
-            self.rod_side = true;
-            self.fine = false;
-            self.pulse = SHORTEST;
-            self.longest = LONGEST;
-            self.pause();
+            self.empties = self.empties.map(|_| EMPTIES);
+            self.begin(true);
+        } else if self.found.is_none() && self.empties.is_none() {
+            self.empties = Some(EMPTIES);
+            self.begin(false);
+        } else {
+            self.phase = Phase::Done;
         }
+    }
+
+    /// The search from one side, in coarse steps.
+    fn begin(&mut self, rod_side: bool) {
+        self.rod_side = rod_side;
+        self.fine = false;
+        self.pulse = SHORTEST;
+        self.longest = LONGEST;
+        self.pause();
     }
 }
 
@@ -228,6 +250,31 @@ mod tests {
             }
         }
         search.t_on()
+    }
+
+    /// Chambers that are full let no pulse move the piston until both have been open to the atmosphere for a second.
+    #[test]
+    fn chambers_that_are_full_at_first_are_emptied() {
+        let t_on = 3_500;
+        let mut search = DelayProbe::new();
+        let (mut left, mut position, mut on_us) = ([1_000_u32; 2], 40.0, 0);
+        for _ in 0..60_000 {
+            let [fill_a, vent_a, _, vent_b] = search.tick(PositionMm::from_f64(position));
+            for (left, vent) in left.iter_mut().zip([vent_a, vent_b]) {
+                *left = left.saturating_sub(u32::from(vent / 1000));
+            }
+            on_us = if fill_a == 0 {
+                0
+            } else {
+                on_us + u32::from(fill_a)
+            };
+            if on_us > t_on && left == [0; 2] {
+                position += 0.3;
+                on_us = 0;
+            }
+        }
+        let found = search.t_on().expect("moves").get();
+        assert!(found.abs_diff(t_on) <= 300, "{found}");
     }
 
     #[test]
