@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::compare::controller;
 use super::exit::FAILED;
-use super::{print, stop_on_signals, tell, tell_error};
+use super::{print, stop_on_signals, tell, tell_error, write_file};
 use wheeleg_config::{AxisConfig, builtin};
 use wheeleg_fmu::archive;
 use wheeleg_fmu::description::Fmi;
@@ -16,7 +16,7 @@ use wheeleg_report::results::{PARQUET, ROS2};
 use wheeleg_scene::urdf;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::Kind as Law;
-use wheeleg_studies::export::{layout, log_of, parquet, ros2, write_new};
+use wheeleg_studies::export::{layout, log_of, parquet, ros2};
 use wheeleg_studies::study::Progress;
 
 /// Arguments of `wheeleg export`.
@@ -185,7 +185,7 @@ fn unit(args: &FmuArgs) -> Result<ExitCode, StudyError> {
     let library = args.library.as_deref();
     let axis = Path::new(&args.axis);
     let reads: Vec<&Path> = library.into_iter().chain([axis]).collect();
-    write_new(&out, &bytes, &reads)?;
+    write_file(&out, &bytes, &reads)?;
     let (count, place) = (model.variables.len(), out.display());
     print(&format!(
         "{count} variables, {} kB in {place}\n",
@@ -197,7 +197,7 @@ fn write(text: &str, args: &OutArgs, reads: &[&Path]) -> Result<ExitCode, StudyE
     match &args.out {
         None => print(text),
         Some(path) => {
-            write_new(path, text, reads)?;
+            write_file(path, text, reads)?;
             Ok(ExitCode::SUCCESS)
         }
     }

@@ -41,6 +41,7 @@ use terminal_size::{Width, terminal_size_of};
 use wheeleg_config::builtin::DEFAULT_SCENARIO;
 use wheeleg_report::plot::ensure_png;
 use wheeleg_studies::StudyError;
+use wheeleg_studies::export::write_new;
 use wheeleg_studies::study::{Finished, Settings, Stop, outlive_file_limit};
 
 use exit::{FAILED, TARGETS_MISSED};
@@ -238,6 +239,15 @@ fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
         png,
         stop: stop_on_signals()?,
     })
+}
+
+/// Writes a small file, which is there as a whole or not at all: a signal waits for it. What is no file, such as
+/// a pipe, may have to be waited for without end.
+fn write_file(path: &Path, content: impl AsRef<[u8]>, reads: &[&Path]) -> Result<(), StudyError> {
+    if path.is_file() || !path.exists() {
+        let _waits = stop_on_signals()?;
+    }
+    write_new(path, content, reads)
 }
 
 /// Ctrl-C, TERM and HUP stop a study, which finishes its files.

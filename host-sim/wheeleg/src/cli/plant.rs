@@ -5,13 +5,12 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::{print, show};
+use super::{print, show, write_file};
 use wheeleg_config::{AxisConfig, brief};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::export;
 use wheeleg_studies::axis_sim::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
 use wheeleg_studies::axis_sim::suite::AxisSimError;
-use wheeleg_studies::export::write_new;
 
 /// Exit code of a check beyond its limit.
 const BEYOND: u8 = 1;
@@ -61,7 +60,7 @@ pub(super) fn command(args: &PlantArgs) -> Result<ExitCode, StudyError> {
             let config = AxisConfig::load(&args.axis)?;
             let value = export::sequences(&config.name, &config.axis)
                 .map_err(|e| plant_error(&args.axis, &e))?;
-            write_new(&args.out, format!("{value}\n"), &[Path::new(&args.axis)])?;
+            write_file(&args.out, format!("{value}\n"), &[Path::new(&args.axis)])?;
             Ok(ExitCode::SUCCESS)
         }
     }
