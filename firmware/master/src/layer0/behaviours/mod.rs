@@ -264,10 +264,10 @@ impl Behaving {
         }
         let bumps = self.bump.map(|one| one.met());
         let gives_way = self.contact.gives_way();
-        let gave_way = self.pace.gave_way();
+        self.stuck.wheels_gave_way(self.pace.gave_way());
         let stuck = self
             .stuck
-            .update(senses, &plan, setpoints, landed, bumps, gave_way, enabled);
+            .update(senses, &plan, setpoints, landed, bumps, enabled);
         if stuck {
             self.pace.forget();
         }

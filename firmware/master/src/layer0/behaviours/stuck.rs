@@ -39,6 +39,8 @@ pub(super) struct Stuck {
     moved: bool,
     /// Travel of the wheels from which progress counts, µm.
     anchor_um: [i64; WHEELS],
+    /// How often the wheels have given way of late.
+    gave_way: u8,
     /// Cycles since a standing leg has moved.
     idle: u16,
     /// The swing of a leg has run against something.
@@ -53,9 +55,13 @@ pub(super) struct Stuck {
 }
 
 impl Stuck {
+    /// How often the wheels have given way of late.
+    pub(super) const fn wheels_gave_way(&mut self, times: u8) {
+        self.gave_way = times;
+    }
+
     /// One cycle; whether the robot is stuck. It is told again after as long a time. `landed`: feet
-    /// that have just come down; `bumps`: that have just run against something; `gave_way`: how often the
-    /// wheels have given way of late.
+    /// that have just come down; `bumps`: that have just run against something.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
@@ -63,7 +69,6 @@ impl Stuck {
         setpoints: &Setpoints,
         landed: [bool; WHEELS],
         bumps: [bool; WHEELS],
-        gave_way: u8,
         enabled: Behaviours,
     ) -> bool {
         self.count(landed, bumps);
@@ -87,7 +92,7 @@ impl Stuck {
         };
         self.stuck_um = self.stuck_um.filter(|before| near(*before));
         let most = |first: u8| self.stuck_um.map_or(first, |_| AGAIN);
-        let repeats = self.bumps >= most(BUMPED) || gave_way >= most(GAVE_WAY);
+        let repeats = self.bumps >= most(BUMPED) || self.gave_way >= most(GAVE_WAY);
         let stuck = self.idle > PATIENCE || blocked || repeats;
         if stuck {
             self.stuck_um = Some(now_um);
