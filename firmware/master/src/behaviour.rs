@@ -39,7 +39,7 @@ pub const BEHAVIOURS: usize = 11;
 behaviours! {
     /// An axis that pulls at its limit and does not move holds where it is.
     Overload = 1, "overload";
-    /// Where no foot carries the wheels stop, and no leg extends far: that lifts the nose.
+    /// Where no foot carries the wheels stop, then give way, and no leg extends far: that lifts the nose.
     TipGuard = 2, "tip-guard";
     /// A foot that goes down stops where its switches close.
     Touchdown = 3, "touchdown";

@@ -266,6 +266,8 @@ pub struct Acts {
     pub stuck: u8,
     /// Share of the walk's speed at which the wheels go, 0 to 1.
     pub pace: I16F16,
+    /// What the wheels are led back in a cycle, mm: they give way to a nose that they hold up.
+    pub back_mm: PositionMm,
 }
 
 impl Default for Acts {
@@ -280,6 +282,7 @@ impl Default for Acts {
             bumps: [0; WHEELS],
             stuck: 0,
             pace: I16F16::ONE,
+            back_mm: PositionMm::ZERO,
         }
     }
 }

@@ -64,6 +64,8 @@ const TRIES: u8 = 3;
 /// The governor is told when it takes more than this share of the speed, and again only after it
 /// has given all of it back.
 const GOVERNED: f32 = 0.5;
+/// The nose has sunk where both legs are shorter than this share of the height ordered.
+const SUNK: f32 = 0.5;
 /// Acts that wait to be told.
 const TOLD: usize = 2;
 /// The wheels' references restart after this distance, mm, far below what they can tell.
@@ -264,8 +266,10 @@ impl Walk {
         self.wheels_um = feedback.wheels_um;
         let metres = |now: i64, before: i64| now.saturating_sub(before) as f32 * 1e-6;
         let way = [metres(now_left, left), metres(now_right, right)];
+        // Wheels that layer 0 leads back are not behind.
+        let back_mm = self.acts.back_mm.get().to_num::<f32>();
         for (lead, way) in self.lead_mm.iter_mut().zip(way) {
-            *lead -= 1e3 * way;
+            *lead -= 1e3 * way + back_mm;
         }
         Twist::of_wheels(&self.geometry, way)
     }
@@ -296,8 +300,11 @@ impl Walk {
         } else {
             plan_mm - 0.5 * (left.stood_mm(&self.acts) + right.stood_mm(&self.acts))
         };
-        // A leg that extends there would climb it, and lift the nose.
-        let rise = if left.may_stand_at_a_face() || right.may_stand_at_a_face() {
+        // A leg that extends there would climb it, and lift the nose. But where both are short the nose
+        // has sunk: feet that cannot be lifted run against everything.
+        let longest_mm = left.stood_mm(&self.acts).max(right.stood_mm(&self.acts));
+        let sunk = longest_mm < SUNK * plan_mm;
+        let rise = if !sunk && (left.may_stand_at_a_face() || right.may_stand_at_a_face()) {
             rise.min(0.0)
         } else {
             rise

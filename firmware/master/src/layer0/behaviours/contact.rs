@@ -15,6 +15,9 @@ const FOLLOW_MM: PositionMm = PositionMm::from_int(1);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(20);
 /// The same while no foot carries: a leg that extends lifts the nose.
 const TIPPING_MM: PositionMm = PositionMm::from_int(10);
+/// Cycles without any foot on the ground after which the wheels give way (200 ms): what holds the nose
+/// up is their torque.
+const GIVES_WAY: u16 = 20;
 /// Pace while a foot looks for the ground.
 const HALF: I16F16 = I16F16::lit("0.5");
 
@@ -41,6 +44,11 @@ impl Contact {
         self.deep
     }
 
+    /// The wheels hold the nose up: they are to give way.
+    pub(super) fn gives_way(&self) -> bool {
+        self.tipping && self.open.iter().all(|open| *open > GIVES_WAY)
+    }
+
     /// What legs have extended.
     pub(super) const fn followed_mm(&self) -> [PositionMm; WHEELS] {
         self.followed_mm
@@ -64,16 +72,14 @@ impl Contact {
         enabled: Behaviours,
     ) -> [Option<Act>; 3] {
         let mut hangs = [false; WHEELS];
-        // Feet that look for the ground: while all do, none carries.
-        let mut looks = true;
         for ((side, open), hangs) in SIDES.into_iter().zip(&mut self.open).zip(&mut hangs) {
             let touches = senses.touches(side).unwrap_or(false);
             *open = if touches { 0 } else { open.saturating_add(1) };
-            let leg = plan.leg(side);
-            *hangs = leg == LegPlan::Stance && *open > LOST;
-            looks &= matches!(leg, LegPlan::Lower(_)) && *open > LOST;
+            *hangs = plan.leg(side) == LegPlan::Stance && *open > LOST;
         }
-        let tips = enabled.contains(Behaviour::TipGuard) && (looks || hangs == [true; WHEELS]);
+        // Whatever they are about: one that swings carries nothing either.
+        let none_carries = self.open.iter().all(|open| *open > LOST);
+        let tips = enabled.contains(Behaviour::TipGuard) && none_carries;
         let mut acts = [None; 3];
         if let ([first, ..], true) = (&mut acts, tips && !self.tipping) {
             *first = Some(Act::TipGuard);

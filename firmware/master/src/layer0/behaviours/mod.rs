@@ -263,13 +263,19 @@ impl Behaving {
             }
         }
         let bumps = self.bump.map(|one| one.met());
+        let gives_way = self.contact.gives_way();
+        self.stuck.wheels_gave_way(self.pace.gave_way());
         let stuck = self
             .stuck
             .update(senses, &plan, setpoints, landed, bumps, enabled);
+        if stuck {
+            self.pace.forget();
+        }
         let waits = self.bump.iter().any(|one| one.place_mm().is_some());
         let bump = if waits { I16F16::ZERO } else { I16F16::ONE };
         let pace = self.contact.pace().min(self.slip.pace()).min(bump);
         self.pace.wish(pace);
+        self.pace.give_way(gives_way);
         self.acts = Acts {
             enabled,
             landing: self.touchdown.map(|one| one.landing()),
@@ -280,6 +286,7 @@ impl Behaving {
             bumps: self.acts.bumps,
             stuck: self.acts.stuck.wrapping_add(u8::from(stuck)),
             pace: self.pace.share(),
+            back_mm: self.pace.back_mm(),
         };
     }
 
@@ -308,6 +315,7 @@ impl Behaving {
             ..Self::new(self.enabled, self.geometry)
         };
         self.pace.wish(I16F16::ONE);
+        self.pace.give_way(false);
     }
 
     /// The set-point of joint index 0..6 after what the behaviours make of it, with what the walk is

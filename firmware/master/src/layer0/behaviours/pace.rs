@@ -1,5 +1,8 @@
 //! The wheels of a walk, at the pace that the behaviours allow.
 //!
+//! Where no foot carries, what holds the nose up is the torque of the wheels: wheels that are held keep
+//! it up, legs that extend do not reach the ground. So they go back until a foot carries.
+//!
 //! Layer 1 gives the position that the wheels should have. Travel that the behaviours withhold is
 //! given up, not caught up. While layer 1 is late the wheels continue as before, and slow down if it
 //! stays away; the distance covered in the meantime is not taken back.
@@ -11,6 +14,12 @@ use crate::setpoint::{TravelSetpoint, WHEELS, WheelTravel};
 
 /// Change of a wheel's speed in a cycle while the pace changes: 0.3 m/s².
 const STEP_MM_S: I16F16 = I16F16::lit("3");
+/// Wheels that give way do so at this speed …
+const BACK_MM_S: I16F16 = I16F16::lit("50");
+/// … and by so much, mm: about blocked wheels the chassis turns by 30 degrees.
+const BACK_MM: I16F16 = I16F16::lit("80");
+/// How often they do is counted over a way of half a metre.
+const COUNTED_MM: I16F16 = I16F16::lit("500");
 /// Bus cycle, s.
 const CYCLE_S: I16F16 = I16F16::lit("0.01");
 
@@ -27,6 +36,13 @@ pub(super) struct Pace {
     late: bool,
     share: I16F16,
     wish: I16F16,
+    /// The wheels are to give way, do so at this speed, mm/s, and have done so, mm.
+    gives_way: bool,
+    back_mm_s: I16F16,
+    back_mm: I16F16,
+    /// How often they have given way, and the way since the first time, mm.
+    gave: u8,
+    since_mm: I16F16,
 }
 
 impl Default for Pace {
@@ -39,6 +55,11 @@ impl Default for Pace {
             late: false,
             share: I16F16::ONE,
             wish: I16F16::ONE,
+            gives_way: false,
+            back_mm_s: I16F16::ZERO,
+            back_mm: I16F16::ZERO,
+            gave: 0,
+            since_mm: I16F16::ZERO,
         }
     }
 }
@@ -54,6 +75,40 @@ impl Pace {
         self.wish = share;
     }
 
+    /// Whether the wheels are to give way: what holds the nose up is their torque.
+    pub(super) fn give_way(&mut self, gives_way: bool) {
+        if gives_way && !self.gives_way {
+            self.gave = self.gave.saturating_add(1);
+        }
+        self.gives_way = gives_way;
+    }
+
+    /// How often the wheels have given way on the last half metre.
+    pub(super) const fn gave_way(&self) -> u8 {
+        self.gave
+    }
+
+    /// Counts anew.
+    pub(super) fn forget(&mut self) {
+        self.gave = 0;
+    }
+
+    /// What the wheels are led in a cycle, mm, counts from the first time that they gave way.
+    fn count_way(&mut self, step_mm: I16F16) {
+        self.since_mm = match self.gave {
+            0 => I16F16::ZERO,
+            _ => self.since_mm.saturating_add(step_mm),
+        };
+        if self.since_mm >= COUNTED_MM {
+            self.gave = 0;
+        }
+    }
+
+    /// What the wheels are led back in a cycle, mm.
+    pub(super) fn back_mm(&self) -> PositionMm {
+        PositionMm::new(self.back_mm_s.saturating_mul(CYCLE_S))
+    }
+
     /// References of the wheels from those of layer 1.
     pub(super) fn lead(
         &mut self,
@@ -66,11 +121,17 @@ impl Pace {
             self.told_mm = [PositionMm::ZERO; WHEELS];
             self.led_mm = [PositionMm::ZERO; WHEELS];
         }
+        // Before the share: wheels stop before they go back.
+        let goes_back = self.back_mm_s > I16F16::ZERO;
+        self.slew_back(walks);
         if walks {
-            self.slew(&travel);
+            self.slew(&travel, goes_back);
         } else {
             self.share = I16F16::ONE;
+            self.gave = 0;
         }
+        let back_mm = self.back_mm();
+        let mut way_mm = I16F16::ZERO;
         let late = core::mem::replace(&mut self.late, !fresh) || !fresh;
         let mut out = travel;
         let places = self.told_mm.iter_mut().zip(&mut self.led_mm);
@@ -88,6 +149,9 @@ impl Pace {
             } else {
                 PositionMm::new(step.get().saturating_mul(self.share))
             };
+            let step = step.saturating_sub(back_mm);
+            let half = step.get().saturating_mul(I16F16::lit("0.5"));
+            way_mm = way_mm.saturating_add(half);
             *led = led.saturating_add(step);
             let ahead = wheel.target_mm.saturating_sub(wheel.travel_mm);
             wheel.travel_mm = *led;
@@ -96,13 +160,33 @@ impl Pace {
                 wheel.velocity_mm_s = VelocityMmS::new(speed.saturating_mul(self.share));
             }
             *led_mm_s = wheel.velocity_mm_s.get();
+            wheel.velocity_mm_s = VelocityMmS::new(led_mm_s.saturating_sub(self.back_mm_s));
         }
+        self.count_way(way_mm);
         out
+    }
+
+    /// Brings the speed at which the wheels give way as near to what is wanted as their acceleration
+    /// allows.
+    fn slew_back(&mut self, walks: bool) {
+        let stopped = self.share == I16F16::ZERO;
+        let goes = walks && stopped && self.gives_way && self.back_mm < BACK_MM;
+        self.back_mm_s = if goes {
+            self.back_mm_s.saturating_add(STEP_MM_S).min(BACK_MM_S)
+        } else {
+            self.back_mm_s.saturating_sub(STEP_MM_S).max(I16F16::ZERO)
+        };
+        self.back_mm = if self.gives_way {
+            let step = self.back_mm_s.saturating_mul(CYCLE_S);
+            self.back_mm.saturating_add(step)
+        } else {
+            I16F16::ZERO
+        };
     }
 
     /// Brings the share as near to the wish as the acceleration of the wheels allows, whatever
     /// layer 1 makes of their speed meanwhile.
-    fn slew(&mut self, travel: &TravelSetpoint) {
+    fn slew(&mut self, travel: &TravelSetpoint, goes_back: bool) {
         if self.share == I16F16::ONE && self.wish == I16F16::ONE {
             // Nothing is held back: layer 1 has its own limits.
             return;
@@ -114,7 +198,8 @@ impl Pace {
             most = most.min(fastest);
         }
         // Where two wheels do not agree, slowly.
-        self.share = self.wish.max(least).min(most);
+        let wish = if goes_back { I16F16::ZERO } else { self.wish };
+        self.share = wish.max(least).min(most);
     }
 }
 

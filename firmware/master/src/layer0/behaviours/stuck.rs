@@ -16,8 +16,10 @@ const PATIENCE: u16 = 300;
 /// So many swings in a row that ran against something make no progress, whatever wheels and legs
 /// do: before a wall both may slip alike.
 const BUMPED: u8 = 3;
-/// After a robot has been stuck so many are enough, until its wheels have gone so far, µm (0.5 m).
-const BUMPED_AGAIN: u8 = 2;
+/// So often wheels that give way on half a metre get it nowhere: soft ground carries the nose up again and again.
+const GAVE_WAY: u8 = 5;
+/// After a robot has been stuck so many of both are enough, until its wheels have gone so far, µm (0.5 m).
+const AGAIN: u8 = 2;
 const AGAIN_UM: i64 = 500_000;
 /// Motor command that is all that a wheel has, %, …
 const EFFORT_PERCENT: u16 = 90;
@@ -37,6 +39,8 @@ pub(super) struct Stuck {
     moved: bool,
     /// Travel of the wheels from which progress counts, µm.
     anchor_um: [i64; WHEELS],
+    /// How often the wheels have given way of late.
+    gave_way: u8,
     /// Cycles since a standing leg has moved.
     idle: u16,
     /// The swing of a leg has run against something.
@@ -51,6 +55,11 @@ pub(super) struct Stuck {
 }
 
 impl Stuck {
+    /// How often the wheels have given way of late.
+    pub(super) const fn wheels_gave_way(&mut self, times: u8) {
+        self.gave_way = times;
+    }
+
     /// One cycle; whether the robot is stuck. It is told again after as long a time. `landed`: feet
     /// that have just come down; `bumps`: that have just run against something.
     pub(super) fn update(
@@ -82,8 +91,9 @@ impl Stuck {
             ways.all(|(now, before)| now.saturating_sub(before).saturating_abs() < AGAIN_UM)
         };
         self.stuck_um = self.stuck_um.filter(|before| near(*before));
-        let most = self.stuck_um.map_or(BUMPED, |_| BUMPED_AGAIN);
-        let stuck = self.idle > PATIENCE || blocked || self.bumps >= most;
+        let most = |first: u8| self.stuck_um.map_or(first, |_| AGAIN);
+        let repeats = self.bumps >= most(BUMPED) || self.gave_way >= most(GAVE_WAY);
+        let stuck = self.idle > PATIENCE || blocked || repeats;
         if stuck {
             self.stuck_um = Some(now_um);
             self.idle = 0;
