@@ -183,12 +183,17 @@ impl Scenario {
         std::iter::once(own.to_owned()).chain(beside).collect()
     }
 
+    /// A reader of its text, for a refusal of something in it, and the head of that.
+    fn reader(&self) -> Result<(Reader, String), ConfigError> {
+        let Source { file, text } = &*self.source.0;
+        let what = format!("the scenario file {file} is not usable");
+        Ok((Reader::parse(&what, file, text, false)?, what))
+    }
+
     /// A refusal of the section `[[terrain]]` of this number, from 0, with what would do.
     #[must_use]
     pub fn refuse_ground(&self, section: usize, why: &str, allowed: &str) -> ConfigError {
-        let Source { file, text } = &*self.source.0;
-        let what = format!("the scenario file {file} is not usable");
-        let mut r = match Reader::parse(&what, file, text, false) {
+        let (mut r, what) = match self.reader() {
             Ok(reader) => reader,
             Err(error) => return error,
         };
@@ -207,9 +212,7 @@ impl Scenario {
     /// fault.
     #[must_use]
     pub fn refuse_fault(&self, number: usize, why: &str, help: &str) -> Option<ConfigError> {
-        let Source { file, text } = &*self.source.0;
-        let what = format!("the scenario file {file} is not usable");
-        let mut r = Reader::parse(&what, file, text, false).ok()?;
+        let (mut r, what) = self.reader().ok()?;
         let top = r.table("")?;
         let (_, item) = top.get("faults")?;
         let span = item.as_array()?.get(number)?.span();
@@ -220,9 +223,7 @@ impl Scenario {
 
     /// A refusal of the robot that it names, which is not there; `None` if the file names none.
     pub(crate) fn refuse_robot(&self, missing: &ConfigError) -> Option<ConfigError> {
-        let Source { file, text } = &*self.source.0;
-        let what = format!("the scenario file {file} is not usable");
-        let mut r = Reader::parse(&what, file, text, false).ok()?;
+        let (mut r, what) = self.reader().ok()?;
         let top = r.table("")?;
         let span = top.get("robot")?.1.span();
         let help = missing.problems().first()?.help_text().map(str::to_owned);

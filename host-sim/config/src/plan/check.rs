@@ -79,11 +79,16 @@ fn set_by(factor: &Factor) -> Vec<String> {
     }
 }
 
-/// Whether two paths are of one value: a list holds its elements.
-fn overlap(a: &str, b: &str) -> bool {
-    let (list, one) = if a.len() < b.len() { (a, b) } else { (b, a) };
-    let rest = one.strip_prefix(list);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+/// Who has set the value of a path before: itself, the list that it is an element of, or one of its elements.
+fn set_before<'a>(earlier: &BTreeMap<String, &'a str>, path: &str) -> Option<&'a str> {
+    let list = path
+        .strip_suffix(']')
+        .and_then(|path| path.rsplit_once('['));
+    let element = format!("{path}[");
+    let elements = || earlier.range(element.clone()..).next();
+    let same = earlier.get(path).or_else(|| earlier.get(list?.0));
+    let one = || elements().filter(|(other, _)| other.starts_with(&element));
+    same.or_else(|| Some(one()?.1)).copied()
 }
 
 /// One field that is set twice, by two factors or by one: the later would win, unseen. `earlier` knows who
@@ -91,9 +96,7 @@ fn overlap(a: &str, b: &str) -> bool {
 fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, &'a str>) {
     let mut found = None;
     for path in set_by(factor) {
-        let mut both = earlier.iter();
-        let set = both.find(|(other, _)| overlap(other, &path));
-        found = found.or(set.map(|(_, name)| (path.clone(), *name)));
+        found = found.or_else(|| Some((path.clone(), set_before(earlier, &path)?)));
         earlier.entry(path).or_insert(&factor.name);
     }
     let Some((path, other)) = found else { return };

@@ -33,6 +33,7 @@ use crate::axis_sim::{Kind, design, optimal};
 use crate::study::schema::json;
 use crate::study::{self, Ended, Finished, Job, Progress, STACK, Settings, Stopped};
 use wheeleg_config::AxisConfig;
+use wheeleg_report::number::counted;
 use wheeleg_report::results::CSV;
 
 /// What is compared.
@@ -294,15 +295,14 @@ struct Unplayed {
 /// What is to be told of them, if there are any: how many, and all of the first.
 fn unplayed_error(unplayed: &[Unplayed], of: u64) -> Option<StudyError> {
     let first = unplayed.first()?;
-    let cases = if unplayed.len() == 1 { "case" } else { "cases" };
     let help = match &first.error {
         AxisSimError::Unphysical { help, .. } => help,
         _ => "change the axis file so that its variations can be simulated",
     };
     Some(StudyError::refused(
         format!(
-            "{} {cases} of {of} could not be played and are counted nowhere; the first is `{}`: {}",
-            unplayed.len(),
+            "{} of {of} could not be played and are counted nowhere; the first is `{}`: {}",
+            counted(unplayed.len(), "case", "cases"),
             first.id,
             first.error
         ),

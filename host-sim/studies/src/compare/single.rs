@@ -67,15 +67,12 @@ impl Single {
         let job = Job::begin("case", settings, &[Path::new(&self.file)])?;
         let cases = std::slice::from_ref(&self.row);
         let judged = &[];
-        let failure = None;
-        let summary = json(
-            &Cases {
-                cases,
-                judged,
-                failure,
-            },
-            None,
-        );
+        let all = Cases {
+            cases,
+            judged,
+            failure: None,
+        };
+        let summary = json(&all, None);
         job.keep(job.save(SUMMARY, &summary));
         let Some(played) = &self.played else {
             return Ok(job.end(Vec::new(), summary, None));

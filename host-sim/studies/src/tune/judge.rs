@@ -97,9 +97,14 @@ impl Worse {
     }
 }
 
+/// Whether the supervision stops every move after tuning.
+pub(super) fn all_stopped(tests: &[Test]) -> bool {
+    !tests.is_empty() && tests.iter().all(|test| test.after.stopped == Some(true))
+}
+
 /// Everything that is worse after than before, or as bad as can be.
 pub(super) fn worse(tests: &[Test]) -> Vec<Worse> {
-    let all_stopped = tests.iter().all(|test| test.after.stopped == Some(true));
+    let all_stopped = all_stopped(tests);
     tests
         .iter()
         .flat_map(|test| {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::judge::all_stopped;
 use super::{Parameter, Test, Tuned, Worse};
 use crate::StudyError;
 use crate::axis_sim::Delays;
@@ -210,12 +211,8 @@ fn lines(test: &Test) -> Vec<Line> {
 
 /// The page's first sentence: the large step before and after, or why the parameters are refused.
 fn verdict(tuned: &Tuned, large: Option<&Test>) -> String {
-    let stuck = |worse: &Worse| worse.figure == super::Figure::Stopped;
-    if !tuned.worse.is_empty()
-        && tuned.worse.iter().all(stuck)
-        && tuned.worse.len() == tuned.tests.len()
-    {
-        return "Refused: the supervision stops every move, also after tuning.".to_owned();
+    if all_stopped(&tuned.tests) {
+        return "Refused: after tuning the supervision stops every move.".to_owned();
     }
     if let Some(first) = tuned.worse.first() {
         return format!(
