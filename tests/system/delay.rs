@@ -339,6 +339,47 @@ fn a_mass_or_load_that_cannot_be_simulated_is_refused_by_its_option() {
     );
 }
 
+/// The study tries other bores, with friction in proportion: where the plant does not take one of them, the
+/// robot's file and that bore are named, and no option that was not given.
+#[test]
+fn a_bore_that_cannot_be_simulated_is_told_with_the_file() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let robot = builtin::ROBOTS
+        .iter()
+        .find(|(name, ..)| *name == "wheeleg-2003");
+    let narrow = robot
+        .expect("built in")
+        .2
+        .replace(
+            "bore          = { value = 20.0,",
+            "bore          = { value = 12.0,",
+        )
+        .replace(
+            "rod           = { value = 8.0,",
+            "rod           = { value = 6.0,",
+        );
+    let path = dir.path().join("narrow.toml");
+    fs::write(&path, narrow).expect("written");
+    let assert = Command::new(program::path())
+        .env("NO_COLOR", "1")
+        .args(["delay", "--seeds", "1", "--robot"])
+        .arg(&path)
+        .arg("--out")
+        .arg(dir.path().join("out"))
+        .assert()
+        .code(2)
+        .stdout("");
+    let said = String::from_utf8_lossy(&assert.get_output().stderr).replace("\n  │ ", " ");
+    for part in [
+        "narrow.toml",
+        "`[cylinder]` with the bore of 25 mm",
+        "`cylinder.bore`",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert!(!said.contains("--mass"), "{said}");
+}
+
 /// A part that fails costs none of those before it: they are in the summary, and the failure is told.
 #[test]
 fn a_part_that_fails_costs_no_part_before_it() {

@@ -29,6 +29,7 @@ pub mod keys;
 mod law;
 mod node;
 mod open_file;
+mod otherwise;
 mod overlay;
 mod params;
 pub mod plan;

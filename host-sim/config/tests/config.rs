@@ -744,3 +744,24 @@ fn odd_seeds_and_doubled_names_are_told_with_what_would_do() {
     );
     assert_all(&told("0,5"), &["my.toml:6:", "decimal point"]);
 }
+
+#[test]
+fn boards_that_are_told_otherwise_than_their_cylinders_are_named() {
+    for (name, _, _) in builtin::ROBOTS {
+        let robot = builtin::robot(name).expect("built in");
+        assert_eq!(robot.told_otherwise(), Vec::<String>::new(), "{name}");
+    }
+    let conductance = "conductance = { value = 0.02, unit = \"dm3/(s bar)\", source = \"T\" }";
+    let other = robot_with_node(&format!("[node.yaw]\n{conductance}"));
+    let told = RobotConfig::parse("my.toml", &other)
+        .expect("accepted")
+        .told_otherwise();
+    assert_eq!(told.len(), 1, "{told:?}");
+    for part in [
+        "`node.*.conductance` = 0.02 dm3/(s bar)",
+        "`fill_valve.conductance`",
+        "`line.conductance`",
+    ] {
+        assert!(told[0].contains(part), "{told:?}");
+    }
+}

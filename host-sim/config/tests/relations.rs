@@ -747,3 +747,30 @@ fn a_stroke_that_is_advised_is_accepted() {
     let text = with(ROBOT, "cylinder.stroke", "184.0", "mm");
     assert!(RobotConfig::parse("my.toml", &text).is_ok());
 }
+
+/// A board whose sensor is right and whose travel is too short is advised the travel, and with it the
+/// file is accepted, whatever else the wrong value breaks.
+#[test]
+fn a_travel_that_is_advised_is_accepted() {
+    for (field, wrong_mm, [least, most]) in [
+        ("node.joint.sensor_max", "-50.0", [180.0, 181.0]),
+        ("node.joint.sensor_max", "100.0", [180.0, 181.0]),
+        ("node.joint.sensor_min", "50.0", [-1.0, 0.0]),
+    ] {
+        let text = with(WALKER, field, wrong_mm, "mm");
+        let error = RobotConfig::parse("my.toml", &text).expect_err("too short");
+        let mut advised = error
+            .problems()
+            .iter()
+            .filter(|problem| problem.relation() == Some("calibration"))
+            .flat_map(|problem| problem.advice().iter().flatten());
+        let advised = advised.find(|advised| advised.path == field);
+        let value = advised
+            .unwrap_or_else(|| panic!("{field}: {}", report(&error)))
+            .value;
+        assert!((least..=most).contains(&value), "{field} = {value}");
+        let text = with(WALKER, field, &format!("{value:?}"), "mm");
+        let accepted = RobotConfig::parse("my.toml", &text);
+        assert!(accepted.is_ok(), "{field} = {value}");
+    }
+}

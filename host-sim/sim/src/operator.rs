@@ -21,8 +21,16 @@ use wheeleg_telemetry::{Event as Recorded, EventKind, LinkSample, Recorder};
 /// values there that decide whether its air moves it in time.
 fn remedy(robot: &RobotConfig) -> String {
     let plant = &robot.plant;
+    let told = robot.told_otherwise();
+    let told = match told.as_slice() {
+        [] => String::new(),
+        _ => format!(
+            "the boards are told otherwise than it is: {}; ",
+            told.join("; ")
+        ),
+    };
     format!(
-        "correct the robot {}: with {:.1} kg in all (`body.chassis_mass`, `link.*.mass`), \
+        "{told}correct the robot {}: with {:.1} kg in all (`body.chassis_mass`, `link.*.mass`), \
          `supply.set_pressure` = {:.2} bar, `cylinder.bore` = {:.1} mm, `cylinder.rod` = {:.1} mm, \
          `friction.static` = {:.1} N, \
          `sensor.adc.bits` = {} and its `[node.*]` sections the joints do not come to rest within \

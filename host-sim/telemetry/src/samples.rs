@@ -437,6 +437,8 @@ samples! {
         late_max_ms: f64, "ms", 3, Host;
         /// Ratio of simulated to wall time.
         factor: f64, "1", 3, Host;
+        /// Bus cycles since the start that began more than 5 ms late, and their SYNC with them.
+        late: u32, "1", 0, Host;
         /// How often the base of the clock was shifted since the start, because a cycle began too late to catch up.
         shifts: u32, "1", 0, Host;
         /// Clients and viewers that are connected.

@@ -165,6 +165,19 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let mut offers = vec![sensor.calibrated(f, it)];
     let room = f64::min(measured[0] - least, most - measured[1]) / full_scale_mm;
     offers.extend(less_noise(f, reading, room));
+    // A board that measures what is may still be told a travel that is too short.
+    let [low, high] = [measured[0] - off_mm, measured[1] + off_mm];
+    let measures = [measured[0], measured[1] - sensor.stroke_m * 1e3].map(f64::abs);
+    if measures.iter().all(|error_mm| *error_mm < off_mm) {
+        if low < least {
+            let most_mm = (low * 10.0).floor() * 0.1;
+            offers.push(vec![Offer::new(f, it.fields[6], Bound::UpTo, most_mm)]);
+        }
+        if high > most {
+            let least_mm = (high * 10.0).ceil() * 0.1;
+            offers.push(vec![Offer::new(f, it.fields[7], Bound::From, least_mm)]);
+        }
+    }
     // Rounded to what people write; from a stop that is measured too low nothing follows.
     let stroke_m = sensor.stroke_at(most - off_mm, full_scale_mm, f.si(it.fields[5])?);
     let stroke_m = (stroke_m * 1e4).floor() * 1e-4;

@@ -74,6 +74,7 @@ impl Inner {
                 "factor": rounded(pace.factor),
                 "late_ms": rounded(pace.late_ms),
                 "late_max_ms": rounded(pace.late_max_ms),
+                "late": pace.late,
                 "shifts": pace.shifts,
                 "dropped": dropped,
             },

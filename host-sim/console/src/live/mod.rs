@@ -286,6 +286,8 @@ pub(crate) struct PaceStatus {
     pub(crate) late_ms: f64,
     /// How late one of the last second began at most, ms.
     pub(crate) late_max_ms: f64,
+    /// Cycles since the start that began more than 5 ms late, and their SYNC with them.
+    pub(crate) late: u32,
     /// How often the base of the clock was shifted.
     pub(crate) shifts: u32,
 }

@@ -7,6 +7,8 @@ use super::PaceStatus;
 
 /// A cycle up to this late is caught up with; beyond it the base of the clock is shifted.
 const CATCH_UP: Duration = Duration::from_millis(100);
+/// A cycle that begins later than this counts as late: its SYNC is, too.
+const LATE: Duration = Duration::from_millis(5);
 /// Cycles that are caught up with at most.
 const BURST: u32 = 10;
 /// Time over which the pace is looked at.
@@ -109,6 +111,9 @@ impl Pace {
             }
             None => Duration::ZERO,
         };
+        if late > LATE {
+            self.status.late += 1;
+        }
         let late_ms = late.as_secs_f64() * 1e3;
         self.status.late_ms = late_ms;
         self.cycles += 1;
@@ -266,6 +271,7 @@ mod tests {
             let now = start + CYCLE * n + Duration::from_millis(late_ms);
             told.extend(pace.begin(now));
         }
+        assert_eq!(pace.status().late, 2, "those beyond 5 ms");
         assert_eq!(told.len(), 2, "{told:?}");
         for second in told {
             let Lateness {

@@ -222,6 +222,7 @@ impl Loop {
             late_p99_ms: lateness.p99_ms,
             late_max_ms: lateness.max_ms,
             factor: pace.factor,
+            late: pace.late,
             shifts: pace.shifts,
             clients: count(self.signals.clients.load(Ordering::Relaxed) as u64),
             dropped: count(self.signals.dropped()),

@@ -29,6 +29,7 @@ use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
@@ -110,22 +111,7 @@ pub struct Study {
 pub fn axis_of(robot: &RobotConfig, mass_kg: f64, load_n: f64) -> AxisParams {
     /// Left vertical, in the order of the joints.
     const VERTICAL: usize = 2;
-    let plant = &robot.plant;
-    let mut cylinder = plant.cylinders[VERTICAL].clone();
-    // A bench begins vented; pressures come from the moves.
-    cylinder.initial_pressure_a_pa = plant.gas.ambient_pressure_pa;
-    cylinder.initial_pressure_b_pa = plant.gas.ambient_pressure_pa;
-    AxisParams {
-        gas: plant.gas,
-        supply: plant.supply,
-        cylinder,
-        moving_mass_kg: mass_kg,
-        load_n,
-        initial_stroke_m: 0.0,
-        potentiometer: plant.potentiometers[VERTICAL],
-        adc: plant.adc,
-        step_ns: plant.step_ns,
-    }
+    robot.axis(VERTICAL, mass_kg, load_n)
 }
 
 /// Cycle and SYNC of the robot's bus.
@@ -161,7 +147,7 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
     }
     let most_n = scaling::most_load_n(&axis);
     if options.load_n <= most_n {
-        return ensure_moves(&bores, options);
+        return ensure_moves(&bores, options, &robot.file);
     }
     Err(StudyError::refused(
         format!(
@@ -182,7 +168,7 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
 
 /// Starts every cylinder of the study once from both of its ends: what cannot be simulated, or never
 /// moves, is told before anything is measured.
-fn ensure_moves(bores: &[AxisParams], options: &Options) -> Result<(), StudyError> {
+fn ensure_moves(bores: &[AxisParams], options: &Options, file: &str) -> Result<(), StudyError> {
     let given = format!(
         "`--mass` = {} kg, `--load` = {} N",
         brief(options.mass_kg),
@@ -191,7 +177,10 @@ fn ensure_moves(bores: &[AxisParams], options: &Options) -> Result<(), StudyErro
     for bored in bores {
         for start in [Start::HomeHeld, Start::StopHeld] {
             let outcome = Trial::new(bored, Law::Paper, start, 1).run();
-            let outcome = outcome.map_err(|e| not_simulated(&given, &e))?;
+            let outcome = outcome.map_err(|e| match &e {
+                AxisSimError::Plant(PlantError::Parameter { .. }) => not_bored(bored, file, &e),
+                _ => not_simulated(&given, &e),
+            })?;
             // Every bore of the study has to start from home.
             if start == Start::HomeHeld && outcome.delay_s.is_none() {
                 return Err(StudyError::refused(
@@ -206,6 +195,18 @@ fn ensure_moves(bores: &[AxisParams], options: &Options) -> Result<(), StudyErro
         }
     }
     Ok(())
+}
+
+/// The answer where the plant does not take a cylinder in one of the bores that the study tries.
+fn not_bored(bored: &AxisParams, file: &str, error: &AxisSimError) -> StudyError {
+    StudyError::refused(
+        format!(
+            "{file}: `[cylinder]` with the bore of {} mm that this study tries: {error}",
+            brief(bored.cylinder.bore_m * 1e3)
+        ),
+        "volumes and friction of `[cylinder]` and `[friction]` grow with the area of the bore: give a \
+         `cylinder.bore` nearer to those of 16 to 25 mm, or the less of what leaves its range",
+    )
 }
 
 /// The answer to what leaves the model: `given` are the values of the command line.
