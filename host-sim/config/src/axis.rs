@@ -17,7 +17,7 @@ use super::overlay;
 use super::params::{ParameterInfo, params};
 use super::plant::pneumatics::{self, Pneumatics, Sensing};
 use super::plant::sections::{MASS, STROKE};
-use super::reader::Reader;
+use super::reader::{FileKind, Reader};
 use super::relations::{self, Advised, Moved, Tried};
 use super::suggest::closest;
 
@@ -229,6 +229,7 @@ impl AxisConfig {
 
     fn parse_as(what: &str, file: &str, text: &str) -> Result<Self, ConfigError> {
         let mut r = Reader::parse(what, file, text, true)?;
+        r.ensure_kind(what, FileKind::Axis)?;
         let Parts {
             name,
             description,

@@ -13,7 +13,7 @@ use super::node::{self, NodeParams};
 use super::params::{ParameterInfo, params};
 use super::plant;
 pub use super::plant::sections::SpatialParams;
-use super::reader::Reader;
+use super::reader::{FileKind, Reader};
 use super::relations::{self, Advised, Tried};
 
 params! {
@@ -116,6 +116,7 @@ impl RobotConfig {
     pub fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         let what = format!("the robot file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, true)?;
+        r.ensure_kind(&what, FileKind::Robot)?;
         let Parts {
             name,
             description,

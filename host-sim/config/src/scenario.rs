@@ -14,7 +14,7 @@ use super::error::ConfigError;
 use super::keys;
 use super::params::{FieldSpec, ParameterInfo};
 use super::quantity::{Dimension, pretty};
-use super::reader::{Entry, Reader};
+use super::reader::{Entry, FileKind, Reader};
 use super::source::Source;
 use super::terrain::{self, Files, Ground};
 use crate::faults::FaultSpec;
@@ -257,6 +257,7 @@ impl Scenario {
     ) -> Result<(Self, Vec<ParameterInfo>), ConfigError> {
         let what = format!("the scenario file {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
+        r.ensure_kind(&what, FileKind::Scenario)?;
         let source = Source {
             file: file.to_owned(),
             text: text.to_owned(),

@@ -136,7 +136,10 @@ export class Plot {
     const [a, b] = this.range();
     this.cursor.hidden = t < a || t > b || this.width === 0;
     this.cursor.style.transform = `translateX(${(PAD.left + ((t - a) / (b - a)) * this.inner()).toFixed(1)}px)`;
-    this.panel.series.forEach((s, i) => say(this.values[i], fixed(linear(s.x, s.y, t), decimals(this.panel.y))));
+    // Channels begin one after the other: a first sample less than a pixel ahead is under the cursor.
+    const pixel = (b - a) / Math.max(1, this.inner());
+    const under = (x) => (t < x[0] && x[0] - t < pixel ? x[0] : t);
+    this.panel.series.forEach((s, i) => say(this.values[i], fixed(linear(s.x, s.y, under(s.x)), decimals(this.panel.y))));
     this.area.setAttribute("aria-valuenow", t.toFixed(2));
   }
 

@@ -142,8 +142,10 @@ export function sideView(picture, g, heights) {
           set(part.commanded, { transform: `translate(${oblique(...asked.o6, 0)})` });
           part.setCommanded(asked.sole);
         }
+        // From the sole: a foot may press against a wall, above the ground.
+        const from = oblique(...at.o6, at.sole)[1];
         const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
-        set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
+        set(part.load, { d: length > 0 ? `M${x - 52},${from} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
         set(part.tag, { x: tenth(x - 24), y: tenth(y - 378) });
       });
       say(title, `Robot from its right side, ${Math.round(pose.travel_mm)} mm travelled`);

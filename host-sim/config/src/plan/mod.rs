@@ -27,7 +27,7 @@ use toml_edit::{ArrayOfTables, DocumentMut};
 use crate::error::ConfigError;
 use crate::params::FieldSpec;
 use crate::quantity::Dimension;
-use crate::reader::Reader;
+use crate::reader::{FileKind, Reader};
 use crate::scenario::MAX_DURATION_S;
 
 /// How the values of factors that are not on a grid are drawn.
@@ -142,6 +142,7 @@ impl Plan {
         let Text { file, text } = &sources.plan;
         let what = format!("the plan {file} is not usable");
         let mut r = Reader::parse(&what, file, text, false)?;
+        r.ensure_kind(&what, FileKind::Plan)?;
         let plan = read(&mut r, &sources);
         if let Some(plan) = &plan {
             if r.is_clean() {

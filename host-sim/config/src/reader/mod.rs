@@ -2,6 +2,7 @@
 
 mod control;
 mod entry;
+mod kind;
 mod plain;
 mod quantities;
 
@@ -19,6 +20,7 @@ use super::suggest::closest;
 
 pub(crate) use entry::Entry;
 use entry::{Field, fields};
+pub(crate) use kind::FileKind;
 pub(crate) use plain::NAME_LENGTH;
 pub(crate) use quantities::range;
 

@@ -9,10 +9,12 @@ use wheeleg_telemetry::messages::within;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
-    /// In its band.
+    /// Required, and in its band.
     Met,
     /// Required, and not in its band.
     Missed,
+    /// In its band, and not required.
+    Within,
     /// Not in its band, and not required.
     Outside,
     /// A value without a band.
@@ -26,6 +28,7 @@ impl Judgement {
         match self {
             Self::Met => "PASS",
             Self::Missed => "FAIL",
+            Self::Within => "info: within",
             Self::Outside => "info: outside",
             Self::Value => "info",
         }
@@ -151,7 +154,8 @@ impl Target {
     pub fn judgement(&self) -> Judgement {
         match (self.pass, self.required) {
             _ if self.min.is_none() && self.max.is_none() => Judgement::Value,
-            (true, _) => Judgement::Met,
+            (true, true) => Judgement::Met,
+            (true, false) => Judgement::Within,
             (false, true) => Judgement::Missed,
             (false, false) => Judgement::Outside,
         }

@@ -154,7 +154,8 @@ struct Parameter<'a> {
 }
 
 /// The page's first sentence: what came of the run, and what that is worth.
-fn verdict(summary: &Summary) -> String {
+/// Where a required target is missed, the cause, if there is one, is taken in place of the first of them.
+fn verdict(summary: &Summary, cause: &mut Option<String>) -> String {
     let required = summary.targets.iter().filter(|t| t.required);
     let count = required.clone().count();
     let missed: Vec<&Target> = required.filter(|t| !t.pass).collect();
@@ -169,6 +170,12 @@ fn verdict(summary: &Summary) -> String {
     } else if count == 0 {
         format!("{name}: ran to its end; the scenario requires nothing.")
     } else if let Some(first) = missed.first() {
+        if let Some(cause) = cause.take() {
+            return format!(
+                "{name}: {} of {count} required targets missed. {cause}.",
+                missed.len()
+            );
+        }
         let what = first.name_text();
         let [measured, asked] = [first.measured_text(), first.asked_text()].map(|t| minus(&t));
         let more = match missed.len() - 1 {
@@ -235,10 +242,12 @@ pub(super) fn render(
         .iter()
         .filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
     let causes = cause::causes(faults);
+    let mut cause = cause::first_sentence(&causes);
+    let verdict = verdict(summary, &mut cause);
     let values = Page {
         summary,
-        verdict: verdict(summary),
-        cause: cause::first_sentence(&causes),
+        cause,
+        verdict,
         remedy: causes.first().and_then(|first| first.remedy.clone()),
         wrong: cause::listed(&causes, |t_s| source.t(t_s)),
         more_wrong: causes.len().saturating_sub(cause::LISTED),

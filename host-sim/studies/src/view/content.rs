@@ -63,6 +63,11 @@ impl LoggedEvent {
         self.code.map_or("", EventCode::name)
     }
 
+    /// Whether a fault is injected here, on purpose.
+    pub(super) fn injects(&self) -> bool {
+        self.code == Some(EventCode::FaultBegins)
+    }
+
     fn fault(&self) -> FaultEvent {
         FaultEvent {
             t_ns: self.t_ns,

@@ -63,6 +63,8 @@ struct About {
     others: u64,
     whole: bool,
     more_events: u64,
+    /// Faults that were injected.
+    injected: Vec<String>,
     wrong: Vec<Wrong>,
     /// Causes beyond those listed.
     more_wrong: usize,
@@ -156,6 +158,7 @@ fn about(log: &Named) -> About {
     let known = |kind| content.about(kind).unwrap_or("not said").to_owned();
     let (from, to) = content.range();
     let causes = content.causes();
+    let injected = content.events.iter().filter(|event| event.injects());
     About {
         name: log.name.clone(),
         robot: known("robot"),
@@ -169,6 +172,7 @@ fn about(log: &Named) -> About {
         whole: content.end.whole,
         more_events: content.more_events,
         more_wrong: causes.len().saturating_sub(LISTED),
+        injected: injected.map(LoggedEvent::text).collect(),
         wrong: listed(&causes, |t_s| t_s),
     }
 }

@@ -281,10 +281,11 @@ const FAULTS_SHOWN: usize = 20;
 const TARGETS_SHOWN: usize = 20;
 
 /// The order in which targets are told: what was missed comes first.
-const ORDER: [Judgement; 4] = [
+const ORDER: [Judgement; 5] = [
     Judgement::Missed,
     Judgement::Met,
     Judgement::Outside,
+    Judgement::Within,
     Judgement::Value,
 ];
 
