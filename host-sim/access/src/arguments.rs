@@ -93,7 +93,7 @@ fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> 
         let how = advice(argument, json, args);
         match argument.kind.admits(value(argument, json, args)) {
             Some(true) => {}
-            // The parameter that is not known is told.
+            // The unknown parameter is reported instead.
             None if argument.kind == ArgumentKind::Raw && parameter(args).is_none() => {}
             Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}{how}")),
             None if argument.kind == ArgumentKind::Raw => {

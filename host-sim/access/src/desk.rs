@@ -142,7 +142,7 @@ impl Desk {
         self.holder.as_ref()
     }
 
-    /// Name of the client that has the control, or of whoever it is reserved for.
+    /// Name of the client that has control, or of the one it is reserved for.
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         let holder = self.holder.as_ref().map(|holder| &*holder.name);
@@ -238,9 +238,9 @@ impl Desk {
         });
     }
 
-    /// Who holds the control, or has asked for it, does so no longer, and is returned. Its lease ends
-    /// without it; from then on the clients on the robot's own computer have so much time to take the
-    /// control. A command line ends with each of its commands, so it is not reserved for one of them.
+    /// Takes control away from its holder, or from the client that has asked for it, and returns that client.
+    /// Its lease then runs out; from that moment the clients on the robot's own computer have `lasts` to take
+    /// control. It is not reserved for one client: a command line ends with each of its commands.
     pub fn revoke(&mut self, lasts: Duration) -> Option<&Holder> {
         let holder = self.holder.as_mut()?;
         holder.ended = Some(Ended::Revoked);
@@ -420,7 +420,7 @@ mod tests {
         for remote in [1, 2] {
             assert_eq!(desk.ask(client(remote), true), Err(Denied::Held));
         }
-        // Whoever revoked may be gone: another client there takes it.
+        // The client that revoked control may be gone: another one there takes it.
         desk.leave(3);
         assert_eq!(desk.ask(client(4), true), Ok(()));
         desk.grant(4, 20);

@@ -583,7 +583,7 @@ mod tests {
         }
     }
 
-    /// Every argument that is wrong is told, with what was written and what is allowed.
+    /// Every wrong argument is reported, with its value and the allowed range.
     #[test]
     fn all_that_is_wrong_is_told_with_value_and_range() {
         for (cmd, args, parts) in [

@@ -95,7 +95,7 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
 /// folder of the scenario's file, so that the two can be kept together.
 ///
 /// # Errors
-/// As [`robot`]; one that is not there is told at its place in the scenario.
+/// As [`robot`]; a missing one is reported at its place in the scenario.
 pub fn robot_of(scenario: &Scenario, name_or_path: &str) -> Result<RobotConfig, ConfigError> {
     let named = named_by(&scenario.robot, name_or_path);
     robot(&named).map_err(|error| match find("robot", &named, ROBOTS) {
@@ -158,7 +158,7 @@ fn with_ground_seed(text: &str, seed: u64) -> Option<String> {
         .and_then(Item::as_array_of_tables_mut);
     for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
         if let Some(value) = part.get_mut("seed") {
-            // TOML has no whole number above 2^63: such a seed stands in quotes.
+            // TOML has no whole number above 2^63: such a seed is quoted.
             *value = match i64::try_from(seed) {
                 Ok(number) => toml_edit::value(number),
                 Err(_) => toml_edit::value(seed.to_string()),
@@ -206,7 +206,7 @@ pub fn text_of(path: &Path) -> std::io::Result<String> {
 /// Longest path that is quoted whole, bytes: no file system has a longer one.
 const LONGEST_PATH: usize = 4096;
 
-/// A path for a message; one that no file can have is not told whole.
+/// A path for a message; one that is too long for any file is shortened.
 fn file(path: &str) -> Cow<'_, str> {
     match path.len() {
         0..=LONGEST_PATH => path.into(),

@@ -58,7 +58,7 @@ pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Opt
             )),
         );
     }
-    // All are read, so that all mistakes are told.
+    // Read all of them, so that every mistake is reported.
     let given: Vec<Option<Given>> = row
         .arguments
         .iter()

@@ -162,8 +162,8 @@ impl RobotConfig {
         self.plant.floating()
     }
 
-    /// Dimensions as the master is told them. It cannot be told strokes: its commands are limited to
-    /// those of the paper's leg.
+    /// Dimensions as the master is configured with them. It has no setting for strokes: its commands are
+    /// limited to those of the paper's leg.
     #[must_use]
     pub fn walk_geometry(&self) -> WalkGeometry {
         let single = |m: f64| m as f32;

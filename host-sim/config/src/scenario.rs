@@ -28,7 +28,7 @@ pub enum LegChoice {
     Right,
 }
 
-/// What the robot is told to do once it stands at its start pose.
+/// Commands for the robot once it stands at its start pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// Stand still.

@@ -215,7 +215,7 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
     );
 }
 
-/// A board that stays as wrong as it was is told of once; one that is made wrong in another way, again.
+/// A board that stays as wrong as it was is reported once; one that is made wrong in another way, again.
 #[test]
 fn a_wrong_parameter_of_a_board_is_told_once_whatever_is_written_after_it() {
     let robot = robot(&[]);
@@ -354,7 +354,7 @@ fn built_in_scenarios_fit_their_robots() {
     }
 }
 
-/// A thousand wrong commands are told in a moment, each once.
+/// A thousand wrong commands are reported quickly, each once.
 #[test]
 fn a_thousand_wrong_commands_are_judged_in_a_moment() {
     let short = robot(SHORT);

@@ -1,4 +1,4 @@
-//! Plans of campaigns: what is read of them, and what is told of wrong ones.
+//! Plans of campaigns: how they are read, and how errors in them are reported.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -138,7 +138,7 @@ fn what_a_case_does_not_take_from_its_scenario_is_no_factor() {
     }
 }
 
-/// What a plan names and what there is not is told with its place in the plan, all at once.
+/// Every unknown name in a plan is reported with its place in the plan, all at once.
 #[test]
 fn names_of_nothing_are_told_where_the_plan_has_them() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -172,7 +172,7 @@ fn names_of_nothing_are_told_where_the_plan_has_them() {
     assert!(help.contains("did you mean `stand`?"), "{help}");
 }
 
-/// A component that a list has not got is told those that there are; what is proposed may be set.
+/// The error for a component beyond a list names the components; each of them may be set.
 #[test]
 fn a_component_beyond_a_list_is_told_the_components() {
     for (field, told, help) in [
@@ -635,7 +635,7 @@ fn a_plan_may_stand_on_a_height_map() {
     let other = resolve(&Plan::of(other).expect("usable"));
     assert_ne!(level.scenario_json, other.scenario_json);
 
-    // A wrong one is told as in a run: with the scenario's file, line and field.
+    // A wrong one is reported as in a run: with the scenario's file, line and field.
     let wrong = with_map("0,x\n").and_then(Plan::of).expect_err("no number");
     let said = format!("{:?}", miette::Report::new(wrong));
     for part in ["mine.toml:", "`terrain[0].file`", "line 1, column 2"] {

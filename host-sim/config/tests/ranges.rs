@@ -85,8 +85,8 @@ fn file_board_listing_and_refusals_have_the_same_range() {
     assert!(edges > 100, "{edges}");
 }
 
-/// What a board refuses together is told with the others that have a part in it, and with the limit up to
-/// which the board takes it.
+/// Values that a board refuses together are reported together, with the limit up to which the board accepts
+/// them.
 #[test]
 fn what_contradicts_others_is_told_how_far_it_may_go() {
     let info = |name: &str| {

@@ -33,8 +33,8 @@ struct Example {
     field: Set,
     broken: f64,
     sound: f64,
-    /// Fields, or those of several that do together, that are advised at `broken`; none where what is
-    /// allowed is told in words.
+    /// Fields, or sets of fields that work together, that are advised at `broken`; none where the limit is
+    /// given in words.
     advised: &'static [&'static str],
 }
 
@@ -255,8 +255,8 @@ fn line(text: &str, path: &str) -> Option<usize> {
         .map(|(at, _)| before + at)
 }
 
-/// The relation alone is told, with its place, every field with its value and line, and what is
-/// allowed.
+/// Only this relation is reported: with its place, every field with its value and line, and the allowed
+/// values.
 fn ensure_told(relation: &Relation, example: &Example, value: f64, error: &ConfigError) {
     let (name, text, said) = (relation.name, example.text(value), report(error));
     let broken: Vec<_> = error.problems().iter().map(Problem::relation).collect();
@@ -350,7 +350,7 @@ fn every_relation_of_the_table_is_refused_where_it_is_broken_and_accepted_where_
     assert!(examples.is_empty(), "of no relation: {:?}", examples.keys());
 }
 
-/// A relation is seen beside a section that lacks something, and all that is broken is told at once.
+/// A relation is seen beside an incomplete section, and all broken ones are reported at once.
 #[test]
 fn relations_are_told_together_and_beside_missing_fields() {
     let text = with(ROBOT, "gait.period", "1.0", "s");
@@ -533,7 +533,7 @@ fn ensure_printed(help: &str, path: &str, value: f64) {
     assert!(texts.any(printed), "{path} = {value}: {help}");
 }
 
-/// A crank that is too short or too long is told one that is accepted, in a few digits.
+/// For a crank that is too short or too long, an accepted value is proposed, in a few digits.
 #[test]
 fn a_crank_that_makes_no_leg_is_told_one_that_does() {
     for crank in [0.05, 0.6] {
@@ -700,7 +700,7 @@ fn no_advice_is_looked_for_where_very_much_is_wrong() {
     assert!(help.contains("correct the other errors first"), "{help}");
 }
 
-/// What the plant refuses for itself is told by its field, in the unit of the file.
+/// Errors that the plant finds itself are reported by field, in the unit of the file.
 #[test]
 fn what_the_plant_cannot_follow_is_told_in_the_unit_of_the_file() {
     let text = with(ROBOT, "contact.stiffness", "1000000.0", "N/mm");

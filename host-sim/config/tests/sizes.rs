@@ -59,7 +59,7 @@ fn a_hundred_thousand_events_and_blocks_are_read_in_time_that_grows_as_they_do()
     assert!(scenario.events.is_sorted_by(|a, b| a.at_s <= b.at_s));
 }
 
-/// A plan with as many wrong factors as that: each is told once.
+/// A plan with that many wrong factors: each is reported once.
 #[test]
 fn two_thousand_factors_are_judged_in_a_moment() {
     const COUNT: usize = 2000;
@@ -78,7 +78,7 @@ fn two_thousand_factors_are_judged_in_a_moment() {
     assert!(seconds < 20.0, "{seconds} s");
 }
 
-/// Each case of a campaign reads its robot anew.
+/// Each case of a campaign reads its robot again.
 #[test]
 fn a_robot_is_read_in_a_moment() {
     const ROBOT: &str = include_str!("../../robots/wheeleg.toml");

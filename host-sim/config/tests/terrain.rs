@@ -383,7 +383,7 @@ fn every_quantity_of_a_part_has_a_unit() {
     let sizes = "size = { value = [5.0, 9.0], unit = \"cm\" }\n";
     let heights = "height = { value = [0.0, 0.1], unit = \"m\" }\n";
     let stairs = "kind = \"stairs\"\ncount = 3\n";
-    // What stands in the part beside the field, the field, its value, its unit.
+    // The other fields of the part; then the field, its value, its unit.
     let scalars = [
         ("kind = \"plane\"\n", "slope", "5", "deg"),
         (

@@ -36,7 +36,7 @@ pub const SUBPROTOCOL: &str = "wheeleg.console.v1";
 const FOXGLOVE: &str = "/foxglove";
 /// Bytes that may wait in a socket's own buffer.
 const WRITE_BUFFER_MAX: usize = 128 * 1024;
-/// The same of a viewer, who is told schemas and the ground in one message each.
+/// The same for a viewer, which gets schemas and the ground in one message each.
 const VIEWER_BUFFER_MAX: usize = 16 << 20;
 
 const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
@@ -186,7 +186,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     let is_refused = refused.contains(&response.status());
     let headers = response.headers_mut();
     if is_refused {
-        // Whoever has no key asks once on a connection.
+        // A client without a key gets one request per connection.
         headers.insert(CONNECTION, HeaderValue::from_static("close"));
     }
     let mut set = |name: HeaderName, value| headers.insert(name, HeaderValue::from_static(value));
@@ -297,7 +297,7 @@ struct Token {
     token: String,
 }
 
-/// A viewer can send no header: its key stands in the address, which this server writes nowhere.
+/// A viewer can send no header: its key is in the address, which this server writes nowhere.
 async fn viewer(
     State(server): State<Arc<Server>>,
     Extension(peer): Extension<Peer>,

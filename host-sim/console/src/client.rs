@@ -244,7 +244,7 @@ impl Client {
         self.send(json!({ "seen_us": seen_us, "valid_ms": valid_ms, "cmd": name, "args": args }))
     }
 
-    /// From now on [`Client::read`] sends beats, until it is told not to.
+    /// Makes [`Client::read`] send beats from now on, or stops it.
     pub fn keep_control(&mut self, keep: bool) {
         self.beat = keep.then(Instant::now);
     }

@@ -130,8 +130,8 @@ const CONNECTIONS: usize = 128;
 /// Those of one address.
 const OF_ONE_ADDRESS: usize = 96;
 
-/// Places for connections. Whoever comes gets one: where all are taken, the address that has most gives
-/// its oldest, unless a key was proved on it. So nobody is kept out who wants to stop the robot.
+/// Places for connections. Every newcomer gets one: if all are taken, the address with the most loses its
+/// oldest, unless a key was proved on it. So nobody who wants to stop the robot is kept out.
 #[derive(Debug, Default)]
 pub(crate) struct Places(Mutex<Taken>);
 

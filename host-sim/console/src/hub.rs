@@ -1,5 +1,5 @@
-//! The hub between the robot's thread and everybody who looks: it decimates and encodes each
-//! sample once, knows who is in control, and answers requests. It never makes the robot wait.
+//! The hub between the robot's thread and all clients: it decimates and encodes each sample once, knows who
+//! is in control, and answers requests. It never makes the robot wait.
 
 mod control;
 mod history;
@@ -34,7 +34,7 @@ use wheeleg_access::request::{BadRequest, Body};
 
 /// How often the rings are emptied.
 pub(crate) const PERIOD: Duration = Duration::from_millis(5);
-/// How often the state is told.
+/// How often the state is sent.
 const STATE_PERIOD: Duration = Duration::from_millis(50);
 /// How often batches are sent.
 const BATCH_PERIOD: Duration = Duration::from_millis(20);
@@ -69,7 +69,7 @@ struct Subscription {
     /// `None`: all samples.
     period_ns: Option<u64>,
     next_ns: u64,
-    /// Samples that the robot's ring dropped, not told yet.
+    /// Samples that the robot's ring dropped, not reported yet.
     missed: u32,
 }
 
@@ -122,8 +122,8 @@ pub(crate) struct Asking {
     stops: StopsUnderWay,
 }
 
-/// Stops of one connection whose answers are waited for: few at a time. Whoever asks for more of
-/// them is read no further until then, and costs nobody else time or memory.
+/// Limits the stops of one connection that wait for an answer. A client that asks for more is not read until
+/// then, and costs nobody else time or memory.
 pub(crate) struct StopsUnderWay(Arc<Semaphore>);
 
 impl StopsUnderWay {
@@ -155,7 +155,7 @@ struct Inner {
     clients: BTreeMap<ClientId, Client>,
     viewers: Viewers,
     desk: Desk,
-    /// The holder of the control that was told last that somebody asks for it, and when.
+    /// The holder of control that was last notified of a request for it, and when.
     asked: Option<(ClientId, Instant)>,
     /// Name of the client that was in control last.
     last_holder: String,
@@ -166,7 +166,7 @@ struct Inner {
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
     history: History,
-    /// The newest events, each as it was told.
+    /// The newest events, each as it was sent.
     events: VecDeque<Utf8Bytes>,
     faults: Vec<(FaultSpec, u64)>,
     /// The stop that is latched, or has just been asked for.
@@ -387,7 +387,7 @@ impl Hub {
         Some(confirmed.ok()?.ok()?.now_us)
     }
 
-    /// The state, as told to everybody.
+    /// The state, as sent to everybody.
     pub(crate) fn state(&self) -> String {
         self.state_of(&self.inner())
     }

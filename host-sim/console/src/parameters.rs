@@ -1,5 +1,5 @@
-//! The boards' parameters as clients see them: as the robot's file stores them, and as the boards
-//! have told them since.
+//! The boards' parameters as clients see them: as stored in the robot's file, and as the boards have reported
+//! them since.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,7 +22,7 @@ struct Parameter {
     place: Place,
     info: &'static ParamInfo,
     raw: i32,
-    /// The board has told it; else it is what the robot's file stores.
+    /// The board has reported it; otherwise it comes from the robot's file.
     told: bool,
     /// As the viewers' protocol has it, JSON.
     shown: String,
@@ -142,7 +142,7 @@ impl Parameters {
         Ok(json!({ "board": place.0, "parameter": info.name, "value": value }))
     }
 
-    /// A board has told the value of a parameter; its name.
+    /// Takes the value of a parameter that a board has reported; returns its name.
     pub(crate) fn told(&mut self, place: Place, raw: i32) -> Option<String> {
         let mut all = self.all.iter_mut();
         let (name, parameter) = all.find(|(_, p)| p.place == place)?;

@@ -107,8 +107,8 @@ pub fn recorded(folder: &Path) -> Result<Recorded, ConsoleError> {
     })
 }
 
-/// Repeats a recording, as fast as it goes, and writes its log from power-up on to `log`.
-/// `progress` is told the time in ms and that of the end.
+/// Repeats a recording, as fast as possible, and writes its log from power-up on to `log`. `progress` gets
+/// the time and the end time, ms.
 ///
 /// # Errors
 /// [`ConsoleError`] if a line of its inputs is none, the robot cannot be built, or the log cannot

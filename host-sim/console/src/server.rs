@@ -41,18 +41,18 @@ use crate::record::{self, About};
 use crate::session::Context;
 use crate::tls::{Certificate, Files, Fingerprint};
 
-/// Where the server listens unless it is told otherwise.
+/// Default address of the server.
 pub const ADDRESS: &str = "127.0.0.1:7420";
 /// Threads for those who have proved a key at the console; the robot has its own.
 const SESSIONS: usize = 2;
-/// Threads for all that others ask. Whoever floods it has one core at most.
+/// Threads for everybody else's requests. A flood of them gets one core at most.
 const REQUESTS: usize = 1;
 /// How often a port is looked for that is free at all addresses.
 const PORTS: usize = 16;
 /// Time in which a request must have come.
 const HEAD: Duration = Duration::from_secs(3);
-/// Bytes that may wait in the system for a client: who has a slow line sees what was so much before.
-/// Linux takes twice as many, its own overhead with them. A line of 100 ms there and back needs so many.
+/// Bytes that may wait in the system for a client: on a slow line they are old by the time they arrive. Linux
+/// allocates twice as many, with its overhead. A line with a round trip of 100 ms needs this many.
 const SEND_BUFFER: u32 = 8 * 1024;
 /// Of these, bytes that are not even on their way: what is newer overtakes all else, at the hub.
 #[cfg(target_os = "linux")]
@@ -450,7 +450,7 @@ impl Drop for Server {
         if let Some(robot) = self.robot.take() {
             let _ = robot.join();
         }
-        // It has what the robot's last cycle told.
+        // It has the reports of the robot's last cycle.
         if let Some(recorder) = self.recorder.take() {
             let _ = recorder.join();
         }
@@ -562,7 +562,7 @@ struct Door {
 
 async fn accept(listener: TcpListener, door: Door) {
     loop {
-        // Whoever connects without end waits for others between two connections.
+        // A flood of connections lets others run between two of them.
         tokio::task::yield_now().await;
         let (stream, peer) = match listener.accept().await {
             Ok(accepted) => accepted,

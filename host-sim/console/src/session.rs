@@ -26,7 +26,7 @@ use wheeleg_access::mac::Transcript;
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);
-/// How often a client is asked whether it is there, also one that is told much and says nothing.
+/// How often a client is pinged, also one that receives much and says nothing.
 const PING: Duration = Duration::from_secs(5);
 /// Time after which a client that sends nothing, no answer to a ping either, is gone.
 pub(crate) const SILENCE: Duration = Duration::from_secs(20);
@@ -183,7 +183,7 @@ async fn run(
                 };
                 let Entered { n, body, limited } = entered;
                 context.hub.ask(&asking, n, body, limited).await;
-                // Whoever sends without end waits for others between two frames.
+                // A client that sends without end lets others run between two frames.
                 tokio::task::yield_now().await;
             }
         };

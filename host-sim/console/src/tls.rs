@@ -143,8 +143,8 @@ fn wrong(path: &Path, what: impl fmt::Display) -> ConsoleError {
     )
 }
 
-/// How a client of ours connects: to the one certificate that has this fingerprint, whoever
-/// vouches for it.
+/// TLS settings of our own clients: they accept only the certificate with this fingerprint, whoever signed
+/// it.
 pub(crate) fn client(fingerprint: Fingerprint) -> Result<Arc<ClientConfig>, rustls::Error> {
     let provider = provider();
     let pinned = Pinned {

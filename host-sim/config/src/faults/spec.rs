@@ -230,7 +230,7 @@ impl FromStr for FaultSpec {
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
         let owned = || text.to_owned();
-        // What else is wrong is told before a missing time, or with it.
+        // Other errors are reported before a missing time, or with it.
         let (what, time) = match text.split_once('@') {
             Some((what, time)) => (what, Some(time)),
             None => (text, None),
@@ -459,7 +459,7 @@ mod tests {
             ("valve-slow:joint1.fill-a=1@1s", "allowed 1.1 to 8"),
             ("valve-leak:joint1=1@1s", "allowed 1.1 to 10000"),
             ("supply-sag=10@1s", "allowed 0.5 to 9.9 bar"),
-            // All that is wrong is told at once.
+            // All errors are reported at once.
             ("bit-errors=0", "`0` is out of range: allowed 1e-9 to 0.1"),
             (
                 "bit-errors=0",

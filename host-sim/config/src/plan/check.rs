@@ -1,5 +1,5 @@
-//! Every value that a factor can have, against the ranges of the files: all that is wrong is
-//! told at once, before the first case.
+//! Checks every value that a factor can have against the ranges of the files, and reports all errors at once,
+//! before the first case.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -109,8 +109,8 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
     r.problem(span, message, "set twice", None);
 }
 
-/// One field that a factor sets, in all files that have it; what is wrong in one is not told of
-/// the others as well.
+/// One field that a factor sets, in all files that have it; an error in one file is not repeated for the
+/// others.
 fn field_in_all<'a>(
     r: &mut Reader,
     factor: &Factor,

@@ -57,7 +57,7 @@ impl Sources {
             robot_of: BTreeMap::new(),
             data: BTreeMap::new(),
         };
-        // A plan that is no TOML, or names nothing, is told of when it is read.
+        // A plan that is not TOML, or names nothing, is reported when it is read.
         let Ok(document) = Document::parse(sources.plan.text.clone()) else {
             return Ok(sources);
         };

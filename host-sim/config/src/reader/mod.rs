@@ -388,8 +388,8 @@ impl Reader {
             .iter()
             .map(|spec| match entry.get(spec.key) {
                 Some(_) => self.quantity(&entry, spec),
-                // That it is missing is told above. What the other fields must be to each other
-                // does not depend on a flag, and is told at the same time.
+                // A missing flag is reported above. Relations between the other fields do not depend on a
+                // flag, and are reported at the same time.
                 None => (spec.dimension == Dimension::Flag).then(|| vec![0.0]),
             })
             .collect();

@@ -20,8 +20,8 @@ fn is_name(text: &str) -> bool {
 }
 
 impl Reader {
-    /// Reads the name of a robot, an axis or a scenario: results go to folders and files of
-    /// that name, so it must be one and cannot lead out of the folder that it stands in.
+    /// Reads the name of a robot, an axis or a scenario. Results go to folders and files of that name, so it
+    /// must be a plain name that cannot lead out of its folder.
     pub(crate) fn name(&mut self, entry: &Entry, key: &str) -> Option<String> {
         let text = self.text(entry, key)?;
         if is_name(&text) {

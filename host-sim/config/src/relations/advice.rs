@@ -1,8 +1,8 @@
-//! What would mend a broken relation: values that are tried on the file before they are told.
+//! Advice for a broken relation: values that are tried on the file before they are proposed.
 //!
-//! A relation offers values with which it would hold itself. Another relation may refuse them, or a
-//! field's own range. So each offer is put into the file, which is checked again; what is refused is
-//! not told. Where no offer does alone, those are added that the relations broken by it ask for.
+//! A relation offers values with which it would hold. Another relation, or a field's own range, may refuse
+//! them. So each offer is put into the file, which is checked again; a refused offer is not proposed. Where
+//! no single offer is enough, offers of the relations that it breaks are added to it.
 
 use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
@@ -143,7 +143,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Of a file in which these are broken, and so much else is wrong.
+    /// For a file with these broken relations and `others` further errors.
     pub(super) fn new(found: &[Found], others: usize, attempt: &'a Try<'a>) -> Self {
         Self {
             before: found.iter().map(|found| found.relation.name).collect(),
@@ -158,7 +158,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether so much is wrong that not everything was tried.
+    /// Whether there were too many errors to try everything.
     pub(super) fn is_cut_short(&self) -> bool {
         self.left.get() == 0
     }

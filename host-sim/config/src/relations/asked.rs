@@ -478,15 +478,15 @@ impl<'a> Judge<'a> {
             let called = format!(", the `{}` of board {}", info.name, index + 1);
             brought.insert(path, (format!("events[{at}].value"), called));
         }
-        // What is as wrong as it was is told once, whatever is written beside it.
+        // An error that stays the same is reported once, whatever else is written.
         let mut refused = take(&mut board.refused);
         let judged = self.judge(&parameters, &brought, false, &mut refused);
         self.boards[index].refused = refused;
         judged
     }
 
-    /// Judges the table with what the scenario has brought; `new_pose`: in another start pose, too. What
-    /// is `refused` already is left out, and what is told now is added to it.
+    /// Judges the table with the values that the scenario brought; `new_pose`: in another start pose, too.
+    /// Leaves out errors that are in `refused`, and adds those that it reports.
     fn judge(
         &mut self,
         parameters: &[ParameterInfo],
@@ -535,7 +535,7 @@ impl<'a> Judge<'a> {
             ));
         }
         for (one, ((why, allowed), advice)) in found.iter().zip(told) {
-            // What an earlier event is to blame for has been told there.
+            // Errors caused by an earlier event have been reported there.
             let is_own = one
                 .relation
                 .fields

@@ -11,8 +11,8 @@ use crate::law::PREDICTIVE;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
 
-/// Shares of its track between which a wiper stands: beyond, a board takes it for torn off or
-/// shorted. As a commissioned board is told.
+/// Range of a wiper on its track, as shares of the track: beyond it, a board takes the sensor for torn off or
+/// shorted. Same as in a commissioned board.
 pub const SENSOR_TRACK: [f64; 2] = [0.01, 0.99];
 
 /// What no value of one field says.
@@ -460,8 +460,8 @@ pub(super) fn gravity(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// From so near to the end of the stroke that it is told, a board with a precharge presses its piston
-/// against the stop, mm; and so far beside the stop it takes it for pressed (`SEAT_TARGET` and
+/// Within the first distance of the configured end of the stroke, a board with a precharge presses its piston
+/// against the stop, mm; within the second of the stop it takes the piston for pressed (`SEAT_TARGET` and
 /// `SEATED_WITHIN` of the predictive law).
 pub const SEAT_MM: [f64; 2] = [0.5, 1.5];
 
@@ -505,7 +505,7 @@ fn decides<'a>(f: &Facts<'_>, own: &'a str, all: &'a str) -> Option<(&'a str, f6
     found(own).or_else(|| found(all))
 }
 
-/// Where the gait needs its pistons is within what their boards are told, to what counts as settled.
+/// The gait keeps its pistons within the limits set in their boards, to the settling tolerance.
 pub(super) fn reach(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     reached(f, it, &[])
 }

@@ -1,10 +1,9 @@
 //! What the fields of a file must be to each other, though each is within its own range.
 //!
-//! [`RELATIONS`] is the table. Each entry names its fields and says what they must be; a check
-//! sees the listed values of the file, so that it works beside sections that are wrong or
-//! missing. Those of the whole plant come last, where nothing else is wrong. An [`Offer`] is told only
-//! if it was tried on the whole file ([`advice`]). What several fields decide together is told in words,
-//! which nobody tries.
+//! [`RELATIONS`] is the table. Each entry names its fields and their relation; a check sees the listed values
+//! of the file, so it works even if other sections are wrong or missing. Relations of the whole plant come
+//! last, once nothing else is wrong. An [`Offer`] is proposed only if it was tried on the whole file
+//! ([`advice`]). A limit that depends on several fields is given in words, and is not tried.
 
 mod advice;
 mod asked;

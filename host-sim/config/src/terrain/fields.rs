@@ -20,7 +20,7 @@ pub(super) const fn number(key: &'static str, range: [f64; 2], doc: &'static str
     FieldSpec::scalar(key, Dimension::Number, range, doc)
 }
 
-/// A part as it is read; what nobody asked for is told in the end.
+/// A part that is being read; fields that nobody asked for are reported in the end.
 pub(super) struct Fields<'a> {
     pub(super) entry: &'a Entry,
     /// Fields at the top of the file.

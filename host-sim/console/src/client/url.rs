@@ -148,8 +148,8 @@ impl Url {
         Ok(Stream::Tls(Box::new(stream)))
     }
 
-    /// Addresses of the host. Whoever knows its name may take long to say so: the system's look-up has
-    /// no deadline of its own, and goes on in a thread that nobody waits for.
+    /// Addresses of the host. A name server may answer slowly: the system's look-up has no deadline of its
+    /// own, so it runs in a thread that nobody waits for.
     fn addresses(&self, end: Instant) -> Result<Vec<SocketAddr>, ConsoleError> {
         if let Ok(address) = self.host.parse() {
             return Ok(vec![address]);

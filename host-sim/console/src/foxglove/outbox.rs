@@ -1,5 +1,5 @@
-//! What waits for one viewer. Of samples and of the time the newest wins; of events the oldest go,
-//! and the viewer is told how many; a viewer that lets answers pile up is closed.
+//! Queue of messages for one viewer. Of samples and of the time the newest wins; of events the oldest are
+//! dropped, and the viewer gets their number; a viewer that lets answers pile up is closed.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -52,7 +52,7 @@ pub(crate) struct Queue {
     time_ns: Option<u64>,
     events: VecDeque<Data>,
     event_bytes: usize,
-    /// Events that went, and are not told yet.
+    /// Dropped events, not reported yet.
     lost: u64,
     newest: BTreeMap<Channel, Data>,
     /// Channel that was sent last: the next one in order is the next, so that none starves.

@@ -26,7 +26,7 @@ struct Viewer {
     outbox: Arc<Outbox>,
     /// The viewer's numbers of its subscriptions.
     subscriptions: BTreeMap<Channel, u32>,
-    /// Parameters whose changes it is told.
+    /// Parameters to whose changes it has subscribed.
     parameters: BTreeSet<Place>,
 }
 
@@ -274,7 +274,7 @@ impl Viewers {
         }
     }
 
-    /// A board has told a value.
+    /// A board has reported a value.
     pub(crate) fn told(&mut self, place: Place, raw: i32) {
         let Some(name) = self.parameters.told(place, raw) else {
             return;

@@ -38,7 +38,7 @@ pub(crate) async fn write(
             status(2, &format!("no further parameter is written: {why}")),
         );
     }
-    // What was not taken is told as it is.
+    // For values that were not written, the viewer gets the real ones.
     if !names.is_empty() {
         hub.tell_parameters(viewer, &names, request.as_deref());
     }
@@ -103,7 +103,7 @@ impl Session {
         Ok(())
     }
 
-    /// Gives the control to whoever has asked for it, and else to nobody.
+    /// Hands control over to the client that has asked for it; without one, releases it.
     async fn release(&mut self) -> Result<(), String> {
         if let Some((_, session)) = self.heir.take()
             && self
@@ -113,7 +113,7 @@ impl Session {
         {
             return Ok(());
         }
-        // Whoever asked may be gone by now.
+        // The client that asked may be gone by now.
         self.carry_out("ReleaseControl", json!({})).await
     }
 

@@ -14,8 +14,8 @@ use wheeleg_access::reason::Reason;
 use wheeleg_access::request::{HostCommand, Order, Spoken};
 
 const RELEASE: CommandCode = CommandCode::ReleaseControl;
-/// The holder of the control is told of those who ask for it so often at most: who asks without end, on
-/// however many connections, fills no queue of theirs.
+/// The holder of control is notified of requests for it at most this often: a client that asks without end,
+/// on however many connections, cannot fill the holder's queue.
 const ASKED: Duration = Duration::from_secs(1);
 /// Time of the master in which it has answered what it accepted about the control: at its next cycle.
 const CONTROL_US: u64 = 1_000_000;
@@ -70,7 +70,7 @@ impl Inner {
                         return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
                     }
                     Err(Denied::Held) => {
-                        // Nobody is told for a holder who has ended; the next one is.
+                        // A holder who has ended is not notified; the next one is.
                         let holder = self.desk.holder().filter(|h| h.ended.is_none());
                         let holder = holder.map(|holder| holder.client);
                         let told = self
@@ -143,7 +143,7 @@ impl Inner {
                 (Input::Revoked { id, holder, by }, Asked::Revoke { hold })
             }
             Order::Host(command) => {
-                // Whoever sits at the robot's computer may break something while another drives.
+                // The person at the robot's computer may inject faults while another drives.
                 let breaks = matches!(command, HostCommand::Inject(_) | HostCommand::EndFault(_));
                 let may_break = breaks && client.is_local;
                 if !self.desk.may_command_host(id) && !may_break {
@@ -278,8 +278,8 @@ impl Inner {
         self.tell(heir, &offered);
     }
 
-    /// A client ends the control of whoever has it, or has asked for it: from now on nothing of theirs
-    /// reaches the robot, beats neither, so that the master ends the lease.
+    /// A client ends the control of the holder, or of the client that has asked for it: from now on none of
+    /// its commands or beats reach the robot, so the master ends the lease.
     fn revoke(&mut self, by: ClientId, hold: Duration) {
         let Some(client) = self.clients.get(&by) else {
             return;
@@ -335,8 +335,8 @@ impl Inner {
                 );
             }
         }
-        // Whoever asked is gone, and nobody else is told. What comes of a control that was asked for is
-        // waited for: the master may grant it yet.
+        // The asker is gone, and nobody else needs the answer. Requests for control stay pending: the master
+        // may still grant them.
         let clients = &self.clients;
         self.pending.retain(|_, p| {
             clients.contains_key(&p.client) || now - p.since < TICKET || p.what.is_of_control()

@@ -1,5 +1,5 @@
-//! The last minute of every channel, for who asks later: of channels with a rate at most 50 samples a
-//! second of master time, of those that are told on change every one.
+//! The last minute of every channel, for clients that ask later: of channels with a rate at most 50 samples a
+//! second of master time, of those that are sent on change every one.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! Who has stopped the robot, as everybody is told.
+//! Who has stopped the robot, as shown to everybody.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -32,7 +32,7 @@ pub(crate) enum StopBy {
 pub(super) struct AskedStops(Arc<Mutex<Vec<(StopBy, u64)>>>);
 
 impl AskedStops {
-    /// Asks for a stop, and gives its number. Whoever sees what comes of it finds here who asked.
+    /// Asks for a stop, and returns its number, under which its effect is traced back to `by`.
     pub(super) fn stop(&self, signals: &Signals, by: StopBy) -> u64 {
         let mut asked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let number = signals.stop();
@@ -45,7 +45,7 @@ impl AskedStops {
     }
 }
 
-/// Who asks for a stop, as everybody is told.
+/// Who asks for a stop, as shown to everybody.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "via", rename_all = "snake_case")]
 enum Stopper {
@@ -79,7 +79,7 @@ pub(super) struct Stopped {
     latched: bool,
     #[serde(skip)]
     asked: Instant,
-    /// It was told as a command.
+    /// It was reported as a command.
     #[serde(skip)]
     told: bool,
 }

@@ -108,7 +108,7 @@ impl Hub {
         let inner = self.inner();
         inner.viewers.tell(looking.id, status(2, text));
         if !names.is_empty() {
-            // The viewer shows what it wanted until it is told what is so.
+            // The viewer shows the requested values until it gets the real ones.
             let request = request.as_deref();
             inner.viewers.tell_parameters(looking.id, &names, request);
         }

@@ -182,7 +182,7 @@ pub(crate) enum Report {
         /// What.
         answer: Answer,
     },
-    /// A board has told the value of a parameter.
+    /// A board has reported the value of a parameter.
     Parameter {
         /// Board.
         board: u8,

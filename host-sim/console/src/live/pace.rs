@@ -79,8 +79,7 @@ impl Pace {
         self.rebase(now);
     }
 
-    /// The next cycle is due now: nothing of what was missed is made up for, and the second that is
-    /// looked at begins anew.
+    /// The next cycle is due now: missed cycles are not made up for, and the observed second starts again.
     pub(super) fn rebase(&mut self, now: Instant) {
         self.due = now;
         self.late_ms.clear();

@@ -445,7 +445,7 @@ impl Loop {
 
     fn answer(&mut self, id: u32, answer: Answer) {
         let time_us = self.now_us();
-        // A hub that does not listen is told nothing; the robot goes on.
+        // If the hub does not listen, the answer is lost; the robot goes on.
         let _ = self.reports.push(Report::Answer {
             id,
             time_us,

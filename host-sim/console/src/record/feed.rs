@@ -115,7 +115,7 @@ pub(crate) struct FeedSink(pub(crate) Rc<RefCell<Feed>>);
 
 impl Sink for FeedSink {
     fn take(&mut self, taken: &Taken<'_>) {
-        // What went into a run stands in every recording, whenever it begins.
+        // Every recording holds the inputs of its run, whenever it begins.
         let head = matches!(taken.sample, SampleRef::Provenance(_));
         let mut feed = self.0.borrow_mut();
         if !taken.due || !(feed.running || head) {

@@ -454,7 +454,7 @@ mod tests {
             .iter()
             .map(|file| file.metadata().expect("there").len());
         assert_eq!(list(root.path(), 9)[0].1, bytes.sum::<u64>());
-        // Of one that had just begun nothing is missed, and it is told that the log breaks off.
+        // One that had just begun misses nothing, and its log is reported as broken off.
         fs::write(&files[2], "").expect("written");
         assert_eq!(contents(&log), (times[..200].to_vec(), robot, false));
     }

@@ -1,10 +1,9 @@
-//! Recordings of a live robot. The robot's thread tells what it was given and what was sampled, in
-//! one ring; a thread of its own writes that into a folder. A slow or full disk costs data, counted
-//! and told, never a tick.
+//! Recordings of a live robot. The robot's thread puts its inputs and samples into one ring; a separate
+//! thread writes them to a folder. A slow or full disk costs data, counted and reported, never a tick.
 //!
-//! A recording can be repeated ([`crate::replay()`]): the seed and the robot are in its folder, and
-//! every input since power-up stands in it with the millisecond at which the robot's thread took
-//! it. So it may begin at any time; its log begins with it, its inputs with the power.
+//! A recording can be repeated ([`crate::replay()`]): its folder holds the seed, the robot and every input
+//! since power-up, with the millisecond at which the robot's thread took it. So it may begin at any time; its
+//! log begins with it, its inputs with the power.
 
 mod feed;
 pub(crate) mod folder;
@@ -29,7 +28,7 @@ use wheeleg_access::request::Spoken;
 pub(crate) use feed::{Feed, FeedSink};
 pub use folder::Summary;
 
-/// Where recordings go unless told otherwise.
+/// Default folder of recordings.
 pub const FOLDER: &str = "runs/live";
 
 /// What may wait for the disk: some seconds of the log.

@@ -1,5 +1,5 @@
-//! What a robot was given as samples of the channel `/session`, for who looks. The same, complete and
-//! for a repetition, stands in a recording's `inputs.jsonl`.
+//! The robot's inputs as samples of the channel `/session`, for viewers. A recording's `inputs.jsonl` holds
+//! them in full, for a repetition.
 
 use std::fmt::Write as _;
 

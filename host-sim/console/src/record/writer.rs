@@ -175,7 +175,7 @@ impl Writer {
         self.check(written);
     }
 
-    /// Ends the recording; `how`: time, hash and missing messages, where the robot told them.
+    /// Ends the recording; `how`: time, hash and missing messages, if the robot reported them.
     fn end(&mut self, how: Option<(u64, String, u64)>) -> Result<(), String> {
         let Some(mut running) = self.running.take() else {
             return Ok(());

@@ -66,7 +66,7 @@ fn every_answer_is_as_the_document_says() {
         "{answer}"
     );
     look(&mut driver, "state");
-    // The schema is strict: a field more or less is told.
+    // The schema is strict: an extra or missing field is reported.
     let state = rig.state();
     let strict = schema(&document, "/state", "get", 200);
     for name in ["armed", "recording", "boards"] {

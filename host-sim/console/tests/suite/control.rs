@@ -102,7 +102,7 @@ fn a_killed_client_is_noticed_by_the_master() {
     assert_eq!(rig.event("hold")["holder"], "driver");
     let state = rig.until("free", |state| state["control"].is_null());
     assert_eq!(state["armed"], false);
-    // Whoever comes back has no control, and the stop is latched.
+    // A client that comes back has no control, and the stop is latched.
     let mut back = rig.control("driver");
     look(&mut back, "state");
     assert_eq!(refusal(&mut back, "Stand", &json!({})), "not_in_control");
@@ -145,7 +145,7 @@ fn a_server_that_hangs_is_noticed_by_the_master() {
     assert!(after_us <= 470_000 + 60_000, "{after_us} us");
 }
 
-/// Whoever asks on a new connection each time is told of no more often.
+/// A client that asks on a new connection each time is not announced more often.
 #[test]
 fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     let rig = TestRig::new();
@@ -215,7 +215,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     );
     assert_eq!(answer["holder"], "first");
     assert_eq!(look(&mut first, "asked")["by"], "second");
-    // Who asks without end is told of once a second.
+    // A client that asks without end is announced once a second.
     let begin = Instant::now();
     let mut told = 0;
     for _ in 0..40 {
@@ -247,7 +247,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     assert!(state["control"].is_null(), "{state}");
 }
 
-/// Everybody is told who has stopped the robot, and is told no more once it is over.
+/// Everybody sees who has stopped the robot, and no longer once it is over.
 #[test]
 fn a_stop_has_a_name() {
     let rig = TestRig::new();
@@ -565,7 +565,7 @@ fn what_is_handed_over_and_not_taken_is_free() {
     assert_eq!(outcome, Outcome::Done);
     first.keep_control(false);
     look(&mut second, "offered");
-    // Whoever it was reserved for goes: it is free at once.
+    // The client it was reserved for leaves: control is free at once.
     drop(second);
     let begin = Instant::now();
     loop {
@@ -595,7 +595,7 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     revokes(&mut local);
     assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
-    // It asks anew before it is gone: that gains nothing.
+    // It asks again before it is gone: that gains nothing.
     assert_eq!(refusal(&mut driver, "TakeControl", &nothing), "revoked");
     // It goes on to beat all the while.
     let state = until_driven(&rig, &mut driver, |state| state["control"].is_null());
@@ -617,7 +617,7 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
         "control_held"
     );
     until_driven(&rig, &mut driver, |state| state["reserved_for"].is_null());
-    // Whoever looks at the robot may take it anew, and has to clear what happened.
+    // Any client may take control again, and has to clear what happened.
     done(&mut driver, "TakeControl");
     assert_eq!(refusal(&mut driver, "Arm", &nothing), "latched");
     done(&mut driver, "ClearFault");
@@ -650,8 +650,8 @@ fn who_pauses_and_leaves_keeps_the_clock_from_nobody() {
     done(&mut other, "TakeControl");
 }
 
-/// Whoever asked while the holder was gone already is no sooner refused by the next one than that one
-/// is told.
+/// A client that asked when the holder was already gone is not refused by the next holder before that one is
+/// notified.
 #[test]
 fn who_asked_for_the_control_of_nobody_is_told_to_the_next_holder() {
     let rig = TestRig::new();

@@ -31,7 +31,7 @@ const WARNING: u64 = 1;
 fn a_short_request_has_no_endless_answer() {
     let rig = TestRig::new();
     let mut viewer = viewer(&rig);
-    // Each would be told with the robot's whole description.
+    // Each answer would hold the robot's whole description.
     let names = vec!["/robot_description"; ITEMS_MAX];
     let asked = json!({ "op": "getParameters", "parameterNames": names, "id": "\"1\"" });
     viewer.send(Message::text(asked.to_string())).expect("sent");

@@ -546,7 +546,7 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     );
 }
 
-/// A viewer that writes on and on makes room for whoever wants to drive.
+/// A viewer that writes on and on makes room for a client that wants to drive.
 #[test]
 fn a_viewer_that_writes_hands_the_control_over_to_who_asks_for_it() {
     let rig = TestRig::new();
@@ -573,7 +573,7 @@ fn a_viewer_that_writes_hands_the_control_over_to_who_asks_for_it() {
     let why = refusal(&mut driver, "TakeControl", &json!({}));
     assert_eq!(why, "control_held");
     assert_eq!(look(&mut driver, "offered")["by"], "foxglove");
-    // Whoever writes waits for who was offered it.
+    // The writer waits for the client that was offered control.
     let one = json!({ "op": "setParameters", "parameters": all[..1], "id": "one" });
     writer.send(one);
     done(&mut driver, "TakeControl");

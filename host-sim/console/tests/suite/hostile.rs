@@ -180,7 +180,7 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
     client.send(json!({ "op": "stop" })).expect("sent");
     assert_eq!(closed(&mut client), 4003);
     assert_eq!(rig.state()["emergency_stop"], false);
-    // The person at the server is told, by name and address.
+    // The person at the server sees its name and address.
     let told = rig.server.notices();
     let named = told
         .iter()
@@ -309,7 +309,7 @@ fn half_handshakes_take_no_more_places_than_others() {
             tungstenite::client(request, stream).ok()
         })
         .collect();
-    // Whoever comes gets a place; the oldest have lost theirs.
+    // Every newcomer gets a place; the oldest have lost theirs.
     let still = open
         .iter()
         .filter(|(socket, _)| is_open(socket.get_ref()))

@@ -30,7 +30,7 @@ fn rig_and_listener() -> (TestRig, TcpListener) {
         .expect("a free port")
 }
 
-/// A line to the server that becomes slow when it is told so, and counts its bytes from then on.
+/// A line to the server that becomes slow on demand, and counts its bytes from then on.
 fn relay(rig: &TestRig, listener: TcpListener) -> (Url, Arc<AtomicBool>, Arc<AtomicUsize>) {
     let server = rig.server.address();
     let slow = Arc::new(AtomicBool::new(false));
@@ -178,7 +178,7 @@ fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
     assert!(count > 0 && missed > 2 * count, "{missed} beside {count}");
 }
 
-/// It is told much, and says nothing but that it is there when it is asked.
+/// It receives much, and sends nothing but its answers to pings.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn who_only_looks_is_not_taken_for_gone() {

@@ -1,5 +1,5 @@
-//! Recordings: what an operator did is repeated to the bit, however the recording ended; a folder
-//! that is none, or was tampered with, is told.
+//! Recordings: an operator's inputs repeat to the bit, however the recording ended; a folder that is no
+//! recording, or was tampered with, is reported.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -32,7 +32,7 @@ fn repeated(folder: &Path) -> Replayed {
     told(folder, None).expect("a recording")
 }
 
-/// What is told of it, with the problems of a file.
+/// The error for a folder, with the problems of its files.
 fn error(folder: &Path) -> String {
     let told = told(folder, None).expect_err("no recording");
     let related = told.related().into_iter().flatten();
@@ -86,7 +86,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     let first = first_difference(&folder.join("log.mcap"), &log).expect("two logs");
     assert_eq!(first, None);
 
-    // One digit of one command makes another session, and the second in which it does is told.
+    // One changed digit in one command makes another session; the second of the difference is reported.
     let other = copied(&folder);
     let inputs = other.path().join("inputs.jsonl");
     let text = fs::read_to_string(&inputs).expect("inputs");
@@ -118,7 +118,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     assert!(told.compared >= 2, "{told:?}");
 }
 
-/// Who revoked whose control stands in the recording, and on `/session`.
+/// Who revoked whose control is in the recording, and on `/session`.
 #[test]
 fn a_revoked_control_is_recorded_and_repeats() {
     let rig = TestRig::recorded(1.0);
