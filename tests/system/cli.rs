@@ -101,7 +101,7 @@ fn no_colour_is_no_colour() {
     }
 }
 
-/// What the program says, word for word; `TRYCMD=overwrite` writes it anew.
+/// The program's output, word for word; `TRYCMD=overwrite` rewrites it.
 #[test]
 fn texts_are_those_of_the_files() {
     trycmd::TestCases::new()
@@ -403,8 +403,8 @@ fn interfaces_are_listed_and_compared_and_bad_hashes_are_refused() {
     wheeleg().args(["interface", "--all"]).assert().code(2);
 }
 
-/// Times of events are those of the scenario wherever they are told, and a command that is
-/// refused is told like a fault, once.
+/// All outputs give the times of events as those of the scenario, and report a refused command like a fault,
+/// once.
 #[test]
 fn events_have_one_time_everywhere_and_refusals_are_told() {
     let dir = folder();
@@ -604,7 +604,7 @@ fn a_full_standard_error_ends_nothing() {
     assert_eq!(run(&dir.path().join("none.toml")).code(), Some(2));
 }
 
-/// What a file says of itself stands in pages, logs, tables and other files as it is.
+/// A file's own texts appear unchanged in pages, logs, tables and other files.
 #[test]
 fn texts_of_a_file_are_quoted_wherever_they_go() {
     const HOSTILE: &str = "</script><b onload='x'>\"a\", &amp; ;\u{202e}\tend";

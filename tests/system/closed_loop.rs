@@ -186,7 +186,7 @@ fn cylinders_follow_their_references_but_not_at_once() {
         });
         assert!((8.0..120.0).contains(&lag), "b6 lags by {lag} mm");
     }
-    // Yaw and the held leg stay where they were told to.
+    // Yaw and the held leg stay where they were sent.
     for joint in (0..6).filter(|j| !steps.leg[1..].contains(j)) {
         let rows = &steps.recording.joints[joint];
         let (low, high) = range(rows, |s| s.reference_mm - s.position_mm);

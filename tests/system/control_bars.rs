@@ -279,8 +279,8 @@ fn nothing_switches_at_rest() {
     }
 }
 
-/// Moves of the robot's cylinder between places all over its stroke, by a law that is
-/// told `axis`: 40 boards, five moves each after the first.
+/// Moves of the robot's cylinder between places all over its stroke, by a law that is configured with `axis`:
+/// 40 boards, five moves each after the first.
 fn wandering_moves(axis: &AxisData) -> Vec<Trace> {
     let sheet = wheeleg_2003_axis();
     let mut design = design(&sheet, Kind::Predictive);
@@ -319,8 +319,8 @@ fn late_and_restless(traces: &[Trace]) -> (usize, usize) {
 #[ignore = "long; `cargo xtask test` runs it"]
 fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
     let told = axis_data(&wheeleg_2003_axis());
-    // What a board takes that is told nothing: a faster valve in front of the same
-    // cylinder. Its shortest pulses, of 3.85 to 5 ms, open nothing here.
+    // The defaults of an unconfigured board: a faster valve in front of the same cylinder. Its shortest
+    // pulses, of 3.85 to 5 ms, open nothing here.
     let other = AxisData::default();
     assert!(other.valve_on < told.valve_on && other.valve_off < told.valve_off);
     assert_eq!(

@@ -339,7 +339,7 @@ fn a_mass_or_load_that_cannot_be_simulated_is_refused_by_its_option() {
     );
 }
 
-/// A part that fails costs none of those before it: they are in the summary, and the failure is told.
+/// A part that fails costs none of those before it: they are in the summary, and the failure is reported.
 #[test]
 fn a_part_that_fails_costs_no_part_before_it() {
     let mut robot = builtin::robot("wheeleg-2003").expect("built in");

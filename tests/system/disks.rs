@@ -79,8 +79,8 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
 /// Sizes of a disk, KiB: from hardly more than a lock to room for everything.
 const SIZES_KIB: [usize; 10] = [4, 12, 32, 64, 128, 256, 512, 1000, 2000, 4000];
 
-/// The disk fills under every command that writes: what is there is whole or named, nothing claims
-/// to be done, and a verdict is told whether its summary has room or not.
+/// The disk fills under every command that writes: every file is whole or named, nothing claims to be done,
+/// and the verdict is printed whether its summary has room or not.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_disk_that_fills_under_any_command_is_told() {
@@ -96,7 +96,7 @@ fn a_disk_that_fills_under_any_command_is_told() {
             tried_disks += 1;
             let serves = tried.arguments[0] == "serve";
             let seconds = if serves { 4 } else { 300 };
-            // What is left is listed before it goes with the name space. A server is told to end.
+            // The files left are listed before the name space takes them. A server gets a signal to end.
             let script = format!(
                 "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
                  disk=\"$1\"; shift\n\

@@ -208,7 +208,7 @@ fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
     against("/dev/zero", &["/dev/zero", "more than 64 MiB"]);
 }
 
-/// A page beside a log may be somebody's own; that of an earlier `view` is made anew.
+/// A page beside a log may be somebody's own; that of an earlier `view` is remade.
 #[test]
 fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     let place = Place::new();
@@ -225,7 +225,7 @@ fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(place.text("notes.html.previous"), "mine");
     assert!(!place.path("notes.html.previous-2").exists());
-    // A log without a message is told as such by every command, not as one of another version.
+    // Every command calls a log without a message just that, not one of another version.
     let log = fs::read(place.path("notes.mcap")).expect("a log");
     fs::write(place.path("head.mcap"), &log[..300]).expect("written");
     for command in [
@@ -248,7 +248,7 @@ fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     assert_eq!(fs::read(place.path("notes.mcap")).expect("kept"), log);
 }
 
-/// Whatever is given, of a word that is longer than any path the begin is told.
+/// In every message, a word that is longer than any path is cut to its start.
 #[test]
 fn words_that_are_longer_than_any_are_told_in_short() {
     let place = Place::new();
@@ -501,8 +501,8 @@ fn look_only_server(pause: Duration) -> String {
     address
 }
 
-/// Who stops a robot is told that nobody confirms, whatever answers in its place: nothing, something
-/// else, or something that does not end.
+/// If nobody confirms a stop, its sender is warned, whatever answers instead: nothing, something else, or
+/// something that does not end.
 #[cfg(unix)]
 #[test]
 fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
@@ -553,7 +553,7 @@ fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
     let address = look_only_server(drip);
     let ctl = ["ctl", "--url", &address, "--key", "key", "stop"];
     place.refusal(&ctl, 3, &words);
-    // Over a session, too, another server is told as one.
+    // Over a session, too, another server is recognized as one.
     for answer in [&b"\x00\xff\x00\xff\r\n\r\n"[..], page] {
         let address = server(answer, none);
         let ctl = ["ctl", "--url", &address, "--key", "key", "pause"];

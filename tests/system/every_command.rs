@@ -307,8 +307,8 @@ fn leaves(path: &[String], found: &mut Vec<(String, String)>) {
     }
 }
 
-/// The list above is compared with the program's own: a command that can be told where to write is on
-/// it; every other is there too, or is known to be brief.
+/// The list above is compared with the program's own: every command with an output option is on it; every
+/// other is there too, or is known to be brief.
 #[test]
 fn no_command_is_left_out() {
     let inputs = Inputs {

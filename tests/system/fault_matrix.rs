@@ -209,8 +209,8 @@ fn nothing_trips_without_a_fault() {
     assert!(quiet >= 7, "{quiet} scenarios without faults");
 }
 
-/// In the row of a minute the robot holds most of the time: this one is told to walk on after
-/// every stop, so that boards that drive see the broken frames.
+/// In the row of a minute the robot holds most of the time: this one is commanded to walk on after every
+/// stop, so that driving boards see the broken frames.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_robot_that_is_started_again_and_again_acts_on_no_wrong_frame_for_a_minute() {

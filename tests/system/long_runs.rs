@@ -77,7 +77,7 @@ fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     ensure_disk_is_told(&stderr, out);
     let summary = json(&output);
-    // A missed target is told, and is no failure without `--strict`.
+    // A missed target is reported, and is no failure without `--strict`.
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     (peak, summary)
 }
@@ -90,8 +90,8 @@ fn size(folder: &Path) -> f64 {
     sizes.map(|file| file.expect("a file").len() as f64).sum()
 }
 
-/// The disk that is told is what the files take, or up to three times as much: a robot that stands has
-/// less to say than one that walks.
+/// The announced disk space is what the files take, or up to three times as much: a robot that stands writes
+/// less than one that walks.
 #[cfg(target_os = "linux")]
 fn ensure_disk_is_told(stderr: &str, out: &Path) {
     let before = |what: &str| -> f64 {
@@ -111,7 +111,7 @@ fn ensure_disk_is_told(stderr: &str, out: &Path) {
     }
 }
 
-/// The scenario with the most to say takes no more disk than is told of it.
+/// The scenario that writes most takes no more disk than announced.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]
@@ -137,7 +137,7 @@ fn no_built_in_scenario_takes_more_disk_than_is_told() {
     }
 }
 
-/// Each channel of a log goes on in time to the end of the run, whatever counter has begun anew by then.
+/// Each channel of a log goes on in time to the end of the run, even if a counter has wrapped by then.
 #[cfg(target_os = "linux")]
 fn ensure_time_goes_on(log: &Path, duration_s: u32) {
     let mut newest = vec![None; channels().len()];
@@ -334,8 +334,8 @@ fn the_log_of_a_killed_run_is_recovered() {
     );
 }
 
-/// The disk fills up at ten different times of a run: the verdict is told and kept all the same.
-/// Each disk is a file system in memory, of a mount name space of its own.
+/// The disk fills up at ten different times of a run: the verdict is printed and kept all the same. Each disk
+/// is a file system in memory, of a mount name space of its own.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]

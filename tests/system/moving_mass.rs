@@ -1,4 +1,4 @@
-//! The mass that a joint's board is told is the one that its piston feels.
+//! The mass set in a joint's board is the one that its piston feels.
 
 use wheeleg_config::builtin;
 use wheeleg_node::parameters::JointParameters;

@@ -65,9 +65,9 @@ const KINDS: [Kind; 7] = [
 enum Fate {
     /// It was run to its end, or until it was stopped.
     Ran,
-    /// Its run ended early, and the user is told why.
+    /// Its run ended early; the reason given to the user.
     Ended(String),
-    /// It was refused, and the user is told why.
+    /// It was refused; the reason given to the user.
     Refused(String),
 }
 
@@ -100,8 +100,8 @@ fn files() -> Vec<(Kind, String)> {
 const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
     duration = \"0.3 s\"\nseed = 1\ntargets = \"stand\"\n[motion]\nkind = \"stand\"\n";
 
-/// Says what a user is told, and that it is told in words: the file, the field or section, what about
-/// it, and no value as a program prints it for itself.
+/// Returns the messages to the user, and checks that they are in words: the file, the field or section, what
+/// about it, and no value in a program's debug format.
 fn messages(error: &dyn Diagnostic, file: &str) -> String {
     let mut text = error.to_string();
     let mut remedy = error.help().is_some() || error.related().is_some();

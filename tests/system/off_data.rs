@@ -1,5 +1,5 @@
-//! Robots that are not what their boards are told: no board takes that for a fault, over every
-//! scenario in which nothing goes wrong and with loads below the margin that the boards are told.
+//! Robots that differ from the data in their boards: no board takes that for a fault, over every scenario in
+//! which nothing goes wrong and with loads below the margin set in the boards.
 //!
 //! A few robots here; `cargo xtask deep off-data` walks as many as it takes to know a rate.
 
@@ -20,7 +20,7 @@ const ROBOTS_VARIABLE: &str = "WHEELEG_OFF_ROBOTS";
 const FIRST_VARIABLE: &str = "WHEELEG_OFF_FIRST";
 /// Loads put on each robot's walk, one a run.
 const LOADS: u64 = 2;
-/// Largest of them, N: the margin that the boards are told is 50 N.
+/// Largest of them, N: the margin set in the boards is 50 N.
 const LARGEST_LOAD_N: f64 = 48.0;
 
 /// Numbers that look random, the same for the same start.
@@ -44,8 +44,8 @@ impl Draw {
     }
 }
 
-/// A robot whose valves, friction, seals and supply are not what its boards are told: each
-/// cylinder's own, at random within what the sources in the robot file leave open.
+/// A robot whose valves, friction, seals and supply differ from the data in its boards: each cylinder's own,
+/// at random within what the sources in the robot file leave open.
 fn off_its_data(number: u64) -> RobotConfig {
     let mut robot = robot();
     let mut draw = Draw::new(number);
@@ -95,7 +95,7 @@ impl Seen {
 impl fmt::Display for Seen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let a = &self.account;
-        // The boards are told 7.01 bar, whatever the supply is.
+        // The boards are configured for 7.01 bar, whatever the supply is.
         let [p_a, p_b] = a
             .pressures
             .map(|p| f64::from(p) / f64::from(1 << 17) * 7.013);

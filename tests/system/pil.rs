@@ -272,8 +272,8 @@ fn without_figures(reply: &Reply) -> Ran {
     }
 }
 
-/// The answer begins 100 µs later: a simulator that runs on to the next edge before it is
-/// told puts it on the line too late.
+/// The answer begins 100 µs later: a simulator that runs on to the next edge before it hears of it puts it on
+/// the line too late.
 #[test]
 fn the_answer_to_a_request_that_ends_with_a_tick_edge_is_told_with_that_edge() {
     for (address, tick_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {

@@ -136,7 +136,7 @@ fn limit(image: &Path, kind: Kind, times: u8) -> Result<(), String> {
 fn hardware_ends_the_drive_of_a_transmission_that_takes_too_long_and_the_board_latches_it() {
     for kind in [JOINT, WHEEL] {
         let image = image(kind.0).expect("an image");
-        // Twice, more, and so much that no byte is over when the driver goes.
+        // Twice, more, and long enough that no byte is over when the driver goes.
         for times in [2, 3, 100] {
             let found = limit(&image, kind, times);
             assert_eq!(found, Ok(()), "{}, {times} times as long", kind.0);

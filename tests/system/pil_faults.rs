@@ -217,7 +217,7 @@ fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
     let scenario = gait_with(&format!("node-hang:joint2@{t:.3}s"), t + 1.0);
     let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
-    // The hardware goes on with what it was told last.
+    // The hardware goes on with its last outputs.
     let hung = window(rows, t + 2.0 * TICK_S, t + 0.040);
     let told = |row: &Row<JointSample>| {
         [
@@ -277,7 +277,7 @@ fn a_wheel_that_lost_its_supply_counts_from_zero_again_as_its_hardware_does() {
         "{count}, {read:?}"
     );
     assert!(read.is_sorted() && read.last() > read.first(), "{read:?}");
-    // It may hold already: the master has told all axes to.
+    // It may hold already: the master has commanded all axes to.
     let drives = [NodeMode::Armed.code(), NodeMode::Tracking.code()];
     let modes = after.iter().map(|row| row.v.mode);
     assert!(modes.clone().all(|m| !drives.contains(&m)), "armed again");

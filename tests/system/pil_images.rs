@@ -1,6 +1,6 @@
-//! Images that are not what is wanted: told before anything is started, with the file,
-//! what it is, what is wanted and the command that builds it; results of an earlier run
-//! stay where they are. `cargo xtask pil` builds what this needs and runs it.
+//! Wrong firmware images: reported before anything is started, with the file, what it is, what is wanted and
+//! the command that builds it; results of an earlier run stay where they are. `cargo xtask pil` builds what
+//! this needs and runs it.
 
 use crate::program;
 use std::path::{Path, PathBuf};

@@ -192,7 +192,7 @@ fn save(node: u8) -> EventAction {
     EventAction::Command(Command::SaveParameters { node })
 }
 
-/// Parameters that the master was told in a run: board, number, raw value.
+/// Parameters that the master received in a run: board, number, raw value.
 fn parameters(recording: &Recording) -> Vec<(u8, u16, i32)> {
     let events = recording.events.iter();
     events

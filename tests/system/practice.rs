@@ -215,8 +215,8 @@ fn tuning_makes_no_random_axis_worse() {
     );
 }
 
-/// A standard stroke works. A longer one, which no board can be told, is refused by its own range by
-/// everything that reads the file.
+/// A standard stroke works. A longer one, which no board accepts, is refused by its own range by everything
+/// that reads the file.
 #[test]
 fn the_longest_standard_stroke_is_tuned() {
     assert_eq!(tuned(HEAVY, &rodless(500.0)), 0);
@@ -608,8 +608,8 @@ fn a_board_seats_where_the_relation_takes_it_to() {
     }
 }
 
-/// Cylinders that are 3 mm longer than their boards are told: refused by the fields; with what is advised
-/// the robot gets ready.
+/// Cylinders that are 3 mm longer than their boards know: refused by the fields; with the advised values the
+/// robot gets ready.
 #[test]
 fn a_longer_stroke_is_told_to_the_boards_too() {
     let folder = tempfile::tempdir().expect("temporary folder");

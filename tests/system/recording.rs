@@ -107,7 +107,7 @@ fn a_server_that_does_not_start_leaves_the_keys_as_they_are() {
     served.end("TERM");
 }
 
-/// Whoever asks how the robot is reads of a stop first, and who pressed it.
+/// The robot's status starts with a stop, and who pressed it.
 #[test]
 fn the_status_of_a_stopped_robot_begins_with_the_stop() {
     let served = Served::new("");
@@ -271,7 +271,7 @@ fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {
     assert_eq!(told["same"], true, "{told}");
 }
 
-/// What the command line gives of a wrong command is told whole, and takes the control from nobody.
+/// The command line reports every error of a wrong command, and takes control from nobody.
 #[test]
 fn a_wrong_command_is_told_with_every_value_and_range() {
     let served = Served::new("");

@@ -431,7 +431,7 @@ pub(crate) fn files_below(folder: &Path) -> Vec<String> {
     found
 }
 
-/// The folder of a run goes while it is under way: the verdict is told all the same.
+/// The folder of a run is removed while it is under way: the verdict is printed all the same.
 #[test]
 fn a_folder_that_vanishes_costs_no_verdict() {
     let dir = tempfile::tempdir().expect("temporary folder");
@@ -450,12 +450,12 @@ fn a_folder_that_vanishes_costs_no_verdict() {
         said.contains("log.mcap") && said.contains("csv") && !said.contains("panicked"),
         "{said}"
     );
-    // What can be made anew is.
+    // Files that can be remade are.
     assert_valid(&summary(&out), "run");
 }
 
-/// The folder of any study goes while it is under way: what is made anew has its summary, or nothing
-/// is there. A report alone would pass for a whole study.
+/// The folder of any study is removed while it is under way: a remade one has its summary, or nothing is
+/// there. A report alone would pass for a whole study.
 #[test]
 fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
     let inputs = Inputs::new();
@@ -498,8 +498,8 @@ fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
     assert!(remade >= 8, "{remade} folders were made anew");
 }
 
-/// It goes as soon as it is there: whatever of it is made anew, the verdict is told, and that the
-/// log is gone.
+/// It is removed as soon as it is there: whatever is remade of it, the verdict is printed, and the loss of
+/// the log is reported.
 #[test]
 fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
     let mut lost = 0;

@@ -15,7 +15,7 @@ fn wheeleg(arguments: &[&str], home: &std::path::Path) -> Output {
     command.output().expect("run")
 }
 
-/// What was told is shown, and nothing of it acts.
+/// The output shows the text, and no control sequence in it acts.
 fn assert_harmless(told: &[u8], shown: &str) {
     let told = String::from_utf8_lossy(told);
     assert!(told.contains(shown), "{told:?}");

@@ -77,7 +77,7 @@ fn of_program(check: &str) -> StepResult<Command> {
     Ok(python)
 }
 
-/// A page whose line, server or view is gone: what is late in it is told by clocks on the wall.
+/// Checks a page whose connection, server or view is gone: it marks late data by wall-clock time.
 pub(crate) fn lines() -> StepResult<String> {
     last_line(&mut console("tests/python/check_console_lines.py")?)
 }

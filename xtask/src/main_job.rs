@@ -50,7 +50,7 @@ fn simulate(name: &str) -> Result<Summary> {
     Ok(Summary { folder, json })
 }
 
-/// What stands on standard output stands in the folder.
+/// The file in the folder equals standard output.
 fn check_file(folder: &Path, json: &Value) -> Result<()> {
     let path = folder.join("summary.json");
     let text = fs::read_to_string(&path).with_context(|| format!("{}", path.display()))?;

@@ -76,8 +76,8 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// As [`run`], for a check that says what it found: the end of that stands in the error as well,
-/// since of a long log often only the summary is read.
+/// As [`run`], for a check that prints its findings: the error also holds the end of its output, since of a
+/// long log often only the summary is read.
 pub(crate) fn check(command: &mut Command) -> Result<()> {
     let line = line(command);
     println!("    $ {line}");
@@ -112,8 +112,8 @@ pub(crate) fn output(command: &mut Command) -> Result<String> {
     Ok(text)
 }
 
-/// Prints and runs a program that measures; gives the lines of its standard output that
-/// are `wanted`. If it fails, they stand first in the error: what missed its bar is told.
+/// Prints and runs a program that measures; gives the lines of its standard output that are `wanted`. If it
+/// fails, they come first in the error: they name the missed bar.
 pub(crate) fn figures(command: &mut Command, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
     let (text, status) = captured(command)?;
     let found: Vec<String> = text
@@ -160,8 +160,8 @@ pub(crate) fn ask(command: &mut Command) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// A command as it is told: the program by its name, since where it stands is a matter of the
-/// machine, and `docs/records/deep.md` keeps what failed.
+/// A command as it is printed: the program by its name, since its path depends on the machine, and
+/// `docs/records/deep.md` keeps what failed.
 fn line(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let name = program.file_name().unwrap_or(program.as_os_str());

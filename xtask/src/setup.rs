@@ -174,7 +174,7 @@ fn cargo_has(sub: &str) -> bool {
     succeeds(cargo().args([sub, "--version"]))
 }
 
-/// Makes the environment anew.
+/// Recreates the environment.
 fn install_python() -> StepResult {
     let system = system_python().context("no Python for a virtual environment")?;
     let venv = virtual_environment();
@@ -188,7 +188,7 @@ fn install_python() -> StepResult {
     Ok(())
 }
 
-/// Makes the folder of the Node packages anew, exactly as they are pinned.
+/// Recreates the folder of the Node packages, exactly as they are pinned.
 fn install_node() -> StepResult {
     let folder = node_folder();
     empty_folder(&folder)?;

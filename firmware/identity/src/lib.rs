@@ -10,8 +10,8 @@
 //! | 8…15 | hash of the board bus's interface, little-endian |
 //! | 16…39 | digest of the sources (feature `sources`) |
 //!
-//! The record stands in the section [`SECTION`], which the linker scripts keep and do
-//! not load: it takes no flash. It goes with the ELF file, not with a raw binary.
+//! The record is in the section [`SECTION`], which the linker scripts keep and do not load: it takes no
+//! flash. It goes with the ELF file, not with a raw binary.
 //!
 //! # Glossary
 //!
@@ -125,7 +125,7 @@ impl Kind {
     }
 }
 
-/// The record as it stands in the file.
+/// The record as it is in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub struct Record {
@@ -230,7 +230,7 @@ fn take<const N: usize>(bytes: &[u8]) -> Result<([u8; N], &[u8]), NoRecord> {
 mod tests {
     use super::*;
 
-    /// As the record stands in a file.
+    /// The record's bytes in a file.
     fn bytes(identity: &Identity) -> Vec<u8> {
         let record = Record::new(identity);
         let mut bytes = record.mark.to_vec();

@@ -123,7 +123,7 @@ pub fn emit_of(root: &Path, names: &[&str], name: &str) -> io::Result<()> {
     for file in files {
         println!("cargo:rerun-if-changed={}", file.display());
     }
-    // Files that come anew: a folder's time is that of its newest entry.
+    // New files: a folder's time is that of its newest entry.
     for name in names {
         let sources = root.join(name).join(SOURCES);
         if sources.is_dir() {

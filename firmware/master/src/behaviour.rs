@@ -1,7 +1,7 @@
 //! The behaviours of a walking robot: their names, the set that may act, their counters, and what
 //! they tell.
 //!
-//! What they sense and do stands in [`crate::layer0::behaviours`].
+//! [`crate::layer0::behaviours`] says what they sense and do.
 
 use crate::contact::Side;
 

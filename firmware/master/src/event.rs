@@ -10,7 +10,7 @@ use crate::contact::{Sector, Side};
 use crate::dispatcher::{Refusal, Ticket};
 use crate::finding::Finding;
 
-/// Why all axes were told to hold.
+/// Why all axes hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldReason {
     /// A node missed three cycles in a row.
@@ -164,7 +164,7 @@ pub enum Event {
     Armed,
     /// All axes are disarmed.
     Disarmed,
-    /// All axes were told to hold; the gait is over.
+    /// All axes were commanded to hold; the gait is over.
     Hold(
         /// Why.
         HoldReason,
@@ -224,13 +224,13 @@ pub const EVENT_DEPTH: usize = 32;
 /// How long an event stays in a full queue, the least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Weight {
-    /// It comes again, or is told elsewhere.
+    /// It comes again, or is reported elsewhere.
     Routine,
     /// It happened once.
     Told,
     /// A person has to know why the robot stopped or does not start, and which board is to blame.
     Cause,
-    /// A command of the user ends with it, or asked for it: whoever gave one waits.
+    /// It ends a command of the user, or answers one: its sender waits for it.
     Outcome,
 }
 

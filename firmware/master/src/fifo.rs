@@ -37,7 +37,7 @@ pub type TelemetryFifo = Queue<Record, TELEMETRY_STORAGE>;
 /// What happens to an item that finds its queue full.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhenFull {
-    /// The new item is refused and its sender is told why.
+    /// The new item is refused, and its sender gets the reason.
     Reject,
     /// The oldest item is dropped, the new one stored, and a counter advances.
     DropOldest,

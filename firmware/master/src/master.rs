@@ -116,7 +116,7 @@ impl Master {
         Dispatcher::route(accepted, &mut to_layer0, &mut to_layer1)
     }
 
-    /// Forgets the command numbers of a client that connects anew.
+    /// Forgets the command numbers of a client that reconnects.
     pub fn open_session(&mut self, client: u8) {
         self.dispatcher.open_session(client);
     }

@@ -184,12 +184,12 @@ impl TravelSetpoint {
     }
 }
 
-/// A foot that goes down does so fast to so far above the ground that is expected, then slowly.
+/// A foot goes down fast to this height above the expected ground, then slowly.
 pub const APPROACH_MM: PositionMm = PositionMm::from_int(10);
-/// A stance presses on by so much beyond where its foot has touched: it takes its share of the load
-/// (4 mm against the stiffness of the air, about 2.7 N/mm).
+/// A stance presses on by this much beyond where its foot has touched: it takes its share of the load (4 mm
+/// against the stiffness of the air, about 2.7 N/mm).
 pub const PRESS_MM: PositionMm = PositionMm::from_int(4);
-/// Cycles at full length, without ground, after which it is told and the nose goes down (200 ms).
+/// Cycles at full length, without ground, before it is reported and the nose goes down (200 ms).
 pub const NO_GROUND: u16 = 20;
 
 /// What a leg of a walk is about, as its vertical cylinder shows it.

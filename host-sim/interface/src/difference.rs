@@ -91,7 +91,7 @@ impl Change {
         }
     }
 
-    /// The first differing line in words; the two are told by their names.
+    /// The first differing line in words; the two are named as given.
     pub(crate) fn message(&self, here_name: &str, there_name: &str) -> String {
         let (here, there) = self.first();
         let place = here.or(there).map_or("", |line| line.place.as_str());

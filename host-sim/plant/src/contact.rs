@@ -8,13 +8,12 @@
 //!
 //! # Friction
 //!
-//! An elastic–plastic bristle (a two-dimensional brush): the bristle stretches with the sliding
-//! of the body, F = −σ0 z − σ1 v, and total force and stretch are limited to the friction
-//! circle μ(v) F. Below the limit it is a spring: a foot under a steady load below μ F does not
-//! creep, as it would with the plain LuGre bristle (Dupont et al., 2002). Above the limit the
-//! bristle is dragged along: Coulomb friction, with μ falling from static to kinetic over the
-//! Stribeck velocity. The stretch is a vector of the world, laid into the tangent plane anew in
-//! every step, so that it follows a curved surface.
+//! An elastic–plastic bristle (a two-dimensional brush): the bristle stretches with the sliding of the body,
+//! F = −σ0 z − σ1 v, and total force and stretch are limited to the friction circle μ(v) F. Below the limit
+//! it is a spring: a foot under a steady load below μ F does not creep, as it would with the plain LuGre
+//! bristle (Dupont et al., 2002). Above the limit the bristle is dragged along: Coulomb friction, with μ
+//! falling from static to kinetic over the Stribeck velocity. The stretch is a vector in the world frame,
+//! projected into the tangent plane in every step, so that it follows a curved surface.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

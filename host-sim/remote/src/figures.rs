@@ -47,7 +47,7 @@ pub struct BoardFigures {
     pub resets: u16,
     /// Bytes that came late to the emulator.
     pub late_bytes: u32,
-    /// Frames that the emulator told of after their first byte.
+    /// Frames that the emulator reported after their first byte.
     pub late_frames: u32,
     /// Frames that did not leave whole: cut off by the driver's time limit, or not on the pins.
     pub cut_frames: u16,

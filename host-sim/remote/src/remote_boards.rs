@@ -55,11 +55,11 @@ struct Board {
     /// Time of the first tick after the newest start, ns; `None` while down.
     running_from_ns: Option<u64>,
     tripped: Option<Trip>,
-    /// First tick after a start that has not been told, ns.
+    /// First tick after a start, not reported yet, ns.
     started_ns: Option<u64>,
     power: Power,
     tick_instructions: Vec<u32>,
-    /// Frames that were told when others should have heard some of them.
+    /// Frames that were reported when others should already have heard some of them.
     late_frames: u32,
 }
 
@@ -73,7 +73,7 @@ pub struct RemoteBoards {
     by_node: [Option<usize>; 8],
     comparison: Comparison,
     requests: Vec<usize>,
-    /// The first difference has been told.
+    /// The first difference has been printed.
     printed: bool,
     /// Where boards run on cores of their own.
     cores: Option<Cores>,
@@ -410,7 +410,7 @@ impl RemoteBoards {
         self.requests = asked;
         if let (Some(first), false) = (&self.comparison.first, self.printed) {
             self.printed = true;
-            // Told at once: the run may end before its summary.
+            // Printed at once: the run may end before its summary.
             let _ = writeln!(std::io::stderr(), "a board differs from the host: {first}");
         }
         Ok(())

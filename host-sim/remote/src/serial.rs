@@ -212,8 +212,8 @@ pub fn connect(
         if answer.is_ok() {
             break;
         }
-        // The first call may have met the rest of a former session. The port
-        // is opened anew, which drops what is still under way.
+        // The first call may have met the rest of an earlier session. Opening the port again drops what is
+        // still under way.
         answer = call(options)?;
     }
     let (transport, hello) = answer.map_err(|e| {

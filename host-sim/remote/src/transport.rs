@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use wheeleg_remote_link::Image;
 
-    /// Says what it was told to, whatever it hears.
+    /// Gives its prepared answers, whatever it hears.
     struct Canned(VecDeque<Vec<u8>>);
 
     impl Stream for Canned {
@@ -256,7 +256,7 @@ mod tests {
         let mut transport = Transport::new(Canned(said.into()));
         assert!(transport.hello().is_ok());
         assert_eq!(transport.ask(&Request::Bye).ok(), Some(Reply::Done));
-        // A session may be opened anew, by anybody.
+        // Anybody may open a new session.
         let version = LINK_VERSION;
         let answer = transport.ask(&Request::Hello { version });
         assert_eq!(answer.ok(), Some(hello));

@@ -102,9 +102,9 @@ pub fn image(name: &str) -> Result<PathBuf, RemoteError> {
 /// Where a process of emulated boards runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// On the simulator's core, or anywhere: whoever waits sleeps.
+    /// On the simulator's core, or anywhere: the side that waits sleeps.
     Near,
-    /// On a core of its own: who waits for the other stays awake for a while.
+    /// On a core of its own: the side that waits for the other stays awake for a while.
     Far,
 }
 

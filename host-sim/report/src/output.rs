@@ -165,10 +165,10 @@ fn remove_empty(folders: &[PathBuf]) {
     }
 }
 
-/// Begin of what stands in a lock.
+/// Start of the text in a lock file.
 const HOLDER: &str = "process ";
 
-/// Opens the lock file and locks it; who holds it stands in it, for the message to others.
+/// Opens the lock file, locks it and writes its holder into it, for the message to others.
 fn lock(path: &Path) -> Result<File, ReportError> {
     let failed = |e: std::io::Error| ReportError::output("lock", path, e);
     let foreign = |what: &str| {
@@ -500,7 +500,7 @@ mod tests {
         let other = temporary.path().join("other");
         let elsewhere = result_in_place_of(&folder.join("axis.toml"), &other, also);
         assert_eq!(elsewhere, None);
-        // Whoever reads such a file gets no folder, and nothing is moved.
+        // A path to such a file gives no folder, and nothing is moved.
         fs::write(folder.join("summary.json"), "earlier").expect("written");
         let input = folder.join("figures/mine.toml");
         let refused = Folder::prepare(&folder, &[], &[Path::new("none"), &input]);

@@ -1,5 +1,5 @@
-//! Names of the files and folders that a study writes into its folder, and of what other commands
-//! make of its log beside it. Whoever writes one, reads one or moves them all takes the name here.
+//! Names of the files and folders that a study writes into its folder, and of those that other commands make
+//! from its log. All code that writes, reads or moves them takes the names here.
 
 /// The recording.
 pub const LOG: &str = "log.mcap";

@@ -205,8 +205,8 @@ impl Entity {
         put(out, "]}");
     }
 
-    /// Appends the entity: it stands in a frame, goes with it, and stays until one of the same name
-    /// takes its place.
+    /// Appends the entity: it belongs to a frame, moves with it, and stays until one of the same name
+    /// replaces it.
     pub(super) fn write(&self, out: &mut Vec<u8>, t_ns: u64, frame: &str, id: &str) {
         put(out, "{");
         put_time(out, t_ns);

@@ -84,8 +84,8 @@ impl Scene {
         &self.urdf
     }
 
-    /// Ground and shapes: once, so that whoever opens the log in its middle finds it as the newest
-    /// message of its channel.
+    /// Ground and shapes: once, so that a viewer that opens the log in its middle finds them as the newest
+    /// message of their channel.
     fn show(&mut self, t_ns: u64, give: Put<'_>) {
         self.payload.clear();
         scene_update(&mut self.payload, |out| {

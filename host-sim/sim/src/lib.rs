@@ -91,14 +91,14 @@ pub struct JointProbe<'a> {
 /// Looks at every joint after every tick.
 pub type ProbeFn<'a> = &'a mut dyn FnMut(&JointProbe<'_>);
 
-/// Who is told of a run while it lasts.
+/// Callbacks during a run.
 pub struct Observers<'a> {
     progress: &'a mut dyn FnMut(f64) -> Control,
     watcher: Option<ProbeFn<'a>>,
 }
 
 impl<'a> Observers<'a> {
-    /// One who is told the time, and can stop the run.
+    /// An observer that gets the time, and can stop the run.
     pub fn new(progress: &'a mut dyn FnMut(f64) -> Control) -> Self {
         Self {
             progress,
@@ -106,7 +106,7 @@ impl<'a> Observers<'a> {
         }
     }
 
-    /// One more, who sees every joint board in every tick.
+    /// Adds one that sees every joint board in every tick.
     #[must_use]
     pub fn watching(self, watcher: ProbeFn<'a>) -> Self {
         Self {

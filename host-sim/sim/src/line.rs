@@ -1,8 +1,7 @@
 //! Master and boards in two programs, with a line between them: a serial port, or a pipe.
 //!
-//! On the one side a [`LineMaster`] leads whatever boards answer, real ones or simulated ones. On
-//! the other side [`LineBoards`] are the eight boards of a simulated robot, led by whoever is at
-//! the other end.
+//! On the one side a [`LineMaster`] leads any boards that answer, real or simulated. On the other side
+//! [`LineBoards`] are the eight boards of a simulated robot, led by any master at the other end.
 
 mod boards;
 mod master;

@@ -47,7 +47,7 @@ pub struct Session {
 /// Most ends of requests that wait for their console; then the oldest goes.
 const OUTCOMES: usize = 256;
 
-/// Keeps the end of a request for its console, and what a board has told for it.
+/// Keeps the end of a request for its console, and values that a board has reported for it.
 pub(crate) fn keep_outcome(outcomes: &mut VecDeque<(u64, Event)>, time_us: u64, event: &Event) {
     let ends = matches!(event, Event::Done(_) | Event::Refused { .. });
     if ends || matches!(event, Event::Parameter { .. }) {
@@ -219,7 +219,7 @@ impl Session {
         self.world.master().beat(seen_us, now_us);
     }
 
-    /// A client of the master connects anew.
+    /// A client of the master reconnects.
     pub fn open_session(&mut self, client: u8) {
         self.world.master().open_session(client);
     }

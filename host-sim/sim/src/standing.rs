@@ -107,7 +107,7 @@ fn places(params: &PlantParams) -> Option<String> {
     ))
 }
 
-/// The refusal, with the section that is in the way, if it is one; or the steepest plane on which this
+/// The refusal, with the section that is in the way, if there is one; or the steepest plane on which this
 /// robot stands in this pose.
 pub(crate) fn refused(
     scenario: &Scenario,
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// What slips is told of its friction, and of the slope that this friction holds.
+    /// The error for a slipping robot gives the friction, and the slope that this friction holds.
     #[test]
     fn ground_that_is_too_smooth_is_named_by_its_material() {
         for (material, slope, allowed) in [

@@ -104,7 +104,7 @@ fn likely(name: &str, part: Part) -> &'static str {
     }
 }
 
-/// What the user is told; `last` are the plant's values of the last tick that was sound.
+/// The error for the user; `last` are the plant's values of the last tick that was sound.
 pub(crate) fn failed(now_ns: u64, error: &PlantError, last: &Outputs) -> SimError {
     let (name, part) = match error {
         PlantError::NonFinite { name, index, .. } | PlantError::OutOfBounds { name, index, .. } => {
@@ -183,7 +183,7 @@ mod tests {
         names
     }
 
-    /// Whatever leaves its range is told by fields that a robot's file has.
+    /// A quantity that leaves its range is reported by fields that a robot's file has.
     #[test]
     fn every_state_of_the_plant_has_fields_of_the_file_to_blame() {
         let robot = wheeleg_config::builtin::robot("wheeleg").expect("built in");

@@ -303,8 +303,8 @@ impl World {
         self.advance_plant()?;
         self.faults.sink(self.now_ns, &mut self.plant);
         self.bring_up()?;
-        // A board outside answers with the outputs that act from this edge on
-        // when it is told the inputs of the edge. Neither depends on the other.
+        // A board outside gets the inputs of the edge, and answers with the outputs that act from this edge
+        // on. Neither depends on the other.
         let sensed = if self.remote.is_some() {
             self.outputs = self.plant.outputs(&self.state);
             let sensed = self.sense();

@@ -153,8 +153,7 @@ pub(crate) fn capital(text: &str) -> String {
     })
 }
 
-/// Causes of what went wrong; events in their order. Most runs have none, and what they have is told
-/// one by one.
+/// Causes of failures, from events in their order. Most runs have none; the others are listed one by one.
 pub(crate) fn causes(events: impl Iterator<Item = FaultEvent>) -> Vec<Cause> {
     let mut causes: Vec<FaultEvent> = Vec::new();
     for event in events {
@@ -273,7 +272,7 @@ mod tests {
         assert!(first_sentence(&causes(std::iter::empty())).is_none());
     }
 
-    /// A board that has lost its supply gives no fault: the master's reason is told, as typed.
+    /// A board that has lost its supply gives no fault: the master's reason is reported, as typed.
     #[test]
     fn a_hold_is_told_by_its_reason_with_the_remedy_apart() {
         let told = |reason: HoldReason| {

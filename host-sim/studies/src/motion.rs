@@ -138,7 +138,7 @@ impl GroundPicture {
     }
 }
 
-/// Places in a line ahead at which heights are told.
+/// Places in a line ahead at which heights are given.
 pub(crate) struct Strip {
     /// The first, m.
     pub(crate) from_m: f64,

@@ -400,8 +400,8 @@ fn a_wrong_line_after_blank_lines_is_told_by_its_own_number() {
     }
 }
 
-/// A table with names, units and columns of its own, of which one tells two valves, is the same
-/// measurement; what is wrong in it is told by its own names.
+/// A table with other names, units and columns, where one column may drive two valves, is the same
+/// measurement; errors in it use its own names.
 #[test]
 fn a_table_of_a_users_own_is_read_by_its_map() {
     let config = config();
@@ -624,7 +624,7 @@ fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
     });
     let jitter: String = jitter.collect();
     assert_eq!(read(&format!("{head}\n{jitter}")).expect("read"), plain);
-    // Thousands are none, and what has another name is told with those that there are.
+    // Thousands separators are refused, and the error for an unknown name lists the known ones.
     let told = |text: &str| read(text).expect_err("refused").to_string();
     let thousands = commas(&sound).replacen("\n0", "\n1.000,5", 1);
     assert!(

@@ -185,7 +185,7 @@ impl Event {
         }
     }
 
-    /// As it stands in the log.
+    /// As written in the log.
     #[must_use]
     pub fn sample(&self) -> EventSample {
         let cause = &self.cause;
@@ -350,7 +350,7 @@ impl Cause {
         }
     }
 
-    /// Whether all axes were told to hold.
+    /// Whether all axes were commanded to hold.
     #[must_use]
     pub const fn is_hold(&self) -> bool {
         matches!(self, Self::Master(MasterEvent::Hold(_)))

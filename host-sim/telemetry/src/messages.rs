@@ -431,7 +431,7 @@ mod tests {
     use wheeleg_interface::archive;
     use wheeleg_protocol::{FaultCode, LimitBits, ResetCause, SCHEMA_HASH};
 
-    /// Whoever is told of a fault is told what happened and what to do.
+    /// A message about a fault says what happened and what to do.
     #[test]
     fn faults_and_findings_are_told_with_their_remedies() {
         let board = Address::joint(3).expect("a joint");

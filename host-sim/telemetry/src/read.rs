@@ -285,8 +285,8 @@ pub enum Scalar {
 }
 
 impl Logged<'_> {
-    /// Gives the fields whose names `wanted` has, with their place in it. What else stands in the
-    /// message is passed over, and so is the rest of one that is no JSON.
+    /// Gives the fields named in `wanted`, with their place in it. Skips all other fields of the message, and
+    /// the rest of a message that is not JSON.
     pub fn fields(&self, wanted: &[&str], take: &mut dyn FnMut(usize, Scalar)) {
         let mut json = serde_json::Deserializer::from_slice(self.payload);
         let _ = json.deserialize_map(Fields { wanted, take });

@@ -76,7 +76,7 @@ mod index {
 }
 
 impl<'a> Recorder<'a> {
-    /// A recorder that hashes, and keeps what it is told to.
+    /// A recorder that hashes, and keeps what `keep` asks for.
     #[must_use]
     pub fn new(keep: Keep) -> Self {
         let filters = JointFilters {

@@ -156,7 +156,7 @@ fn copy(
     Ok(Some(recovered))
 }
 
-/// A log as it is written anew.
+/// A rewritten log.
 struct Copy {
     log: mcap::Writer<BufWriter<File>>,
     /// Numbers of schemas and channels there, by those of the old log.

@@ -204,7 +204,7 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
     }
 }
 
-/// What follows a log, as where two were joined, is told.
+/// Data after the end of a log, as if two were joined, is reported.
 #[test]
 fn what_follows_the_end_of_a_log_is_told() {
     let folder = tempfile::tempdir().expect("temporary folder");

@@ -37,7 +37,7 @@ pub enum Request {
     Bye,
 }
 
-/// A stretch of the parameter store, as it stands in the flash memory.
+/// A stretch of the parameter store, as it is in the flash memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Nonvolatile {
     /// First byte, from the beginning of the store.

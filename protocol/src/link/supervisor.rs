@@ -133,8 +133,8 @@ impl LinkSupervisor {
             }
         } else {
             self.stale_since_advance = true;
-            // A master that started again counts from anew: follow it once the link
-            // is not in use, so that it can be cleared.
+            // A restarted master counts from the start: follow it once the link is not in use, so that it can
+            // be cleared.
             if self.state != LinkState::Up {
                 self.counter = Some(cycle);
             }

@@ -17,8 +17,8 @@ pub const CYCLE_US: u32 = 10_000;
 /// 20 µs after a tick edge: the conversion of that edge (23 µs), its tick and
 /// the SYNC itself come first, then the answer must stand ready in hardware.
 pub const TURNAROUND_US: u32 = 100;
-/// The same to the answer to [`MessageType::ParamSet`], µs: the board first works out
-/// anew what follows from its parameters, which takes up to a third of it.
+/// The same to the answer to [`MessageType::ParamSet`], µs: the board first recalculates everything that
+/// follows from its parameters, which takes up to a third of it.
 pub const SETTING_US: u32 = 1000;
 /// Idle line between slots, µs.
 pub const GAP_US: u32 = 20;
@@ -109,10 +109,9 @@ impl SlotTiming {
         self.cyclic_us().saturating_mul(1000).div_ceil(CYCLE_US)
     }
 
-    /// Start of a board's answer to [`MessageType::Discover`], µs after the end of
-    /// the request: one of [`DISCOVERY_SLOTS`] slots, chosen by the unique id and
-    /// the newest bus cycle. Two boards meet in one slot in one of eight cycles,
-    /// and in the next choose anew.
+    /// Start of a board's answer to [`MessageType::Discover`], µs after the end of the request: one of
+    /// [`DISCOVERY_SLOTS`] slots, chosen by the unique id and the newest bus cycle. Two boards meet in one
+    /// slot in one of eight cycles, and choose again in the next.
     #[must_use]
     pub fn discovery_us(self, unique_id: &[u8; 12], cycle: u16) -> u32 {
         // FNV-1a, 32 bit, over the cycle's low byte and the id; its upper bits. (With a

@@ -22,7 +22,7 @@ use wheeleg_console::keys::Keys;
 use wheeleg_console::{Live, Options, Protection, Server};
 
 const URDF: &str = "package://wheeleg/wheeleg.urdf";
-/// What is told at events alone, or once: a robot that stands may have no need of it.
+/// Channels sent on events only, or once: a robot that stands may have no need of them.
 const SELDOM: [&str; 3] = ["/events", "/log", "/session"];
 
 /// One viewer.

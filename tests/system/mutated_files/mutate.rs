@@ -24,7 +24,7 @@ const UNITS: [&[&str]; 11] = [
     &["1", "%", "", "furlong"],
 ];
 
-/// What stands in the place of a number.
+/// Replacements for a number.
 const EDGES: [&str; 12] = [
     "0",
     "0.0",

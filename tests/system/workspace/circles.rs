@@ -74,7 +74,7 @@ type Names = Vec<String>;
 #[derive(Default)]
 struct Module {
     file: PathBuf,
-    /// What stands in it.
+    /// Its items.
     items: BTreeSet<String>,
     /// What it brings into scope: a name, or `*`, and what for.
     uses: Vec<(String, Names)>,

@@ -28,10 +28,10 @@ pub(super) fn is_met(runs: &[Speed]) -> bool {
         .any(|run| run.0 >= SPEED_LEAST && was_alone(*run))
 }
 
-/// The speeds against the target: the fastest of the runs that were alone on the machine must
-/// meet it. What disturbs a run only takes time, and some of it, as a virtual machine's
-/// neighbours, is seen by nobody; so every speed stands in the line. Where no run was alone
-/// nothing is judged, and not shown as met, either.
+/// The speeds against the target: the fastest of the runs that were alone on the machine must meet it. A
+/// disturbance only makes a run slower, and some of it, as by a virtual machine's neighbours, cannot be
+/// detected; so every speed is in the line. If no run was alone, nothing is judged, and not shown as met,
+/// either.
 ///
 /// # Errors
 /// The same line, if the target is missed.

@@ -25,7 +25,7 @@ pub fn start() {
     feed();
 }
 
-/// Starts the 50 ms anew.
+/// Restarts the 50 ms.
 #[inline]
 pub fn feed() {
     pac::IWDG.kr().write(|r| r.set_key(Key::RESET));

@@ -309,8 +309,8 @@ impl Layer0 {
         ]
     }
 
-    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels
-    /// are told at once, the others when they arm.
+    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels get it at once, the others when
+    /// they arm.
     pub(super) fn shape_pushes(&mut self, push: PushProfile) {
         if push == self.push {
             return;

@@ -22,7 +22,7 @@ const ALL: u8 = 0x0F;
 /// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes
 /// to roll onto its sole.
 const AGREE: u8 = 20;
-/// A swinging foot that is drawn up by so much, mm, from where it stood is in the air.
+/// A swinging foot drawn up by this much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
 /// Legs extended at least so far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
@@ -40,7 +40,7 @@ struct One {
     closed: u8,
     /// Stances in which it stayed open.
     open: u8,
-    /// Told of already.
+    /// Already reported.
     told: bool,
 }
 
@@ -146,7 +146,7 @@ mod tests {
     /// A pattern, the stroke of b6 and for how many cycles.
     type Stretch = (u8, i16, u32);
 
-    /// What is told over these stretches; the other leg stands at `other_mm`.
+    /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`.
     fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
         let mut found = Vec::new();

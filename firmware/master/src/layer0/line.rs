@@ -24,7 +24,7 @@ const SPOILT_CYCLES: u8 = 3;
 /// replies and the longest answer make less than 500 bytes with 232 of replies in
 /// slots, and an answer is not repeated in the same cycle.
 const BABBLE_BYTES: u32 = 400;
-/// Cycles in a row with so much rubbish.
+/// Cycles in a row with this much rubbish.
 const BABBLE_CYCLES: u8 = 2;
 /// Cycles without after which the line is quiet.
 const QUIET_CYCLES: u8 = 10;
@@ -32,10 +32,10 @@ const QUIET_CYCLES: u8 = 10;
 const FLOOD_BYTES: u32 = 300;
 /// Cycles in a row with so many of them.
 const FLOOD_CYCLES: u8 = 10;
-/// Errors that babble leaves in the counters of whoever hears it, at least.
+/// Errors that babble leaves at least in the counters of a board that hears it.
 const HEARD_ERRORS: u32 = 4;
 
-/// State of a condition that lasts: told at its begin, and again after its end.
+/// State of a condition that lasts: reported at its begin, and again after its end.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lasting {
     cycles: u8,
@@ -236,7 +236,7 @@ impl Line {
         }
         let mut deaf = None;
         for (index, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
-            // One that was reset since has counted anew: it tells nothing.
+            // One that was reset since has restarted its count: it proves nothing.
             let grown = (*after)?.checked_sub(before.unwrap_or(0))?;
             if grown < HEARD_ERRORS {
                 if deaf.is_some() {

@@ -111,7 +111,7 @@ pub struct Layer0 {
     emergency_stop: bool,
     group: Option<Group>,
     setpoints: Setpoints,
-    /// Profile of the wheels' pushes, as last told to their boards.
+    /// Profile of the wheels' pushes, as last sent to their boards.
     push: PushProfile,
     stale_cycles: u16,
     /// Number of the permission to move: of all references that have not ended.

@@ -187,8 +187,8 @@ impl Layer0 {
         }
     }
 
-    /// The answer to a question of the master's own. One that is not answered is
-    /// not repeated: a board that comes back is asked anew.
+    /// The answer to a question of the master's own. An unanswered one is not repeated: a board that comes
+    /// back is asked again.
     fn reported(
         &mut self,
         from: Address,
@@ -257,8 +257,8 @@ impl Layer0 {
         went_on
     }
 
-    /// A board says that it has stored its parameters. If it was reset meanwhile,
-    /// those that it has stored are not those that it was told.
+    /// A board reports that it has stored its parameters. If it was reset meanwhile, it has not stored those
+    /// that it was sent.
     fn saved(
         &mut self,
         ticket: Ticket,
@@ -306,8 +306,8 @@ impl Layer0 {
         }
     }
 
-    /// One node refused or stayed behind: the others are disarmed again. What
-    /// else was waiting is dropped, and its users are told.
+    /// One node refused or stayed behind: the others are disarmed again. Other waiting jobs are dropped, and
+    /// their users notified.
     pub(super) fn abort_arming(&mut self, now_us: u64, events: &mut Events) {
         self.power = Power::Disarmed;
         let reason = Refusal::Interrupted;

@@ -201,7 +201,7 @@ impl Layer0 {
         });
     }
 
-    /// Whether the supply pressure switch is open, as its board told last.
+    /// Whether the supply pressure switch is open, as its board last reported.
     pub(super) fn has_no_air(&self) -> bool {
         let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
         supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE))

@@ -6,7 +6,7 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Refusal, Request};
 use wheeleg_protocol::{Address, Envelope, Fault, MAX_ENCODED, Message, NodeMode};
 
-/// What another board is told is not this one's business.
+/// A reply to another board is not the master's business.
 #[test]
 fn a_slot_reply_to_another_than_the_master_is_no_reply() {
     for (to, heard) in [(Address::MASTER, true), (Address::joint(1).unwrap(), false)] {

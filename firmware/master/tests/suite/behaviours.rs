@@ -71,7 +71,7 @@ impl Robot {
         self.senses.feet = feet.map(|touches| Some(FootSwitches(if touches { 0x0F } else { 0 })));
     }
 
-    /// Cycles; what is told in them.
+    /// Runs cycles; returns the acts reported in them.
     pub(crate) fn run(&mut self, cycles: u32) -> Vec<Act> {
         let mut told = Vec::new();
         for _ in 0..cycles {
@@ -82,7 +82,7 @@ impl Robot {
         told
     }
 
-    /// The behaviours' part of a cycle; what is told in it.
+    /// The behaviours' part of a cycle; returns the acts reported in it.
     pub(crate) fn observe(&mut self) -> Vec<Act> {
         let mut events = Events::new();
         self.behaving
@@ -286,7 +286,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
     assert_eq!(robot.run(1), []);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(121.0)));
     assert_eq!(robot.behaving.tally().of(Behaviour::Touchdown), 1);
-    // 20 mm beside where it was expected (130 mm) is told, less is not.
+    // 20 mm off the expected place (130 mm) is reported, less is not.
     for (at, told) in [
         (110.0, vec![Act::EarlyGround(Side::Left)]),
         (110.1, vec![]),
@@ -404,7 +404,7 @@ fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_giv
     let mut robot = pressed(9.9);
     assert_eq!(robot.run(9), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
-    // One that moves is told a cycle later: b5 waits where it touches.
+    // A moving one is reported a cycle later: b5 waits where it touches.
     assert_eq!(pressed(10.1).run(10), []);
 }
 

@@ -88,7 +88,7 @@ fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
     assert_eq!(profiles(&mut rig), [[13, 5, 16, 5], [13, 5, 16, 5]]);
 }
 
-/// Speeds and accelerations that both wheels were told, in order.
+/// Speeds and accelerations sent to both wheels, in order.
 fn profiles(rig: &mut TestRig) -> [Vec<u16>; 2] {
     [7, 8].map(|node| {
         let told = rig.node(node).requests.iter().filter_map(|m| match m {
@@ -110,12 +110,12 @@ fn new_gait_parameters_reach_the_wheels_profiles() {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(profiles(&mut rig), [[10, 5], [10, 5]]);
-    // Armed: told at once, once, and only where something changed.
+    // Armed: sent at once, once, and only where something changed.
     let set = rig.submit(Command::SetGait(gait(360, 1200)));
     rig.run(20);
     assert!(rig.done(set));
     assert_eq!(profiles(&mut rig), [[10, 5, 21, 9], [10, 5, 21, 9]]);
-    // Disarmed: told with the next arming.
+    // Disarmed: sent with the next arming.
     rig.submit(Command::Disarm);
     rig.run(20);
     rig.submit(Command::SetGait(gait(180, 600)));

@@ -124,7 +124,7 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
 fn gait_after(moves_mm: &[i16]) -> i64 {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
-    // A second time: the numbers begin anew with neither.
+    // A second time: neither restarts the numbers.
     let ticket = rig.submit(Command::Stand);
     rig.run(500);
     assert!(rig.done(ticket));

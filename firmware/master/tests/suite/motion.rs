@@ -360,7 +360,7 @@ fn touchdown_reflex_is_asked_for_from_the_lowering_on() {
     }
 }
 
-/// The number of a motion tells that its distance counts from anew.
+/// A new motion number means that the distance restarts from zero.
 #[test]
 fn a_second_gait_numbers_its_motions_on() {
     let motions = |gait: &mut SquareGait| -> std::collections::BTreeSet<u16> {

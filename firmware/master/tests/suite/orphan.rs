@@ -244,7 +244,7 @@ fn no_walk_goes_on_after_a_clear_and_an_arming() {
         let record = walker.rig.last_record.unwrap();
         assert_eq!((record.phase, record.walk), (Phase::Idle, None));
         assert!(walker.rig.master.is_armed(), "{later}");
-        // And it can be ordered anew.
+        // And it can be ordered again.
         walker.rig.submit(Command::Walk(order(120, "0")));
         walker.run(60);
         assert!(walker.wheels()[0] > wheels[0] + 1000);
@@ -255,7 +255,7 @@ fn asks(walker: &mut Walker, command: Command) {
     walker.rig.submit(command);
 }
 
-/// A stop: name, how it comes about, the reason that is told.
+/// A stop: its name, how it comes about, the reported reason.
 type Stop = (&'static str, fn(&mut Walker), Option<HoldReason>);
 
 /// What can stop a robot whose layer 1 stands still.

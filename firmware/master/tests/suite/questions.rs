@@ -60,7 +60,7 @@ fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
     assert_eq!(diagnoses(&rig).len(), 1, "once");
 }
 
-/// A new master leads boards that have told their fault to nobody yet.
+/// A new master leads boards that have not reported their fault to anybody yet.
 #[test]
 fn a_fault_from_before_this_master_is_told_by_its_age() {
     const AGE_US: u64 = 3_000_000;
@@ -367,7 +367,7 @@ fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
         diagnoses(&rig).iter().map(|(n, _)| *n).collect::<Vec<_>>(),
         [3]
     );
-    // One that never comes back is told as lost after all.
+    // One that never comes back is reported as lost after all.
     rig.node(5).save_cycles = 200;
     let ticket = rig.submit(Command::SaveParameters { node: 5 });
     rig.run(40);

@@ -197,7 +197,7 @@ fn the_share_of_the_load_goes_by_0_15_mm_in_a_cycle() {
         assert!((late[0] - 99.0).abs() < 0.01, "{ends}: {late:?}");
         assert_eq!(evenly(&mut robot, B6, rate, 8), [100.0; 2], "{ends}");
     }
-    // A foot that lands stands anew.
+    // A foot that lands starts a new stance.
     let mut robot = shares();
     plans(&mut robot, [LegPlan::Lower(mm(80.0)), LegPlan::Stance]);
     robot.run(1);

@@ -400,7 +400,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
     assert_eq!(rig.node(4).mode, NodeMode::Idle);
     let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
     assert_eq!(told, [Some(4)]);
-    // Arming and disarming on request are no such thing, whoever is slow.
+    // A requested arming or disarming is no such thing, whichever board is slow.
     for slow in [6, 8] {
         let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();

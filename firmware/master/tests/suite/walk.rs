@@ -19,7 +19,7 @@ const PISTON_MM: f64 = 3.0;
 struct Robot {
     walk: Walk,
     behaving: Behaving,
-    /// What was told in the last cycle.
+    /// Acts reported in the last cycle.
     told: Vec<Act>,
     speeds: [f64; 6],
     strokes: [f64; 6],
@@ -30,7 +30,7 @@ struct Robot {
     segment: u16,
     now_us: u64,
     last: Setpoints,
-    /// How often it was told that it is stuck, beside what the behaviours find.
+    /// How often it was reported as stuck, not counting what the behaviours find.
     stuck: u8,
 }
 

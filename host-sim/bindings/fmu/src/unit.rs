@@ -22,7 +22,7 @@ const TIME_TOLERANCE_S: f64 = 0.25 * TICK_S;
 /// What a step may be off a whole number of ticks, in ticks.
 const STEP_TOLERANCE: f64 = 1e-3;
 
-/// Where an instance stands in its life.
+/// State of an instance in its life cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Phase {
     Instantiated,

@@ -1,4 +1,4 @@
-//! What comes from Python, checked: a wrong value is told with its place and its range.
+//! Checks values from Python: a wrong one is reported with its place and its range.
 
 use std::fmt::Display;
 

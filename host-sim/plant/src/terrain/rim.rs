@@ -1,10 +1,9 @@
 //! Where the rim of a disc is deepest in a height map.
 //!
-//! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands
-//! on two at most in its plane. The two highest are followed: one step of Newton's method in every
-//! step of the plant keeps a peak, which moves by some micrometres meanwhile. Every millisecond
-//! all of the lower rim is looked at anew, so that a bump which has come near is found before it
-//! touches.
+//! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands on two at
+//! most in its plane. The two highest are followed: one step of Newton's method in every step of the plant
+//! keeps a peak, which moves by some micrometres meanwhile. Every millisecond the whole lower rim is searched
+//! again, so that a bump which has come near is found before it touches.
 //!
 //! Two peaks that run into each other are one. Each then bears less, to half, so that the force
 //! does not jump.

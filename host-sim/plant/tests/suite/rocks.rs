@@ -108,7 +108,7 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
         }
     }
     assert!(rims > 500 && sides > 100, "{rims} {sides}");
-    // Most of those that are apart are told without the search.
+    // Most pairs that are apart are recognized without the search.
     assert!(2 * clear > apart, "{clear} {apart}");
 }
 

@@ -6,8 +6,8 @@ use super::axes::seen;
 use super::simplify::simplified;
 use super::{Content, Panel, Series};
 
-/// Most stretches of a curve, each told by its smallest and its largest value: no peak is lost,
-/// and a report stays small.
+/// Most stretches of a curve, each drawn by its smallest and its largest value: no peak is lost, and a report
+/// stays small.
 const STRETCHES: usize = 500;
 /// A curve may be off by this share of its axis: a quarter of a pixel of a high panel.
 const INVISIBLE: f64 = 1e-3;

@@ -50,7 +50,7 @@ fn check_alone(
     Ok(())
 }
 
-/// The error of a fault, with its place if it stands in the scenario's file: others come from elsewhere.
+/// The error of a fault, with its place if it comes from the scenario's file.
 fn in_file(scenario: &Scenario, number: usize, error: SimError) -> SimError {
     let SimError::Simulation { what, help } = &error else {
         return error;

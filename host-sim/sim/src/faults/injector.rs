@@ -1,10 +1,9 @@
 //! The faults under way: what they do to the plant, to signals and to the line.
 //!
-//! A fault acts at one of three places. On the plant it is done once, when it
-//! begins, and undone when it ends ([`Injector::inject`]). On a signal between
-//! plant and board, or on the line, it stands in the way as long as it lasts;
-//! the simulation asks at every passage. All chance comes from one random
-//! stream of the run's seed, which runs without faults never draw from.
+//! A fault acts at one of three places. On the plant it is set once, when it begins, and undone when it ends
+//! ([`Injector::inject`]). A fault on a signal between plant and board, or on the line, acts on every passage
+//! as long as it lasts. All randomness comes from one random stream of the run's seed, which runs without
+//! faults never draw from.
 
 use rand_pcg::Pcg64Mcg;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};

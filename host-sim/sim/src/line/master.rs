@@ -153,7 +153,7 @@ impl<L: Line> LineMaster<L> {
         self.now_ns = self.line.wait(t_ns, &mut heard);
     }
 
-    /// A line that breaks is told, and leaves the axes disarmed when it is there again.
+    /// Reports a broken line, which leaves the axes disarmed when it is back.
     fn watch_line(&mut self, recorder: &mut Recorder) {
         let broken = self.line.broken();
         if broken.is_some() == self.was_broken {

@@ -30,8 +30,8 @@ impl World {
             .is_some_and(|edge_ns| edge_ns <= self.now_ns)
     }
 
-    /// Whether a board drives its bridge: from its first tick edge on, and
-    /// on with what it was told last when its program has stopped.
+    /// Whether a board drives its bridge: from its first tick edge on; with its last outputs if its program
+    /// has stopped.
     pub(super) fn drives(&self, node: Node) -> bool {
         let started = self.started_ns(node);
         !self.board(node).down.is_off() && started.is_some_and(|ns| ns <= self.now_ns)
@@ -237,7 +237,7 @@ impl World {
         }
     }
 
-    /// A master that remembers nothing. Whoever was connected to it reconnects.
+    /// A master that remembers nothing. Its clients reconnect.
     fn restart_master(&mut self) -> Result<(), SimError> {
         let first_sequence = self.config.first_sequence.wrapping_add(SEQUENCE_STEP);
         self.config = MasterConfig {

@@ -175,8 +175,8 @@ impl World {
         }
     }
 
-    /// Lets the master use the line for a request while nothing is on it or
-    /// scheduled, then a service tool, then whoever has a stream to send.
+    /// While nothing is on the line or scheduled, lets the master use it for a request, then a service tool,
+    /// then any node that has a stream to send.
     pub(super) fn offer_line(&mut self) {
         if self.bus.next_delivery_ns().is_some() {
             return;

@@ -144,7 +144,7 @@ impl<'a> Analyser<'a> {
         analyser
     }
 
-    /// Begins anew what counts from the start of the motion.
+    /// Resets all counts that start with the motion.
     fn count_from(&mut self, start_s: f64) {
         if let Meter::ThreeStep(_) = self.meter {
             self.meter = Meter::new(self.scenario, self.robot, start_s);

@@ -120,7 +120,7 @@ impl Target {
         format!("{band} {}", self.unit_text()).trim_end().to_owned()
     }
 
-    /// What is measured, as it stands in a sentence: without what its brackets explain.
+    /// The measured quantity, as used in a sentence: without the explanation in brackets.
     #[must_use]
     pub fn name_text(&self) -> String {
         let name = self.description.split(" (").next().unwrap_or_default();

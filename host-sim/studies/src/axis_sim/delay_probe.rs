@@ -8,10 +8,9 @@
 //! exceeds t_on by a step or two. If neither chamber moves the piston, there is
 //! no result.
 //!
-//! Motion counts that follows a pulse at once and in its direction: under a load
-//! that has moved the piston until a shut chamber carries it, leakage lets it creep on
-//! by itself. Where that brings it to its end stop, the side is given up, its chamber
-//! vented, and the search begins anew from the other one.
+//! Motion counts only if it follows a pulse at once and in its direction: under a load that has moved the
+//! piston until a shut chamber carries it, leakage lets it creep on by itself. If that brings it to its end
+//! stop, the side is given up, its chamber vented, and the search starts again from the other one.
 //!
 //! A chamber that is full to begin with gives way to no pulse. A search without a result is repeated once, from a
 //! known state: each side then begins with both chambers open to the atmosphere for two seconds.
@@ -36,8 +35,7 @@ const FINE: u16 = 50;
 const BACK: u16 = 3000;
 /// Longest pulse, µs: slower valves than 20 ms are not for this use.
 const LONGEST: u16 = 20_000;
-/// A side that takes pulses so much longer than the last one that moved it, µs, has
-/// come to its end stop.
+/// A side that takes pulses longer by this than the last one that moved it, µs, has come to its end stop.
 const BEYOND: u16 = 1000;
 /// Shortest pulse, µs.
 const SHORTEST: u16 = 200;

@@ -300,8 +300,8 @@ mod tests {
     use crate::axis_sim::{Delays, Node, design_with};
     use wheeleg_config::AxisConfig;
 
-    /// Valves of a few milliseconds and of forty: every controller's design is one that a
-    /// board accepts, as on the sheet and with the delays twice as long as told there.
+    /// Valves of a few milliseconds and of forty: a board accepts every controller's design, with the delays
+    /// of the sheet and with twice those delays.
     #[test]
     fn a_board_accepts_designs_for_fast_and_slow_valves() {
         let mut sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;

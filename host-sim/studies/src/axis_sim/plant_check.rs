@@ -1,5 +1,5 @@
-//! What can be said of a plant without a recording of the real one: balances, agreement with a
-//! model from the text book, order of convergence, error of the step, continuity of the flow.
+//! Checks of a plant that need no recording of the real one: balances, agreement with a model from the text
+//! book, order of convergence, error of the step, continuity of the flow.
 //!
 //! A value beyond its limit has one of two causes. Either the plant is wrong, or the step of the
 //! file is too long to tell: then a shorter step brings the value into its limit. The two are
@@ -206,8 +206,8 @@ fn balances(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 2], AxisSi
     ])
 }
 
-/// An axis of which the text book has the whole model: no leak, no dry friction, no cushions, a
-/// supply that does not give way, and so much mass that the piston stays away from its stops.
+/// An axis that the text book models completely: no leak, no dry friction, no cushions, a supply that does
+/// not give way, and enough mass to keep the piston away from its stops.
 fn plain(params: &AxisParams) -> AxisParams {
     let mut axis = params.clone();
     let cylinder = &mut axis.cylinder;

@@ -287,10 +287,9 @@ pub fn steps(
         .collect()
 }
 
-/// The retract move from the extended end stop, after the controller has pushed
-/// against the stop for 3 s: the start from home of the paper's test. Chamber
-/// pressures come from the simulation alone. `preview_s` is how long before the
-/// move the board is told of it.
+/// The retract move from the extended end stop, after the controller has pushed against the stop for 3 s: the
+/// start from home of the paper's test. Chamber pressures come from the simulation alone. The board gets the
+/// move `preview_s` ahead.
 ///
 /// # Errors
 /// [`AxisSimError`].

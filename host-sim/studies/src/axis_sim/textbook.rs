@@ -7,9 +7,9 @@
 //! m x''     = p_A A_A − p_B A_B − p_amb A_rod − σ2 x' + load
 //! ```
 //!
-//! Polytropic: n as in the file, T = T_amb, h = 0. Thermal: n = γ, T = p V / (m R). No leak, no
-//! dry friction, a supply that does not give way, a piston away from its stops. Integrated by
-//! the classic Runge–Kutta method at a fixed, short step that begins anew at every edge.
+//! Polytropic: n as in the file, T = T_amb, h = 0. Thermal: n = γ, T = p V / (m R). No leak, no dry friction,
+//! a supply that does not give way, a piston away from its stops. Integrated by the classic Runge–Kutta
+//! method with a fixed, short step that restarts at every edge.
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use wheeleg_config::AxisConfig;
 
-    /// Whatever leaves its range is told by fields that an axis file has.
+    /// A quantity that leaves its range is reported by fields that an axis file has.
     #[test]
     fn every_state_of_an_axis_has_fields_of_the_file_to_blame() {
         let axis = AxisConfig::load("bench-vq110u").expect("built in");

@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use wheeleg_config::AxisConfig;
 
-    /// What a board cannot be told is no advice.
+    /// Values that a board does not accept are not advised.
     #[test]
     fn no_axis_is_throttled_below_what_a_board_takes() {
         let mut axis = AxisConfig::load("bench-vq110u").expect("built in").axis;

@@ -189,7 +189,7 @@ impl Comparison {
         unplayed.map_or(Ok(comparison), Err)
     }
 
-    /// The comparison, and what is to be told of cases that could not be played: they cost none of the others.
+    /// The comparison, and an error for cases that could not be played: the others are kept.
     fn play(
         options: &Options,
         configs: Vec<AxisConfig>,
@@ -292,7 +292,7 @@ struct Unplayed {
     error: AxisSimError,
 }
 
-/// What is to be told of them, if there are any: how many, and all of the first.
+/// The error for unplayed cases, if there are any: their number, and details of the first.
 fn unplayed_error(unplayed: &[Unplayed], of: u64) -> Option<StudyError> {
     let first = unplayed.first()?;
     let help = match &first.error {

@@ -180,8 +180,8 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
     ))
 }
 
-/// Starts every cylinder of the study once from both of its ends: what cannot be simulated, or never
-/// moves, is told before anything is measured.
+/// Starts every cylinder of the study once from both of its ends, so that one that cannot be simulated, or
+/// never moves, is reported before anything is measured.
 fn ensure_moves(bores: &[AxisParams], options: &Options) -> Result<(), StudyError> {
     let given = format!(
         "`--mass` = {} kg, `--load` = {} N",

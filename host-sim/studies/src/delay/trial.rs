@@ -60,7 +60,7 @@ pub struct Trial {
     pub start: Start,
     /// Noise, time of the command, place in mid-stroke.
     pub seed: u64,
-    /// How long before the command the board is told of it \[s\].
+    /// How long before the command the board knows of it \[s\].
     pub preview_s: f64,
     /// Whether the command waits for the next bus cycle and its SYNC frame, drawn
     /// from the seed. `None` counts from the set-point in the board.

@@ -1,4 +1,4 @@
-//! One exported file; what stands in its place is kept.
+//! One exported file; an existing one in its place is kept.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -30,8 +30,8 @@ pub struct PrecisionMap {
 }
 
 impl PrecisionMap {
-    /// Computes the map with `n` + 1 strokes of the yaw and the horizontal cylinder and `levels` + 1
-    /// of the vertical one, ends included. `progress` is told the share that is done.
+    /// Computes the map with `n` + 1 strokes of the yaw and the horizontal cylinder and `levels` + 1 of the
+    /// vertical one, ends included. `progress` gets the share that is done.
     ///
     /// # Errors
     /// [`KinematicsError`]; not inside the strokes.

@@ -55,7 +55,7 @@ pub struct Lab {
 /// Longest text of a file that is quoted, characters.
 const QUOTED: usize = 40;
 
-/// What stands in a file, as long as anybody reads it.
+/// Text of a file, shortened to a readable length.
 fn shown(text: &str) -> String {
     shown_at(text, QUOTED)
 }
@@ -98,7 +98,7 @@ impl At<'_> {
     }
 }
 
-/// Where a value stands in a row, and what makes it one in our unit.
+/// Position of a value in a row, and its conversion to our unit.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     column: usize,

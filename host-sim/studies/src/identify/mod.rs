@@ -1,9 +1,9 @@
 //! A user's cylinder from measurements: `wheeleg identify`.
 //!
-//! A measurement ([`lab`]) has what the valves were told and where the piston was. The plant is
-//! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and
-//! judged by the rest. Every parameter gets an interval; what the data cannot tell is said
-//! ([`intervals`]), and which valve sequence would tell most of it ([`experiment`]).
+//! A measurement ([`lab`]) holds the commands of the valves and the position of the piston. The plant is
+//! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and judged by the
+//! rest. Every parameter gets an interval; parameters that the data does not determine are reported
+//! ([`intervals`]), with the valve sequence that would determine most of them ([`experiment`]).
 
 pub mod experiment;
 pub mod fit;
@@ -610,8 +610,8 @@ impl Identified {
 mod tests {
     use super::*;
 
-    /// Whoever goes on with the axis that was written, any number of times and in any order, finds where
-    /// each value came from, once.
+    /// If the written axis is identified again, any number of times and in any order, the source of each
+    /// value is still given once.
     #[test]
     fn the_source_of_a_value_that_stays_open_does_not_grow() {
         let config = AxisConfig::load("bench-vq110u").expect("built in");

@@ -1,4 +1,4 @@
-//! What the user of a row must be told, or must not: an event with its cause, not its text.
+//! Messages that the user of a row must get, or must not: an event with its cause, not its text.
 
 use std::fmt;
 

@@ -1,7 +1,7 @@
 //! The fault matrix (host-sim/FAULTS.md): a table of what can go wrong with what must
 //! come of it, run on the simulated robot and held against what was measured.
 //!
-//! * [`row`], [`rows`]: the table; [`expected`]: what the user must be told;
+//! * [`row`], [`rows`]: the table; [`expected`]: the messages that the user must get;
 //! * [`run`]: one run per row;
 //! * [`measure`]: latencies, latching, deviation, messages;
 //! * [`judge`]: measured against expected;

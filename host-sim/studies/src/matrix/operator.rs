@@ -24,7 +24,7 @@ const SLOW_US: u64 = 500_000;
 const PICTURE_US: u64 = 10_000;
 /// How often the operator tells what is seen, ms.
 const BEAT_MS: u64 = 50;
-/// How long the line is cut before the operator connects anew, ms.
+/// How long the line is cut before the operator reconnects, ms.
 const CUT_MS: u64 = 1_000;
 /// Commands that were given meanwhile.
 const QUEUED: u64 = 1_000;
@@ -298,7 +298,7 @@ impl Operator {
         }
     }
 
-    /// A client that connects anew, takes the control and sends what was given while it was cut.
+    /// A client reconnects, takes control and sends the commands that were given while it was cut off.
     fn reconnect(&mut self, now_us: u64, robot: &mut Robot<'_, '_>) {
         let cut_us = now_us - CUT_MS * 1_000;
         // What was written into the old session does not open the new one.

@@ -140,7 +140,7 @@ pub enum Connection {
     HalfOpen,
     /// What the operator sends takes 0.5 s.
     Slow,
-    /// It is cut for 1 s; then the client connects anew and sends 1,000 commands of before.
+    /// It is cut for 1 s; then the client reconnects and sends 1,000 old commands.
     Reconnects,
     /// Another client commands, takes and beats.
     SecondClient,

@@ -57,7 +57,7 @@ fn grouped<'a>(events: impl Iterator<Item = &'a Row<Event>>) -> Vec<Line> {
     lines
 }
 
-/// What each board heard on the bus, as it told last; without those that never told.
+/// What each board heard on the bus, by its last report; without boards that never reported.
 fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
     let last = NODE_NAMES.iter().zip(links);
     let last = last.filter_map(|(name, rows)| Some((name, rows.last()?)));
@@ -197,7 +197,7 @@ pub(super) fn render(
         .iter()
         .filter(|t| summary.complete && t.judgement() == Judgement::Missed);
     let motion = motion(source);
-    // The start-up is a story of its own, told at time zero.
+    // The start-up is listed on its own, at time zero.
     let all = &source.recording.events;
     let start_up: Vec<String> = all
         .iter()
@@ -206,7 +206,7 @@ pub(super) fn render(
             Some(format!("{at}: {}", r.v.cause))
         })
         .collect();
-    // What the boards logged themselves stands in the log and its tables.
+    // The boards' own log messages are in the log and its tables.
     let later = all
         .iter()
         .filter(|r| r.v.start_up_us.is_none() && r.v.cause.kind() != EventKind::Log);

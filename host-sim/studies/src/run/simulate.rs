@@ -14,7 +14,7 @@ use crate::analysis::{Analyser, Analysis};
 pub struct Simulated {
     /// How it ended.
     pub outcome: RunOutcome,
-    /// Its hash, and what the recorder was told to keep.
+    /// Its hash, and the data that the recorder was set to keep.
     pub recording: Recording,
     /// Targets and what else was found.
     pub analysis: Analysis,
@@ -22,9 +22,9 @@ pub struct Simulated {
     pub failed: Vec<LogError>,
 }
 
-/// Simulates a scenario and judges it while it lasts. `progress` is told the scenario time in s
-/// at every bus cycle, negative before it begins, and can end the run. The hash does not depend
-/// on what the recorder keeps or writes.
+/// Simulates a scenario and judges it while it lasts. `progress` gets the scenario time in s at every bus
+/// cycle, negative before the scenario begins, and can end the run. The hash does not depend on what the
+/// recorder keeps or writes.
 ///
 /// # Errors
 /// [`SimError`] when a part refuses its parameters; a run that fails on its way is none

@@ -139,9 +139,9 @@ fn cause(recording: &Recording) -> Vec<String> {
 /// the first refusal.
 fn messages(recording: &Recording) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // Each refusal that is told, with the place of its line, and how often it came.
+    // Each reported refusal, with the place of its line, and how often it came.
     let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
-    // What boards told, with its time, the place of its line, and the boards.
+    // What boards reported, with its time, the place of its line, and the boards.
     let mut shared: Vec<(Cause, u64, usize, Vec<Address>)> = Vec::new();
     let mut more = 0_u64;
     for event in &recording.events {
@@ -333,7 +333,7 @@ mod tests {
         }
     }
 
-    /// However many there are, the first twenty are told, and how many more; a refusal that is told
+    /// However many there are, the first twenty are listed, with the number of the others; a listed refusal
     /// is counted to the end.
     #[test]
     fn of_very_many_faults_twenty_are_told_and_their_number() {
@@ -365,7 +365,7 @@ mod tests {
         );
     }
 
-    /// What the run failed of is told first, whether a board has a fault or not.
+    /// The failure of the run comes first, whether a board has a fault or not.
     #[test]
     fn a_robot_that_gives_up_is_told_as_the_cause_and_as_a_message() {
         let mut recording = Recording::default();

@@ -178,7 +178,7 @@ impl Job {
         Ok(subfolder(self.folder(), name)?)
     }
 
-    /// Writes a text file; returns its path. A folder that somebody has removed is made anew.
+    /// Writes a text file; returns its path. Recreates a folder that somebody has removed.
     ///
     /// # Errors
     /// [`StudyError::Report`] if it cannot be written.

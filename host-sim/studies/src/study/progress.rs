@@ -12,9 +12,9 @@ use crate::StudyError;
 /// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
 pub const STACK: usize = 8 << 20;
 
-/// Works with the workers that all studies share, which have room for a simulated robot; on a worker
-/// already, with those of its own pool. Not rayon's global pool: whoever in the process uses that
-/// first gives its workers their stack.
+/// Works with the workers that all studies share, which have room for a simulated robot; if called on a
+/// worker, with those of its own pool. Not rayon's global pool: its first user in the process sets the stack
+/// size of its workers.
 pub(super) fn on_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     static WORKERS: LazyLock<Option<ThreadPool>> = LazyLock::new(|| {
         let workers = ThreadPoolBuilder::new().stack_size(STACK);

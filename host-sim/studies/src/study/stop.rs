@@ -77,10 +77,10 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// One that the program's signals set. Until [`begin`](Self::begin) they end the program at
-    /// once: there is nothing to finish, and a pipe that is read may never end. From then on the
-    /// first asks; a second Ctrl-C or TERM ends the program. A hang-up that whoever started the program has it ignore (`nohup`)
-    /// stays ignored.
+    /// One that the program's signals set. Until [`begin`](Self::begin) they end the program at once: there
+    /// is nothing to finish, and a pipe that is read may never end. From then on the first asks; a second
+    /// Ctrl-C or TERM ends the program. A hang-up that the program was started to ignore (`nohup`) stays
+    /// ignored.
     ///
     /// # Errors
     /// What the operating system says if a handler cannot be set.

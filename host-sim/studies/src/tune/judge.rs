@@ -129,12 +129,12 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     let tried = before.stopped != Some(true);
     let step = matches!(motion, Move::Step20 | Move::Step100);
     let rests = step || motion == Move::Hold;
-    // Whoever lets go of a load jumps; what counts then is where the piston comes to rest.
+    // A piston that loses its load jumps; what counts then is where it comes to rest.
     let judged = |figure: Figure| match figure {
         Figure::LimitCycle => rests,
         Figure::Overshoot => !motion.loses_contact() && tried,
         Figure::TrackingError => matches!(motion, Move::SCurve | Move::Sine) && tried,
-        // Whoever never settles, or goes on about the target, has no time to compare with.
+        // A law that never settles, or keeps cycling about the target, has no time to compare with.
         Figure::SettlingTime => {
             tried && step && before.settle_s.is_some() && before.limit_cycle != Some(true)
         }

@@ -201,8 +201,7 @@ fn delays(file: &str, config: &AxisConfig, seed: u64) -> Result<Option<Delays>, 
     identify(plant, plant, seed).map_err(|e| axis_error(file, &e))
 }
 
-/// A board as it comes, told no more than where its piston is and how long its
-/// stroke.
+/// A board with default settings, except for the piston's position sensor and its stroke.
 fn defaults(tuned: &Design) -> Design {
     let supervision = JointParam::SlewRate.info().default;
     Design {

@@ -179,8 +179,8 @@ fn cut(text: &str) -> String {
 }
 
 impl Content {
-    /// Reads a log; `keep_strokes`: all of them, for a comparison. `look` is told the time in ms
-    /// and ends the reading.
+    /// Reads a log; `keep_strokes`: all of them, for a comparison. `look` gets the time in ms, and can end
+    /// the reading.
     pub(super) fn read(
         path: &Path,
         span: Span,

@@ -25,7 +25,7 @@ const MARGIN: f64 = 0.05;
 /// By this a page of a log is known, near its start.
 const OURS: &str = "<meta name=\"generator\" content=\"wheeleg view\">";
 
-/// Whether a file is such a page, which is made anew.
+/// Whether a file is such a page, which may be remade.
 pub(super) fn is_ours(page: &Path) -> bool {
     // A pipe has nothing to say, and would be waited for.
     if !page.symlink_metadata().is_ok_and(|page| page.is_file()) {

@@ -109,7 +109,7 @@ mod tests {
     use crate::Cause;
     use crate::messages::within;
 
-    /// Whoever reads an event reads the words of the table.
+    /// The text of an event uses the words of the table.
     #[test]
     fn every_reason_has_words_of_its_own_and_its_event_has_them() {
         let causes: BTreeSet<&str> = holds().map(|(_, words)| words.cause).collect();
@@ -124,7 +124,7 @@ mod tests {
                 "{words:?}"
             );
             let text = Cause::Master(MasterEvent::Hold(reason)).to_string();
-            // Where a board reports a fault, that is told.
+            // If a board reports a fault, that is given instead.
             if !matches!(reason, HoldReason::NodeFault { .. }) {
                 assert!(text.contains(&within(words.cause)), "{text}");
                 assert!(text.ends_with(&words.way_on()), "{text}");

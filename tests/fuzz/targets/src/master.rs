@@ -43,7 +43,7 @@ enum Line {
 
 #[derive(Clone, Debug, Arbitrary)]
 enum Action {
-    /// Cycles in which every node does what it last was told to do.
+    /// Cycles in which every node obeys its last command.
     Cycles(u8),
     /// One cycle in which a node's reply and the answers suffer.
     BadLine(u8, Line, Line),

@@ -93,7 +93,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// A value without a unit of its own stands in the robot as it is.
+/// A value without a unit of its own reaches the robot unchanged.
 fn arrived(factor: &Factor, value: &Value, parameters: &[wheeleg_config::ParameterInfo]) {
     let (Sets::Fields { robot, .. }, Value::Number(number)) = (&factor.sets, value) else {
         return;

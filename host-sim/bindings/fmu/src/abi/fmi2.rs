@@ -100,7 +100,7 @@ extern "C" fn fmi2SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Errors alone are told, and always.
+    // Only errors are logged, and always.
     OK
 }
 

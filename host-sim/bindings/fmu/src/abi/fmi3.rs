@@ -78,7 +78,7 @@ extern "C" fn fmi3SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Errors alone are told, and always.
+    // Only errors are logged, and always.
     OK
 }
 

@@ -99,7 +99,7 @@ fn command_text(name: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<S
         } else if value.is_instance_of::<PyInt>() {
             match value.extract::<i64>() {
                 Ok(number) => number.to_string(),
-                // Longer than a number of TOML: in quotes, and told with what is allowed.
+                // Longer than a TOML number: quoted, and reported with the allowed range.
                 Err(_) => toml_text(&value.str()?.to_string()),
             }
         } else if value.is_instance_of::<PyFloat>() {

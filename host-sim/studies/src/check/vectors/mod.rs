@@ -81,7 +81,7 @@ impl Quantity {
     fn add(&mut self, case: Option<u64>, expected: &[f64], computed: &[f64]) {
         for (index, (&e, &c)) in expected.iter().zip(computed).enumerate() {
             let error = (e - c).abs();
-            // The first number always stands in the table; NaN is the worst of all.
+            // The first number is always in the table; NaN is the worst of all.
             if self.values == 0 || error > self.worst_error || error.is_nan() {
                 self.worst_error = if error.is_nan() { f64::INFINITY } else { error };
                 self.case = case;

@@ -94,7 +94,7 @@ pub fn export(log: &Path, folder: &Path, progress: &Progress) -> Result<Option<B
     let filling = Filling::begin(folder)?;
     let files = attachments(log)?;
     let Some(urdf) = files.into_iter().find(|file| file.name == "robot.urdf") else {
-        // Of a log that breaks off at once, that is what is told.
+        // If the log breaks off at once, report that instead.
         wheeleg_telemetry::read(log, &mut |_| ControlFlow::Break(()))?;
         return Err(without(log, "the robot's URDF"));
     };

@@ -22,7 +22,7 @@ pub(super) enum Kind {
 pub(super) struct TopicDef {
     pub(super) name: &'static str,
     pub(super) kind: Kind,
-    /// Whoever comes late gets the last message: durability "transient local".
+    /// A late subscriber gets the last message: durability "transient local".
     pub(super) latched: bool,
 }
 

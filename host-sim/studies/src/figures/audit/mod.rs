@@ -272,7 +272,7 @@ fn line(equation: &Equation, unit: &'static str, states: &[Vec<State<'_>>; 3]) -
     }
 }
 
-/// The table, one line for each equation and unit. `progress` is told the share that is done.
+/// The table, one line for each equation and unit. `progress` gets the share that is done.
 ///
 /// # Errors
 /// [`DynamicsError`]; not inside the strokes.
