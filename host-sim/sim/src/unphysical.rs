@@ -1,5 +1,5 @@
-//! A plant that has left the range of its model: when, which part, what most likely did it, and
-//! what was last known of the part.
+//! A plant that has left the range of its model: when, which part, the likely cause, and the last known
+//! values of the part.
 
 use wheeleg_plant::PlantError;
 use wheeleg_plant::dynamics::floating::state::{LEG, WHEEL};
@@ -18,7 +18,7 @@ enum Part {
     Chassis,
     /// The reservoir.
     Supply,
-    /// Not one of them.
+    /// None of these.
     Robot,
 }
 
@@ -48,7 +48,7 @@ impl Part {
         }
     }
 
-    /// What was last known of it.
+    /// Its last known values.
     fn last(self, o: &Outputs) -> String {
         match self {
             Self::Joint(i) => {
@@ -78,7 +78,7 @@ impl Part {
     }
 }
 
-/// Parameters of the robot's file that most likely make a state variable explode.
+/// Parameters of the robot's file that are the likely cause if a state variable explodes.
 fn likely(name: &str, part: Part) -> &'static str {
     match (name, part) {
         ("bristle_m", _) => "`friction.bristle_damping`, `friction.bristle_stiffness`",

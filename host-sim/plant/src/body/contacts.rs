@@ -238,7 +238,7 @@ impl ContactStates {
         }
     }
 
-    /// Adds the state to a hash. Soil adds to it only if it has been deformed.
+    /// Adds the state to a hash. Soil adds to it only where a foot or wheel is in it.
     pub fn feed(&self, hasher: &mut StateHasher) {
         for grip in self.grips() {
             hasher.bytes(&grip.part.to_le_bytes());

@@ -7,7 +7,7 @@ use wheeleg_remote_host::Nodes;
 use super::admission;
 use crate::SimError;
 
-/// Faults under way, each with the time since power-up at which it is over, ns.
+/// Faults under way, each with its end as time since power-up, ns.
 #[derive(Debug, Default)]
 pub(crate) struct ActiveFaults(Vec<(FaultSpec, u64)>);
 
