@@ -183,7 +183,7 @@ fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
     let first = repeated(&folder(&rig, "0001"));
     assert!(first.is_same(), "{first:?}");
     assert!(first.summary.begin_us > 0 && first.inputs > 2);
-    // A viewer finds robot, ground and forces in a log that begins in the middle of a life.
+    // A viewer finds robot, ground and forces in a log that begins in mid-run.
     let log = folder(&rig, "0001").join("log.mcap");
     assert_eq!(attachments(&log).expect("a log")[0].name, "robot.urdf");
     let mut counts = [0; 5];
@@ -211,7 +211,7 @@ fn a_folder_that_cannot_be_made_is_told_and_the_robot_goes_on() {
     let mut driver = rig.driver("driver");
     assert_eq!(refusal(&mut driver, "RecordStart", &json!({})), "recording");
     let begin = Instant::now();
-    // The place can be freed, and then it can.
+    // Once the path is freed, it works.
     fs::remove_file(rig.home.path().join("recordings")).expect("removed");
     done(&mut driver, "RecordStart");
     done(&mut driver, "RecordStop");
@@ -268,7 +268,7 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
     fs::remove_file(&inputs).expect("removed");
     assert!(error(folder.path()).contains("inputs.jsonl"));
     let summary = folder.path().join("recording.json");
-    // A time after which nobody waits, and a robot that is none.
+    // A time so late that nobody waits for it, and an invalid robot.
     let sound = fs::read_to_string(&summary).expect("read");
     fs::write(&inputs, "").expect("written");
     let mut late: Value = serde_json::from_str(&sound).expect("JSON");

@@ -41,7 +41,7 @@ struct SeriesData<'a> {
 }
 
 impl<'a> PanelData<'a> {
-    /// The data of a panel of lines; none for other contents, whose picture is all there is.
+    /// The data of a panel of lines; none for other contents, which have only their picture.
     pub(crate) fn of(panel: &'a Panel) -> Option<Self> {
         let Content::Lines(lines) = &panel.content else {
             return None;
@@ -94,7 +94,7 @@ impl<'a> SeriesData<'a> {
     }
 }
 
-/// Smallest and largest value of every stretch, in the order in which they come.
+/// Smallest and largest value of every stretch, in their order.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= 2 * STRETCHES {
         return points.to_vec();
