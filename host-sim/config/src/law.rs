@@ -1,4 +1,4 @@
-//! Control laws of a joint by name, and another law for a robot than its file's.
+//! Control laws of a joint by name, and replacing the law of a robot's file.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! A robot: everything about the machine that a run needs, in SI units.
+//! A robot: all data of the machine that a run needs, in SI units.
 
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::layer1::walk::WalkGeometry;
@@ -79,7 +79,7 @@ params! {
 /// A robot file, checked and converted to SI.
 #[derive(Debug, Clone)]
 pub struct RobotConfig {
-    /// Its file, as messages name it.
+    /// Its file, as named in messages.
     pub file: String,
     /// Name of the robot.
     pub name: String,
@@ -197,7 +197,7 @@ impl RobotConfig {
     }
 }
 
-/// What a robot file is made of, as far as it could be read.
+/// Parts of a robot file, as far as they could be read.
 struct Parts {
     name: Option<String>,
     description: Option<String>,
@@ -253,7 +253,7 @@ fn facts(robot: Option<&PlantParams>) -> relations::Read<'_> {
     }
 }
 
-/// What the file would be refused for with other values in it.
+/// Tries the file with other values, and returns its errors.
 fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
     let mut r = Reader::with(file, text, values)?;
     let plant = Parts::read(&mut r).plant.map(|(plant, _)| plant);
