@@ -1,5 +1,4 @@
-//! One run from a scenario to its judgement: what every way to run a case has in common, with
-//! files or without.
+//! One run from a scenario to its judgement: common to all ways of running a case, with files or without.
 
 use std::ops::ControlFlow;
 
@@ -16,7 +15,7 @@ pub struct Simulated {
     pub outcome: RunOutcome,
     /// Its hash, and the data that the recorder was set to keep.
     pub recording: Recording,
-    /// Targets and what else was found.
+    /// Targets and other findings.
     pub analysis: Analysis,
     /// The first error of each sink that had one.
     pub failed: Vec<LogError>,
@@ -27,7 +26,7 @@ pub struct Simulated {
 /// recorder keeps or writes.
 ///
 /// # Errors
-/// [`SimError`] when a part refuses its parameters; a run that fails on its way is none
+/// [`SimError`] when a part refuses its parameters; not for a run that fails on its way
 /// ([`RunOutcome::failure`]).
 pub fn simulate(
     boards: Boards,
