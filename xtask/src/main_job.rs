@@ -59,7 +59,7 @@ fn check_file(folder: &Path, json: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Every required target is met, and none of the paper's list is left out.
+/// Every required target is met, and none in the paper's list is missing.
 fn check_targets(json: &Value) -> Result<()> {
     let targets = json["targets"].as_array().context("no `targets`")?;
     for id in ["A19", "A20", "A21", "A22", "A23", "A25", "A26", "A27"] {

@@ -1,4 +1,4 @@
-//! Running other programs: where the repository is, what is installed.
+//! Running other programs: the place of the repository, and installed tools.
 
 use std::collections::VecDeque;
 use std::io::{BufRead as _, BufReader, ErrorKind};
@@ -8,7 +8,7 @@ use std::{env, fs};
 
 use anyhow::{Context, Result, bail};
 
-/// Lines that an error repeats of what a check said.
+/// Lines of a check's output that an error repeats.
 const LAST_LINES: usize = 12;
 
 /// The root of the repository.
@@ -25,7 +25,7 @@ pub(crate) fn target_dir() -> PathBuf {
     }
 }
 
-/// Removes a folder with all that is in it, if it is there.
+/// Removes a folder with its contents, if it is there.
 pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -35,7 +35,7 @@ pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     }
 }
 
-/// Makes an empty folder, in place of what was there.
+/// Makes an empty folder, removing any old contents.
 pub(crate) fn empty_folder(folder: &Path) -> Result<()> {
     remove_folder(folder)?;
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
@@ -83,7 +83,7 @@ pub(crate) fn check(command: &mut Command) -> Result<()> {
     println!("    $ {line}");
     let (says, end) = std::io::pipe()?;
     let child = command.stdout(end.try_clone()?).stderr(end).spawn();
-    // What is read ends when nobody holds the other end.
+    // The pipe ends when nobody holds its other end.
     command.stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
     let mut last = VecDeque::new();

@@ -1,5 +1,4 @@
-//! Commands of the host: they act on the simulation or on who is in control, and do not move the
-//! robot.
+//! Commands of the host: they act on the simulation or on who is in control, and do not move the robot.
 
 /// An argument of a command of the host.
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +49,7 @@ pub struct HostInfo {
     pub name: &'static str,
     /// Arguments.
     pub arguments: &'static [HostArgument],
-    /// What it does.
+    /// Its effect.
     pub effect: &'static str,
 }
 

@@ -66,7 +66,7 @@ mod tests {
         let mut bucket = Bucket::new(start);
         let taken = (0..1_000).filter(|_| bucket.take_for(31 * 1_024, start));
         assert_eq!(taken.count(), 6);
-        // What is left is enough for short ones.
+        // The rest is enough for short ones.
         let taken = (0..1_000).filter(|_| bucket.take(start));
         assert_eq!(taken.count(), 8);
     }
