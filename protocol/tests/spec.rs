@@ -1,4 +1,4 @@
-//! SPEC.md and the code say the same.
+//! SPEC.md and the code agree.
 //!
 //! The tables between `<!-- begin … -->` and `<!-- end … -->` are compared with the text rendered from the
 //! code's own tables; the worked examples are read from the document, decoded, and encoded again. After a

@@ -135,7 +135,7 @@ pub enum Refusal {
         /// Active fault bits.
         faults: u16,
     },
-    /// A node was reset while it did this: nobody knows whether it is done.
+    /// A node was reset during this: nobody knows whether it is done.
     NodeReset {
         /// Bus address.
         node: u8,

@@ -26,7 +26,7 @@ impl<T> Slot<T> {
         }
     }
 
-    /// Puts what `make` gives into the slot; `None` if it is taken already.
+    /// Puts the result of `make` into the slot; `None` if it is taken already.
     #[inline]
     #[expect(clippy::mut_from_ref, reason = "`taken` gives the reference out once")]
     pub fn fill(&'static self, make: impl FnOnce() -> T) -> Option<&'static mut T> {

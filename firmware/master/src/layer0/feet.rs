@@ -24,7 +24,7 @@ const ALL: u8 = 0x0F;
 const AGREE: u8 = 20;
 /// A swinging foot drawn up by this much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
-/// Legs extended at least so far, mm, have their soles in the plane of the wheels.
+/// Legs extended at least this far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
 /// Swings in which a switch must stay closed.
 const SWINGS: u8 = 2;
@@ -44,7 +44,7 @@ struct One {
     told: bool,
 }
 
-/// What a foot does, as far as its switches can be judged by it.
+/// Motion of a foot, as far as it allows judging its switches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
     /// Neither.
@@ -78,8 +78,8 @@ pub struct Stuck {
 }
 
 impl FootWatch {
-    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs'
-    /// strokes, and whether the leg swings; gives a switch that has just been found stuck.
+    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, and
+    /// whether the leg swings; returns a switch that has just been found stuck.
     pub fn sample(
         &mut self,
         now: FootSwitches,

@@ -90,7 +90,7 @@ impl Layer0 {
         }
     }
 
-    /// Takes a frame from the bus that is no slot reply. False if nobody asked for it.
+    /// Takes a frame from the bus that is not a slot reply. False if it was not requested.
     fn on_answer(
         &mut self,
         envelope: Envelope,
@@ -208,7 +208,7 @@ impl Layer0 {
                     ago_us,
                 };
                 events.push(now_us, diagnosis);
-                // What led to it.
+                // Ask for the events before it.
                 self.questions.log(index);
                 self.nodes.forget_count(from);
             }
@@ -231,7 +231,7 @@ impl Layer0 {
         }
     }
 
-    /// What a board has heard. True if it was not reset since it was asked last.
+    /// Takes a board's link record. True if it was not reset since the last one.
     fn heard(
         &mut self,
         from: Address,
@@ -291,7 +291,7 @@ impl Layer0 {
                 self.abort_arming(now_us, events);
                 events.push(now_us, Event::Refused { ticket, reason });
             }
-            // Armed when the replies say so: see `confirm_arming`.
+            // Armed once the replies show it: see `confirm_arming`.
             (GroupKind::Arm, None) => {}
             _ if left > 0 => {}
             (_, Some(reason)) => {

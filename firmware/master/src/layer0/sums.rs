@@ -28,7 +28,7 @@ impl Sums {
         before != Some(sum) && wanted.is_some_and(|wanted| wanted != sum)
     }
 
-    /// A board is lost: what comes back may be another one.
+    /// A board is lost: a returning one may be another board.
     pub(super) fn lost(&mut self, index: usize) {
         if let Some(told) = self.told.get_mut(index) {
             *told = None;

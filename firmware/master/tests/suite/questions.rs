@@ -1,5 +1,5 @@
-//! What the master asks by itself, and what it says of boards and line: causes of
-//! faults and restarts, link counters, logs, commissioned boards, babble.
+//! The master's own questions, and its reports about boards and line: causes of faults and restarts, link
+//! counters, logs, commissioned boards, babble.
 
 use crate::common::{NO_LOG, TestRig, emit};
 use wheeleg_master::MasterConfig;
@@ -267,7 +267,7 @@ fn another_board_than_the_commissioned_one_bars_arming_and_both_ids_are_named() 
     for told in [foreign(3, 4, Some(4)), foreign(4, 0xEE, None)] {
         assert!(rig.saw(|event| *event == told), "{told:?}");
     }
-    // Taken over as they are, they arm.
+    // Accepted as they are, they arm.
     let ticket = rig.submit(Command::Commission);
     rig.run(2);
     assert!(rig.done(ticket), "{:?}", rig.refusal(ticket));
@@ -437,7 +437,7 @@ fn who_fills_the_line_is_named() {
             rig.master.on_bus_bytes(&answer, start + 5_000 + 350 * i);
         }
     }
-    // Answers that nobody waits for, twelve in a cycle.
+    // Unrequested answers, twelve in a cycle.
     assert_eq!(found(&rig, Finding::LineFull), [Some(8)]);
     assert!(rig.master.is_armed(), "and goes on");
 }
