@@ -1,5 +1,5 @@
-//! A plant that leaves physics says so at once: when, which part, what most likely did it, and what
-//! was last known of it.
+//! A plant that leaves physics reports it at once: when, which part, the likely cause, and its last known
+//! state.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -16,7 +16,7 @@ use wheeleg_studies::study::Settings;
 
 use crate::sil::robot;
 
-/// A pressure that the supply cannot have made is none, long before it is a strange number.
+/// A pressure that the supply cannot have made is an error, long before it is a strange number.
 #[test]
 fn four_times_the_supply_is_too_much() {
     let robot = robot();

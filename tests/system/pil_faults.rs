@@ -134,7 +134,7 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     for (board, rows) in pil.boards.iter().zip(&recording.links) {
         assert_eq!(board.late_frames, 0, "{}", board.node);
         let counted = &rows.last().expect("an answer of every board").v;
-        // Eight frames a cycle, but for what was broken.
+        // Eight frames a cycle, minus the broken ones.
         let broken = counted.truncated + counted.short + counted.crc;
         assert!(
             counted.frames > 1_000 && broken > 3,
@@ -145,8 +145,7 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     }
 }
 
-/// Joint 2 is disarmed and shut from `from_s` on, every other axis is held, and all of
-/// that stays.
+/// Joint 2 is disarmed and shut from `from_s` on, every other axis is held, and this lasts.
 fn assert_all_stopped(recording: &Recording, from_s: f64) {
     for (joint, rows) in recording.joints.iter().enumerate() {
         let rest = window(rows, from_s, f64::INFINITY);
@@ -175,7 +174,7 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
             "joint {} moves {low} … {high} mm",
             joint + 1
         );
-        // What the board senses is what is there, to the noise.
+        // The board senses the truth, to the noise.
         for row in rest.iter().skip(100) {
             let error = row.v.sensed_mm - row.v.position_mm;
             assert!(error.abs() < 2.0, "joint {}: {error} mm", joint + 1);
@@ -328,7 +327,7 @@ fn a_native_run_is_that_of_boards_that_were_down_to_the_last_bit_of_the_log() {
         let said = String::from_utf8_lossy(&ran.stderr);
         assert!(ran.status.success(), "{pair:?}: {said}");
         let summary: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("a summary");
-        // Each of them was down once, and that is not what was compared away.
+        // Each of them was down once, and the comparison did not remove that.
         for board in summary["pil"]["boards"].as_array().expect("boards") {
             assert_eq!(board["resets"], 1, "{pair:?}: {board}");
         }
@@ -371,7 +370,7 @@ impl Saver {
         self.board.ran(&Request::Run(run))
     }
 
-    /// Switches the supply off and on; gives the set that is found then.
+    /// Switches the supply off and on; returns the set found then.
     fn restart(&mut self) -> Set {
         self.run(5, Power::BrownOut);
         // The supply comes back at the end of a run.

@@ -72,7 +72,7 @@ impl BoardBench {
         }
     }
 
-    /// Sends a request in the middle of a tick; gives the answer.
+    /// Sends a request in the middle of a tick; returns the answer.
     fn request(&mut self, message: Message) -> Message {
         self.sequence += 1;
         let address = Address::new(ADDRESS).expect("a joint");
@@ -115,7 +115,7 @@ impl BoardBench {
         matches!(self.request(ParamSave {}.into()), Message::Ack(_))
     }
 
-    /// Switches the supply off and on; gives why the board says that it started.
+    /// Switches the supply off and on; returns the reported reason of the start.
     fn restart(&mut self) -> FaultRecord {
         self.ticks(5, Power::BrownOut);
         self.ticks(START_MS, Power::Good);

@@ -7,7 +7,7 @@ use wheeleg_studies::StudyError;
 use wheeleg_studies::run::run_read;
 use wheeleg_studies::study::Settings;
 
-/// The error for a robot that is to stand, and its help; empty if it stands.
+/// The error for a robot that should stand, and its help; empty if it stands.
 fn told(robot: &RobotConfig) -> [String; 2] {
     let mut scenario = builtin::scenario("stand").expect("built in");
     scenario.duration_s = 0.1;

@@ -1,4 +1,4 @@
-//! Texts of files and of servers stand in what the program says, and do not act on a terminal.
+//! Texts from files and servers appear in the program's output, and do not act on a terminal.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;
@@ -49,7 +49,7 @@ fn texts_of_a_file_do_not_act_on_a_terminal() {
     }
 }
 
-/// What a command says to a server in place of ours, which does not have the key, and answers so.
+/// A command's output about a false server, which does not have the key and sends this answer.
 fn asked_of(command: &str, status: &'static str, body: &serde_json::Value) -> Output {
     let home = tempfile::tempdir().expect("a folder");
     wheeleg_console::keys::Keys::open(&home.path().join("wheeleg")).expect("keys");

@@ -7,7 +7,7 @@ use wheeleg_master::layer1::walk::{WalkGeometry, WalkOrder};
 use wheeleg_studies::analysis::{Target, analyse};
 use wheeleg_units::VelocityMmS;
 
-/// What a seed makes of the scenario's bars.
+/// Results of the scenario's bars for a seed.
 fn targets(scenario: &Scenario, seed: u64) -> Vec<Target> {
     let robot = builtin::robot(&scenario.robot).expect("built in");
     let recording = sil::run(scenario, &robot, seed);

@@ -84,7 +84,7 @@ pub fn run(data: &[u8]) {
                     arrived(factor, value, &resolved.robot.parameters);
                 }
             }
-            // Values that do not go together; but what was written is TOML.
+            // Values that do not fit together; but the file was TOML.
             Err(error) => {
                 let said = explained(error);
                 assert!(!said.contains("not valid TOML"), "{said}");
@@ -115,7 +115,7 @@ fn explained(error: ConfigError) -> String {
         .iter()
         .map(wheeleg_config::Problem::summary);
     let said = problems.collect::<Vec<_>>().join("\n");
-    // What a user sees: the places are in the text, or this panics.
+    // The message that a user sees: rendering it panics if a span lies outside the text.
     assert!(format!("{:?}", miette::Report::new(error)).len() > 20);
     said
 }
