@@ -94,8 +94,8 @@ fn thread_and_working_directory_make_no_difference() {
     assert_eq!(hashes, [here.clone(), here]);
 }
 
-/// A walk on rocks, where contacts come and go by the hundred: the same in two folders, on two threads in
-/// turn and two at a time; other rocks make another run.
+/// A walk on rocks, where contacts come and go by the hundred: the same in two folders, on one
+/// thread and on two at a time; other rocks make another run.
 #[test]
 fn a_walk_on_rocks_is_the_same_in_any_folder_on_one_thread_or_two() {
     let walk = |seed: u64| {

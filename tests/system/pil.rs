@@ -70,7 +70,7 @@ impl BoardBench {
         self.ran(&edge)
     }
 
-    /// Runs until the board reports a reset; returns it and the time of the provocation.
+    /// Runs until the board reports a reset; returns its time since this call and its cause.
     fn until_reset(&mut self, ticks: u32) -> Option<(u64, u32)> {
         let since_ns = self.now_ns;
         (0..ticks).find_map(|_| {

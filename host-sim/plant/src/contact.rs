@@ -49,7 +49,7 @@ pub struct Touch {
     pub normal: Vector3<f64>,
     /// Velocity of the body's point against the surface \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// What that point has moved since the last instant \[m\].
+    /// Displacement of that point since the last instant \[m\].
     pub moved_m: Vector3<f64>,
     /// The ground.
     pub material: Material,
@@ -129,7 +129,7 @@ impl ContactLaw {
         (elastic * (1.0 + self.damping_s_m * closing_m_s)).max(0.0)
     }
 
-    /// Stretches the bristle by what the body has moved, and gives the force on the body.
+    /// Stretches the bristle by the body's displacement, and returns the force on the body.
     #[must_use]
     #[inline]
     pub fn force(&self, stretch_m: &mut Vector3<f64>, touch: &Touch) -> ContactForce {
