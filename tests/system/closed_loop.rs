@@ -140,8 +140,8 @@ fn the_sensed_stroke_is_the_true_one_through_a_real_sensor() {
             -bound_mm < low && high < bound_mm,
             "joint {name}: {low} … {high} mm"
         );
-        // Not the true stroke handed through: its noise is there, and no more than its noise
-        // where the joint stands.
+        // Not the true stroke passed through: its noise is there, and only its noise where the joint is at
+        // rest.
         let (mean, deviation) = spread(window(rows, 0.0, 0.15).iter().map(|r| error(&r.v)));
         assert!(
             (0.6 * noise_mm..1.8 * noise_mm).contains(&deviation),

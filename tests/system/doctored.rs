@@ -316,7 +316,7 @@ fn a_run_with_very_many_events_has_a_page_that_opens() {
     }
 }
 
-/// Of eight times as many events a run takes less than twenty-four times as long, up to a hundred thousand.
+/// A run with eight times as many events takes less than twenty-four times as long, up to a hundred thousand.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_hundred_thousand_events_take_no_longer_than_their_number() {

@@ -35,7 +35,7 @@ const FILES: u64 = 200;
 const FEW_FILES: u64 = 20;
 /// A run that is not over is stopped with Ctrl-C then; a mistake may have made it a long one.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// One that goes on after that hangs. It may share its processor with others.
+/// A run that continues after that hangs. It may share its processor with others.
 const HUNG: Duration = Duration::from_secs(120);
 /// Simulated time of a run that has not got another by mistake, s.
 const DURATION_S: f64 = 0.3;

@@ -216,7 +216,7 @@ fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
     let scenario = gait_with(&format!("node-hang:joint2@{t:.3}s"), t + 1.0);
     let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
-    // The hardware goes on with its last outputs.
+    // The hardware keeps its last outputs.
     let hung = window(rows, t + 2.0 * TICK_S, t + 0.040);
     let told = |row: &Row<JointSample>| {
         [

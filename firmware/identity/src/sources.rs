@@ -77,7 +77,7 @@ pub fn digest_of(root: &Path, names: &[&str]) -> io::Result<(Digest, Vec<PathBuf
             files.push(path);
             continue;
         }
-        // A path that is neither file nor crate has no sources.
+        // A path to neither a file nor a crate has no sources.
         files.push(path.join(MANIFEST));
         walk(&path.join(SOURCES), &mut files)?;
         let script = path.join(BUILD_SCRIPT);

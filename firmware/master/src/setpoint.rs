@@ -356,7 +356,7 @@ pub struct Feedback {
     pub wheels_um: [i64; WHEELS],
     /// State of layer 0's behaviours.
     pub acts: Acts,
-    /// All nodes armed, alive and free of faults: motion may go on.
+    /// All nodes armed, alive and free of faults: motion may continue.
     pub motion_allowed: bool,
     /// Number of the permission to move (wraps): a stop, a clear or an arming ends one, and with it every
     /// motion, also of a layer 1 that has not noticed it.

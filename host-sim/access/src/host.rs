@@ -20,7 +20,7 @@ pub struct HostArgument {
 pub enum HostCode {
     /// Stops the clock.
     Pause = 0x0301,
-    /// Lets it go on.
+    /// Resumes it.
     Resume = 0x0302,
     /// Some bus cycles of a paused robot.
     Step = 0x0303,

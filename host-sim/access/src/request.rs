@@ -109,7 +109,7 @@ pub enum Order {
 pub enum HostCommand {
     /// Stops the clock.
     Pause,
-    /// Lets it go on.
+    /// Resumes it.
     Resume,
     /// Some bus cycles.
     Step(u32),

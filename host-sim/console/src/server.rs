@@ -74,7 +74,7 @@ pub enum Protection {
     Plain,
 }
 
-/// Options of the server: what it serves, to whom and where.
+/// Options of the server: what it serves, for which clients and where.
 #[derive(Debug)]
 pub struct Options {
     /// The robot.

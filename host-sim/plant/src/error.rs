@@ -1,6 +1,6 @@
 //! The plant's one error type: every failure names the variable and its value.
 
-/// Why the plant refused to go on.
+/// Why the plant cannot continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// A state variable stopped being a finite number.

@@ -179,7 +179,7 @@ impl Stream for SerialLine {
                 Err(e) => return Err(self.lost(&e)),
             }
         };
-        // A frame ends with a zero, and there is none inside.
+        // A frame ends with a zero and contains no other.
         if buffer[..count].contains(&0)
             && let Some(asked) = self.asked.take()
         {

@@ -114,7 +114,7 @@ impl<'a> Observers<'a> {
     }
 }
 
-/// Whether to go on; the caller of [`run`] decides at every bus cycle.
+/// Whether to continue; the caller of [`run`] decides at every bus cycle.
 pub type Control = ControlFlow<()>;
 
 /// How a run ended.

@@ -340,7 +340,7 @@ fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     assert_eq!(std::fs::read(path("notes.txt")).expect("kept"), b"notes");
 }
 
-/// A sink that fails keeps its error; the others and the hash go on.
+/// A sink that fails keeps its error; the others and the hash continue.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_takes_nothing_else_with_it() {

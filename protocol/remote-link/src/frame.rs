@@ -99,7 +99,7 @@ impl Deframer {
     /// resynchronise a line.
     ///
     /// # Errors
-    /// A frame that cannot be read; the next call goes on behind it.
+    /// A frame that cannot be read; the next call continues behind it.
     pub fn next<T: DeserializeOwned>(
         &mut self,
         input: &mut &[u8],

@@ -20,7 +20,7 @@ pub enum Reply {
     Ran(Ran),
     /// Contents of the parameter store.
     Nonvolatile(Nonvolatile),
-    /// The request cannot be carried out; the board goes on as before.
+    /// The request cannot be carried out; the board continues as before.
     Refused(Text),
     /// The emulation has come to an end, with the reason: an access that no
     /// model knows, a hard fault, a frame that cannot be read. Nothing but

@@ -147,7 +147,7 @@ pub enum Power {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "as for `Reply`")]
 pub enum Hook {
-    /// The main loop stops for good, interrupts go on: the watchdog must bite.
+    /// The main loop stops for good, interrupts still run: the watchdog must bite.
     /// Acts until the next reset.
     StopMainLoop,
     /// The processor stops altogether, its timers go on. Acts until the next reset.

@@ -16,7 +16,7 @@ const PERIOD_CYCLES: u32 = 10;
 const ROUND: usize = 2 * NODES;
 /// Rounds without links between two with them on a sound line, 0.8 s each.
 const QUIET_ROUNDS: u8 = 7;
-/// Time for which the boards go on recording, ms: three rounds of 1.6 s.
+/// Time for which the boards keep recording, ms: three rounds of 1.6 s.
 const LEASE_MS: u16 = 5_000;
 
 /// Open questions to one board.

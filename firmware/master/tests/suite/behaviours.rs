@@ -159,7 +159,7 @@ fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
         robot.run(4);
         assert_eq!(robot.reference(B5, 60.0), 60.0);
     }
-    // 5 mm in the half second are motion, 4.9 mm are none.
+    // 5 mm in half a second count as motion, 4.9 mm do not.
     for (way_mm, told) in [(4.9, true), (5.0, false)] {
         let mut robot = Robot::all(STAND);
         robot.joint(B5).saturated = true;
@@ -297,7 +297,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
         robot.joint(B6).stroke_mm = mm(at);
         assert_eq!(robot.run(2), told, "{at}");
     }
-    // A touch of one cycle is a graze: the foot goes on down.
+    // A touch of one cycle is a graze: the foot keeps going down.
     let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
     robot.joint(B6).stroke_mm = mm(125.0);
     robot.run(1);
@@ -461,7 +461,7 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
         150.0,
         "and goes on when it is free"
     );
-    // One that goes on to touch has met something.
+    // A foot that continues and touches has met something.
     robot.touch([true; 2]);
     assert_eq!(robot.run(10), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
@@ -610,7 +610,7 @@ fn b9_three_swings_in_a_row_that_run_against_something_are_stuck_and_then_two() 
             let reaches = leg == LegPlan::Reach;
             robot.touch([!reaches, true]);
             robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(if bumps { 0 } else { 100 });
-            // Wheels and legs go on as if nothing had happened.
+            // Wheels and legs continue as if nothing had happened.
             for wheel in &mut robot.senses.wheels {
                 wheel.travel_um += way_um;
             }

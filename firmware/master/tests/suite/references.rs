@@ -156,7 +156,7 @@ fn the_lead_of_a_pulling_leg_goes_by_half_a_millimetre_in_a_cycle() {
         before = now;
     }
     assert_eq!(before, [130.0; 2], "and pulls the other way");
-    // Its walk ends, and it stands in the last references.
+    // Its walk ends, and it holds the last references.
     let mut robot = pulls();
     robot.setpoints.walk = None;
     robot.setpoints.phase = Phase::Done;
@@ -247,7 +247,7 @@ fn a_nailed_foot_that_is_stopped_above_the_ground_it_expects_lands_within_60_ms(
     robot.joint(B6[0]).stroke_mm = mm(70.0);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(200);
     robot.run(15);
-    // Nails go in: it touches, and goes on.
+    // Nails go in: it touches, and continues down.
     robot.touch([true; 2]);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(10);
     robot.run(30);

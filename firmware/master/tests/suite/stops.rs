@@ -1,4 +1,4 @@
-//! Causes that stop the robot, how fast it stops, and how it can go on.
+//! Causes that stop the robot, how fast it stops, and how it can continue.
 
 use crate::common::{CYCLE_US, FakeNode, TestRig, emit};
 use proptest::prelude::*;

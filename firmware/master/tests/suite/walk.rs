@@ -297,7 +297,7 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
     // The standing foot is still inside its reach.
     let [x, _] = robot.foot_m(Side::Right);
     assert!(x > 0.012, "{x}");
-    // It goes on when there is ground again.
+    // It continues when there is ground again.
     robot.ground[0] = 0.0;
     robot.run(3.0);
     assert!(robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64() > 50.0);

@@ -22,7 +22,7 @@ pub struct Seen {
     pub board: Action,
 }
 
-/// A running plant, with its board if there is one. A clone goes on on its own.
+/// A running plant, with its board if there is one. A clone continues on its own.
 #[derive(Clone)]
 pub(crate) enum Simulation {
     /// Only the plant.

@@ -312,7 +312,7 @@ impl Unit {
         Ok(())
     }
 
-    /// Everything that decides how it goes on.
+    /// The complete state that determines how it continues.
     pub(crate) fn state(&self) -> State {
         self.state.clone()
     }

@@ -23,7 +23,7 @@ pub struct Url {
     pub(super) host: String,
     /// Certificate of the server; without one it is reached by plain HTTP.
     certificate: Option<Fingerprint>,
-    /// It is to be reached over TLS.
+    /// The server uses TLS.
     tls: bool,
     /// Deadline of the expected answers.
     until: Option<Instant>,

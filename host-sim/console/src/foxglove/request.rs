@@ -98,12 +98,12 @@ pub struct Subscription {
     pub channel_id: u32,
 }
 
-/// A parameter that is to be set.
+/// A parameter to set.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Setting {
     /// Name.
     pub name: String,
-    /// Value; none: it is to be removed.
+    /// Value; none removes it.
     pub value: Option<Value>,
 }
 

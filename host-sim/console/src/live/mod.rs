@@ -190,7 +190,7 @@ pub(crate) enum Report {
         /// Raw value.
         raw: i32,
     },
-    /// The simulation cannot go on.
+    /// The simulation cannot continue.
     Failed(Box<SimError>),
 }
 

@@ -40,7 +40,7 @@ const BLIND: Duration = Duration::from_micros(OPERATOR_TIMEOUT_US as u64);
 /// Longest sleep, so that a stop is heard however slow the clock runs.
 const NAP: Duration = Duration::from_millis(5);
 
-/// Time of a clock that goes on while the computer is suspended, where the system has one.
+/// Time of a clock that runs while the computer is suspended, where the system has one.
 fn awake() -> Duration {
     #[cfg(target_os = "linux")]
     {
@@ -176,7 +176,7 @@ struct Loop {
     /// The computer was suspended under the operator, who is no longer heard: the master ends the lease, and
     /// all axes hold.
     deaf: bool,
-    /// The simulation cannot go on.
+    /// The simulation cannot continue.
     failed: bool,
 }
 
@@ -444,7 +444,7 @@ impl Loop {
 
     fn answer(&mut self, id: u32, answer: Answer) {
         let time_us = self.now_us();
-        // If the hub does not listen, the answer is lost; the robot goes on.
+        // If the hub does not listen, the answer is lost; the robot continues.
         let _ = self.reports.push(Report::Answer {
             id,
             time_us,

@@ -153,7 +153,7 @@ fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     let over = AtomicBool::new(false);
     let begin = Instant::now();
     let told = std::thread::scope(|threads| {
-        // It goes on driving, and hears of them.
+        // It continues to drive, and is notified of them.
         let hears = threads.spawn(|| {
             let mut told = 0;
             while !over.load(Ordering::Relaxed) {
@@ -247,7 +247,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     assert!(state["control"].is_null(), "{state}");
 }
 
-/// Everybody sees who has stopped the robot, and no longer once it is over.
+/// All clients see who has stopped the robot, until the stop is over.
 #[test]
 fn a_stop_has_a_name() {
     let rig = TestRig::new();
@@ -597,7 +597,7 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
     // It asks again before it is gone: that gains nothing.
     assert_eq!(refusal(&mut driver, "TakeControl", &nothing), "revoked");
-    // It goes on sending beats all the while.
+    // It keeps sending beats all the while.
     let state = until_driven(&rig, &mut driver, |state| state["control"].is_null());
     assert_eq!(
         (&state["hold"], &state["armed"]),

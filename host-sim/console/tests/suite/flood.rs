@@ -1,4 +1,4 @@
-//! Clients that ask without end, with a key or without: they cost others neither time nor memory.
+//! Clients that send endless requests, with a key or without: they cost others neither time nor memory.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
@@ -134,7 +134,7 @@ fn who_has_no_key_asks_once_on_a_connection() {
         let answers = String::from_utf8_lossy(&answers);
         assert_eq!(answers.matches("HTTP/1.1 4").count(), 1, "{answers}");
     }
-    // A client with a key goes on asking.
+    // A client with a key keeps sending requests.
     let key = rig.keys.view.to_hex();
     let mut stream = TcpStream::connect(address).expect("connected");
     let wait = stream.set_read_timeout(Some(Duration::from_secs(1)));

@@ -265,7 +265,7 @@ impl HeightMap {
         }
     }
 
-    /// The four rows of four values around a cell at the map's edge, which goes on level.
+    /// The four rows of four values around a cell at the map's edge, which continues level.
     #[cold]
     fn rows_at_edge(&self, i: usize, j: usize) -> [[f64; 4]; 4] {
         let [columns, rows] = [(i, self.columns), (j, self.rows)].map(|(cell, count)| {

@@ -200,7 +200,7 @@ impl<B: Board> AxisSim<B> {
         Ok((action, row))
     }
 
-    /// The same with an announced reference; shows row and board before the plant goes on.
+    /// The same with an announced reference; shows row and board before the plant continues.
     fn tick_with(
         &mut self,
         reference_m: f64,

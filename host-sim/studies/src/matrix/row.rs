@@ -63,7 +63,7 @@ pub struct RowFault {
 pub enum Expect {
     /// Every axis is stopped and stays so.
     Stop(Stop),
-    /// The motion goes on.
+    /// The motion continues.
     GoesOn {
         /// Largest deviation of a stroke from the same run without the fault, mm.
         deviation_mm: f64,
@@ -187,7 +187,7 @@ pub struct Row {
     pub connection: Option<Connection>,
     /// When.
     pub phase: Phase,
-    /// How long the run goes on after the instant, s.
+    /// How long the run continues after the instant, s.
     pub after_s: f64,
     /// The robot.
     pub variant: Variant,
@@ -217,7 +217,7 @@ impl Row {
     }
 }
 
-/// A run goes on for this long after the instant, s.
+/// A run continues for this long after the instant, s.
 const AFTER_S: f64 = 2.0;
 
 /// A permanent fault.

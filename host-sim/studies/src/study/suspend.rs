@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGCONT, SIGTSTP};
 use signal_hook::{flag, low_level};
 
-/// Whether the program is to be suspended, or was.
+/// Whether the program should suspend, or did.
 #[derive(Debug)]
 pub struct Suspend {
     asked: Arc<AtomicBool>,

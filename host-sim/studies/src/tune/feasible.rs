@@ -40,7 +40,7 @@ fn wrong(config: &AxisConfig) -> Vec<Unfit> {
         });
     }
     let most_n = left_n / MARGIN;
-    // If no force is left, there is none for a load.
+    // Without spare force there is none for a load.
     if left_n > 0.0 && p.load_n.abs() > most_n * (1.0 + 1e-9) {
         wrong.push(Unfit {
             fields: vec![

@@ -18,7 +18,7 @@ pub struct HoldWords {
 }
 
 impl HoldWords {
-    /// What to do until the robot can go on.
+    /// What to do until the robot can continue.
     #[must_use]
     pub fn way_on(&self) -> String {
         match self.remedy {

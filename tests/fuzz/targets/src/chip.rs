@@ -58,7 +58,7 @@ pub(crate) struct Chip {
     pub(crate) voided: [u32; PAGES],
 }
 
-/// A separate generator: its draws depend on nothing else.
+/// A separate generator, independent of everything else.
 pub(crate) const fn draw(state: u32) -> u32 {
     // Numerical Recipes' constants; the high bits are the good ones.
     let next = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

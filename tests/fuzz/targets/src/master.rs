@@ -68,7 +68,7 @@ enum Action {
     Noise(Vec<u8>),
     /// A command.
     Command(AnyCommand),
-    /// Layer 1 stops or goes on.
+    /// Layer 1 stops or continues.
     Layer1(bool),
 }
 

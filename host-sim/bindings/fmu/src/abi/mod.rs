@@ -327,7 +327,7 @@ unsafe fn values<'a, T>(values: *const T, count: usize) -> &'a [T] {
 /// The importer's place for values.
 ///
 /// # Safety
-/// As [`values`], and nothing else refers to them.
+/// As [`values`], and with no other references to them.
 unsafe fn places<'a, T>(values: *mut T, count: usize) -> &'a mut [T] {
     if values.is_null() || count == 0 {
         &mut []
