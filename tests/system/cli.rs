@@ -659,7 +659,7 @@ fn texts_of_a_file_are_quoted_wherever_they_go() {
     assert!(!urdf.contains("<b onload"));
 }
 
-/// What no page and no other file can show is refused where it is read: in a text, a source or a name.
+/// Text that no page and no other file can show is refused where it is read: in a text, a source or a name.
 #[test]
 fn control_characters_in_a_file_are_refused_with_their_place() {
     let dir = folder();

@@ -182,9 +182,8 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
     }
 }
 
-/// What a reset of joint 2 at `t` must lead to, once its outputs were off `commanded`
-/// seconds later: valves shut, one reset, all axes stopped. Gives the time until the
-/// valves are shut.
+/// Required effects of a reset of joint 2 at `t`, with its outputs off `commanded` seconds later: valves
+/// shut, one reset, all axes stopped. Returns the time until the valves are shut.
 fn assert_shut_after_one_reset(
     what: &str,
     recording: &Recording,

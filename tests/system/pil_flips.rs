@@ -426,9 +426,9 @@ const TURNED: u64 = 60;
 /// Counts of each sample until then.
 const COUNTS: i32 = 5_000;
 
-/// What a wheel says of its position once a flip of bit 17 of this word of its
-/// application has been found and its fault was cleared: its count less the true one.
-/// `None` without an answer: it was reset, or is no longer where it can be reached.
+/// Error of a wheel's reported position once a flip of bit 17 of this word of its application has been found
+/// and its fault cleared: its count less the true one. `None` without an answer: it was reset, or can no
+/// longer be reached.
 fn error_after_clear(word: u32) -> Option<i32> {
     let address = Address::wheel(WHEEL_ADDRESS).expect("a wheel");
     let mut board = Board::new(image("wheel").expect("an image"));

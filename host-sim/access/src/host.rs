@@ -59,7 +59,7 @@ pub const STEP_MAX: u32 = 1_000;
 pub const HOLD_S: (u32, u32) = (2, 600);
 /// Slowest and fastest pace.
 pub const SPEED: (f64, f64) = (0.1, 10.0);
-/// Fastest pace at which somebody may be in control.
+/// Fastest pace at which a client may be in control.
 pub const SPEED_OF_CONTROL: f64 = 2.0;
 
 const FAULT: HostArgument = HostArgument {

@@ -1,4 +1,4 @@
-//! Opens files that may come from anybody.
+//! Opens files from untrusted sources.
 
 use std::fs::{self, File};
 use std::path::Path;

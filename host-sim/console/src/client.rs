@@ -221,7 +221,7 @@ impl Client {
         self.key.seal(frame.to_string().as_bytes())
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     ///
     /// # Errors
     /// [`ConsoleError::Link`] if the connection has ended.

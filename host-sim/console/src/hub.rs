@@ -387,7 +387,7 @@ impl Hub {
         Some(confirmed.ok()?.ok()?.now_us)
     }
 
-    /// The state, as sent to everybody.
+    /// The state, as sent to all clients.
     pub(crate) fn state(&self) -> String {
         self.state_of(&self.inner())
     }
@@ -438,7 +438,7 @@ impl Hub {
         self.inner().active_faults()
     }
 
-    /// Empties the rings, and sends everybody what is due.
+    /// Empties the rings, and sends all clients the due messages.
     pub(crate) fn turn(&self) {
         let now = Instant::now();
         let mut inner = self.inner();

@@ -18,7 +18,7 @@ pub const VIEW_FILE: &str = "view.key";
 
 /// Remedy for a server's own files.
 const MAKE: &str = "make new keys: wheeleg serve --new-key; clients need them then";
-/// Remedy for a client: new keys would lock out everybody.
+/// Remedy for a client: new keys would lock out all others.
 const GIVE: &str = "give the file control.key or view.key; `wheeleg serve` prints their paths";
 
 /// Digits of a key in its file.

@@ -46,7 +46,7 @@ use crate::tls::{Certificate, Files, Fingerprint};
 pub const ADDRESS: &str = "127.0.0.1:7420";
 /// Threads for clients that have proved a key at the console; the robot has its own.
 const SESSIONS: usize = 2;
-/// Threads for everybody else's requests. A flood of them gets one core at most.
+/// Threads for all other requests. A flood of them gets one core at most.
 const REQUESTS: usize = 1;
 /// How often to look for a port that is free at all addresses.
 const PORTS: usize = 16;

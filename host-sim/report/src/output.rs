@@ -156,7 +156,7 @@ impl Drop for Folder {
     }
 }
 
-/// Removes folders as far as they are empty, the innermost first.
+/// Removes empty folders, the innermost first.
 fn remove_empty(folders: &[PathBuf]) {
     for folder in folders {
         // A folder with contents stays.
@@ -176,7 +176,7 @@ fn lock(path: &Path) -> Result<File, ReportError> {
         )))
     };
     let open = || {
-        // A link may lead to somebody else's file, and opening a pipe would block.
+        // A link may lead to another user's file, and opening a pipe would block.
         if let Ok(about) = std::fs::symlink_metadata(path)
             && !about.is_file()
         {
@@ -236,7 +236,7 @@ fn holder(lock: &mut File) -> String {
     }
 }
 
-/// Locks a file for this process alone; false if another holds it.
+/// Locks a file for this process only; false if another holds it.
 #[cfg(unix)]
 fn take(file: &File) -> std::io::Result<bool> {
     use rustix::fs::{FlockOperation, flock};

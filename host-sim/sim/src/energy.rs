@@ -20,7 +20,7 @@ pub struct EnergyBalance {
 }
 
 impl EnergyBalance {
-    /// Energy gained without any work \[J\]: 0 but for the error of the integration.
+    /// Energy gained without any work \[J\]: 0 except for the error of the integration.
     #[must_use]
     pub fn residual_j(&self) -> f64 {
         self.gained_j - self.work_j

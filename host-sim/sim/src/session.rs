@@ -282,7 +282,7 @@ impl Session {
         &mut self.world
     }
 
-    /// Shows every joint board and its cylinder as they are after a tick.
+    /// Shows every joint board and its cylinder after a tick.
     pub(crate) fn show(&self, watcher: &mut dyn FnMut(&JointProbe<'_>)) {
         let world = &self.world;
         for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)

@@ -445,7 +445,7 @@ mod tests {
             (logged.kind(), logged.fault_code()),
             (EventKind::Log, Some(1))
         );
-        // A record that somebody should act on is more than a log record.
+        // A record that requires action is more than a log record.
         let late = entry(LogEvent::PrechargeLate, 0);
         assert_eq!(late.kind(), EventKind::Fault);
         assert_eq!(

@@ -40,7 +40,7 @@ const FREE: u64 = 64 << 20;
 /// 10,000 times: a small file would be read for hours.
 const MOST: u64 = 500;
 
-/// How much a log swells as it is read.
+/// How much a log grows when decompressed.
 #[derive(Debug, Default)]
 pub(crate) struct Swelling {
     read: u64,

@@ -267,7 +267,7 @@ fn another_board_than_the_commissioned_one_bars_arming_and_both_ids_are_named() 
     for told in [foreign(3, 4, Some(4)), foreign(4, 0xEE, None)] {
         assert!(rig.saw(|event| *event == told), "{told:?}");
     }
-    // Accepted as they are, they arm.
+    // Once accepted, they arm.
     let ticket = rig.submit(Command::Commission);
     rig.run(2);
     assert!(rig.done(ticket), "{:?}", rig.refusal(ticket));

@@ -75,7 +75,7 @@ const KINDS: [(&str, Kind); 7] = [
 ];
 
 impl Kind {
-    /// Whether such a part alone gives ground everywhere.
+    /// Whether such a part gives ground everywhere by itself.
     fn is_everywhere(self) -> bool {
         matches!(self, Self::Plane | Self::HeightMap)
     }

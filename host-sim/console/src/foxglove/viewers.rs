@@ -100,7 +100,7 @@ impl Viewers {
         self.ask_for_contacts();
     }
 
-    /// Closes everybody.
+    /// Closes all viewers.
     pub(crate) fn close(&self, why: crate::close::Close) {
         for viewer in self.all.values() {
             viewer.outbox.close(why);
@@ -232,7 +232,7 @@ impl Viewers {
         }
     }
 
-    /// Sends everybody the time.
+    /// Sends all viewers the time.
     pub(crate) fn tell_time(&self, t_ns: u64) {
         for viewer in self.all.values() {
             viewer.outbox.time(t_ns);

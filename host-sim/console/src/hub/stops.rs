@@ -1,4 +1,4 @@
-//! Who has stopped the robot, as shown to everybody.
+//! Who has stopped the robot, as shown to all clients.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -45,7 +45,7 @@ impl AskedStops {
     }
 }
 
-/// Who asks for a stop, as shown to everybody.
+/// Sender of a stop, as shown to all clients.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "via", rename_all = "snake_case")]
 enum Stopper {

@@ -215,7 +215,7 @@ pub(crate) enum Answer {
     Revoked,
     /// The master is dead.
     NoMaster,
-    /// The clock runs too fast for anybody to be in control.
+    /// The clock runs too fast for a client to be in control.
     TooFast,
     /// The serial adapter is too slow for the bus.
     SlowAdapter(Box<SlowAdapter>),

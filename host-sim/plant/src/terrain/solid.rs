@@ -101,7 +101,7 @@ impl Solid {
         }
     }
 
-    /// Its corners seen from above, in turn \[m\].
+    /// Its corners from above, in order \[m\].
     #[must_use]
     pub fn outline_m(&self) -> [[f64; 2]; 4] {
         // Faces 1 to 4 are the walls: front, rear, left, right.

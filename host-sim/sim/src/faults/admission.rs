@@ -183,7 +183,7 @@ pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimEr
     }
 }
 
-/// A fault that would leave this robot as it is, is refused.
+/// Refuses a fault that would not change this robot.
 fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError> {
     let plant = &robot.plant;
     let (what, unit, sound) = match fault.kind {

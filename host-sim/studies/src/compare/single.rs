@@ -1,4 +1,4 @@
-//! One case alone, recorded tick by tick.
+//! A single case, recorded tick by tick.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::study::{Finished, Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 use wheeleg_report::results::{CSV, FIGURES, SUMMARY};
 
-/// A case that was played alone.
+/// A case that was run on its own.
 #[derive(Debug, Clone)]
 pub struct Single {
     /// Its row.

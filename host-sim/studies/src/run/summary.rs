@@ -138,7 +138,7 @@ fn messages(recording: &Recording) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     // Each reported refusal, with the place of its line, and how often it came.
     let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
-    // What boards reported, with its time, the place of its line, and the boards.
+    // Reports of boards: time, place of the line, and the boards.
     let mut shared: Vec<(Cause, u64, usize, Vec<Address>)> = Vec::new();
     let mut more = 0_u64;
     for event in &recording.events {

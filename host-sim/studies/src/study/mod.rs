@@ -178,7 +178,7 @@ impl Job {
         Ok(subfolder(self.folder(), name)?)
     }
 
-    /// Writes a text file; returns its path. Recreates a folder that somebody has removed.
+    /// Writes a text file; returns its path. Recreates a folder that was removed.
     ///
     /// # Errors
     /// [`StudyError::Report`] if it cannot be written.
@@ -299,7 +299,7 @@ impl Job {
         if !drawn.is_empty() {
             self.keep(self.save_figures(&drawn));
         }
-        // It is missing if somebody has removed the folder meanwhile; there is no report without it.
+        // It is missing if the folder was removed meanwhile; there is no report without it.
         if saved.is_some_and(|path| !path.exists()) {
             self.keep(self.save(SUMMARY, &summary));
         }

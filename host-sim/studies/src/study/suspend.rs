@@ -41,7 +41,7 @@ impl Suspend {
         self.continued.swap(false, Ordering::SeqCst)
     }
 
-    /// Stops this program until somebody continues it.
+    /// Stops this program until it is continued.
     ///
     /// # Errors
     /// The operating system's error if it cannot be stopped.

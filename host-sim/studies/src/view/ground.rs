@@ -47,7 +47,7 @@ struct Pose {
     orientation: Turn,
 }
 
-/// About z alone.
+/// Only about z.
 #[derive(Deserialize)]
 struct Turn {
     z: f64,
@@ -132,7 +132,7 @@ impl Entity {
                 heading,
             ]
         });
-        // A log may come from anybody.
+        // A log may come from anyone.
         seen.filter(|rock| rock.iter().all(|v| v.is_finite()))
             .collect()
     }
@@ -146,7 +146,7 @@ impl Entity {
                 [mm(corner.x), mm(corner.y)]
             })
         });
-        // A log may come from anybody.
+        // A log may come from anyone.
         let sound = |top: &[[f64; 2]; 4]| top.as_flattened().iter().all(|v| v.is_finite());
         tops.filter(sound).take(MOST_ROCKS).collect()
     }

@@ -114,7 +114,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         .chain(options.robot.as_deref().map(Path::new))
         .collect();
     ensure_no_input(&page, &reads)?;
-    // A log's own page is remade; somebody's own file is kept.
+    // A log's own page is remade; a user's file is kept.
     if options.out.is_none() && page::is_ours(&page) {
         let _ = std::fs::remove_file(&page);
     }

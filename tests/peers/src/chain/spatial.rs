@@ -258,7 +258,7 @@ impl Wrench {
         force: Vec3::ZERO,
     };
 
-    /// What a joint about (TURNS) or along axis A feels of it.
+    /// Its component at a joint about (TURNS) or along axis A.
     #[inline(always)]
     pub fn at<const A: usize, const TURNS: bool>(&self) -> Num {
         if TURNS {

@@ -97,7 +97,7 @@ impl Base {
         )
     }
 
-    /// A body fixed to the chassis but for columns of its own.
+    /// A body fixed to the chassis, with additional columns of its own.
     fn body(
         &self,
         velocity: &Velocity,
