@@ -63,7 +63,7 @@ fn output(command: &mut Command) -> Output {
     command.output().expect("started")
 }
 
-/// The output, its wrapped lines joined.
+/// What was said, its wrapped lines joined.
 fn text(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     text.replace("\n  │ ", " ")
