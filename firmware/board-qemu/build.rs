@@ -1,5 +1,4 @@
-//! Gives the images their own linker script, see `mps2-an386.ld`, and the digest of what
-//! they are made of.
+//! Gives the images their own linker script, see `mps2-an386.ld`, and the digest of their sources.
 
 use std::env;
 use std::path::PathBuf;

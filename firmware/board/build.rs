@@ -1,5 +1,5 @@
-//! Hands the linker its script and the memory map in the workspace's root, and the images
-//! the digest of what they are made of.
+//! Gives the linker its script and the memory map in the workspace's root, and the images the digest of their
+//! sources.
 
 use std::path::PathBuf;
 use std::{env, fs};

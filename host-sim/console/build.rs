@@ -1,4 +1,4 @@
-//! The page is built in: a change of it builds this crate anew.
+//! The page is built in: if it changes, this crate is rebuilt.
 
 fn main() {
     println!("cargo:rerun-if-changed=../report/page");

@@ -1,6 +1,5 @@
-//! Digests of the firmware sources beside this program: images of other sources are told
-//! from those of the same. And the archive of interface definitions, of which the compiler
-//! would not see that a file comes anew.
+//! Digests of the firmware sources beside this program, which tell images of other sources from those of the
+//! same. And the archive of interface definitions: the compiler would not notice a new file in it.
 
 use std::env;
 use std::path::PathBuf;

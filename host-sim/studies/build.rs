@@ -1,4 +1,4 @@
-//! Digest of the sources of `firmware/control`: the root of the randomness that judges its laws.
+//! Digest of the sources of `firmware/control`: the root of all randomness that judges its laws.
 
 use std::env;
 use std::path::PathBuf;

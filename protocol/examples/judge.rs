@@ -1,8 +1,7 @@
 //! The Rust side of `conformance/agree.py`.
 //!
-//! `judge check` reads streams as hex, one a line, and writes what the decoder
-//! makes of each; `judge emit COUNT` writes frames made from values, with what
-//! the values are.
+//! `judge check` reads streams as hex, one per line, and writes the decoder's result for each; `judge emit
+//! COUNT` writes frames made from values, with those values.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -42,8 +41,8 @@ fn check(out: &mut impl Write) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Messages like those of the vectors, with bytes of their payloads changed as
-/// long as they are sound; then emitted from the value.
+/// Messages like those of the vectors, with bytes of their payloads changed as long as they stay sound; then
+/// emitted from the value.
 fn emit(count: usize, out: &mut impl Write) -> std::io::Result<()> {
     let seeds = vectors().accepted;
     let mut state = 2003_u64;

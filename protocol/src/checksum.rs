@@ -43,7 +43,7 @@ mod narrow {
     /// The polynomial 0x1EDC6F41, reflected.
     const POLYNOMIAL: u32 = 0x82F6_3B78;
 
-    /// What the lower four bits of the sum do to the rest of it.
+    /// Effect of the lower four bits of the sum on the rest of it.
     const TABLE: [u32; 16] = {
         let mut table = [0; 16];
         let mut rest: &mut [u32] = &mut table;

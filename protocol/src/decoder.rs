@@ -76,8 +76,8 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder that has seen nothing. The first bytes of a stream may belong to
-    /// a frame whose start was missed; they are discarded like any broken frame.
+    /// A decoder that has seen nothing. The first bytes of a stream may belong to a frame whose start was
+    /// missed; they are discarded like any broken frame.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -99,21 +99,20 @@ impl Decoder {
         }
     }
 
-    /// Takes one byte; gives a frame or an error at the delimiter behind it.
+    /// Takes one byte; returns a frame or an error at the delimiter behind it.
     ///
     /// Delimiters without anything between them are idle line and give `None`.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         self.next(&mut [byte].as_slice())
     }
 
-    /// Takes bytes from the front of `bytes`, which is shortened by what was taken, up
-    /// to the end of the next frame or error; `None` when they are used up. Any
-    /// chunking gives the same.
+    /// Takes bytes from the front of `bytes`, which is shortened by them, up to the end of the next frame or
+    /// error; `None` when they are used up. Any chunking gives the same result.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Result<Frame<'_>, FrameError>> {
         // Kept in registers: on a board this loop takes every byte of the line.
         let (mut len, mut owed, mut started) = (self.len, self.owed, self.started);
         if !started {
-            // Between two frames nothing is owed. A flipped bit could say so, and every
+            // Between two frames no byte is owed. A flipped bit in `owed` could say otherwise, and every
             // delimiter would be taken for idle line from then on.
             (len, owed) = (0, 0);
         }
@@ -130,8 +129,8 @@ impl Decoder {
                 owed = owed.saturating_sub(1);
                 byte
             } else {
-                // A code byte. The zero it stands for belongs between two blocks. (Only
-                // a block of 254 bytes has none, and that is longer than any frame.)
+                // A code byte. The zero that it represents belongs between two blocks. (Only a block of 254
+                // bytes has none, and that is longer than any frame.)
                 owed = usize::from(byte).saturating_sub(1);
                 if !started {
                     started = true;
@@ -183,7 +182,7 @@ impl Decoder {
         self.discarding = false;
     }
 
-    /// The frame, or what is wrong with it, at the delimiter behind it.
+    /// The frame, or its error, at the delimiter behind it.
     fn finish(&mut self) -> Result<Frame<'_>, FrameError> {
         let (len, owed, discarding) = (self.len, self.owed, self.discarding);
         self.reset();

@@ -1,18 +1,16 @@
 //! Permanent fault and limit numbers, with the sentence and the remedy of each.
 //!
-//! Numbers are wire values and are never used again for something else:
-//! 1–31 transport, 32–95 hard faults of a board, 96–127 limit indications, 128–159
-//! warnings of the master, which never travel on the bus.
-//! Transport and hard faults are latched until an explicit clear and own one
-//! bit each of the 16-bit set in every cyclic reply. Limits are indications
-//! that come and go: they say which limit shaped the output in this tick, and
-//! never stop anything.
+//! Numbers are wire values and are never reused: 1–31 transport, 32–95 hard faults of a board, 96–127 limit
+//! indications, 128–159 warnings of the master, which never travel on the bus. Transport and hard faults are
+//! latched until an explicit clear and have one bit each in the 16-bit set of every cyclic reply. Limits are
+//! indications that come and go: they say which limit shaped the output in this tick, and never stop
+//! anything.
 
 use crate::le;
 use crate::wire::{UnknownValue, WireSize};
 use serde::{Deserialize, Serialize};
 
-/// What a number means by its range.
+/// Class of a number, by its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultClass {
     /// 1–31: the link. Latched.

@@ -45,8 +45,8 @@ pub const MAX_PAYLOAD: usize = MAX_DECODED - HEADER_LEN - CRC_LEN;
 /// The byte between frames.
 pub const DELIMITER: u8 = 0;
 
-// One COBS block holds 254 bytes: the overhead is one byte for every frame, and
-// the encoded length depends on the message type alone, never on the content.
+// One COBS block holds 254 bytes: the overhead is one byte for every frame, and the encoded length depends
+// only on the message type, never on the content.
 const _: () = assert!(MAX_DECODED < 254);
 
 /// Bytes on the line of a frame with this payload length, delimiters included.
@@ -55,7 +55,7 @@ pub const fn encoded_len(payload_len: usize) -> usize {
     payload_len.saturating_add(HEADER_LEN + CRC_LEN + 3)
 }
 
-/// What the header says, without the length.
+/// Contents of the header, without the length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Protocol version of the sender.
@@ -72,9 +72,8 @@ pub struct Header {
 
 /// A frame that passed every check of this layer.
 ///
-/// Holds no other value than a correct one: known version (or one of the
-/// version-independent messages), existing addresses, exact length, right CRC.
-/// The payload still has to pass [`crate::Message::parse`].
+/// A value of this type is always correct: known version (or one of the version-independent messages),
+/// existing addresses, exact length, right CRC. The payload still has to pass [`crate::Message::parse`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// The header.
@@ -205,9 +204,8 @@ fn seal(head: &[u8; HEADER_LEN], payload: &[u8], out: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// COBS in place: every zero becomes the code of the block behind it; gives the
-/// code of the first block. The frame is shorter than one COBS block (const
-/// assertion above), so no code is added in between.
+/// COBS in place: every zero becomes the code of the block behind it; returns the code of the first block.
+/// The frame is shorter than one COBS block (const assertion above), so no code is added in between.
 fn cobs_in_place(frame: &mut [u8]) -> u8 {
     let mut code = 1_u8;
     for byte in frame.iter_mut().rev() {

@@ -1,7 +1,7 @@
 //! Integers of exact size, low byte first: `#[serde(with = "le")]`.
 //!
-//! The same bytes as of `postcard::fixint::le`, whose code a board would hold once for each
-//! size, with its bytes one after the other. This is one loop for all.
+//! Gives the same bytes as `postcard::fixint::le`, whose code a board would hold once for each size, with its
+//! bytes one after the other. Here one loop serves all sizes.
 
 use core::fmt;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};

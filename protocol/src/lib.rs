@@ -6,10 +6,8 @@
 //!
 //! # Never-panic contract
 //!
-//! No public function of this crate panics, allocates, recurses or loops more
-//! often than its input is long, whatever the input. Everything that can go
-//! wrong is a value: [`FrameError`], [`ParseError`], [`EncodeError`],
-//! [`NackReason`].
+//! No public function of this crate panics, allocates, recurses or loops more often than its input is long,
+//! for any input. Every error is a value: [`FrameError`], [`ParseError`], [`EncodeError`], [`NackReason`].
 //!
 //! ```
 //! use wheeleg_protocol::{Address, Decoder, Disarm, Envelope, MAX_ENCODED, Message};
@@ -38,7 +36,7 @@
 //! * **delimiter**: the byte 0: COBS leaves no other zero on the line
 //! * **COBS**: consistent overhead byte stuffing: takes the zeros out of a frame
 //! * **SYNC**: the frame that begins a bus cycle, with a slot for each node
-//! * **acyclic**: what is sent after the slots: requests and their answers
+//! * **acyclic**: messages after the slots: requests and their answers
 //! * **Ack, Nack**: done; refused, with a reason
 //! * **interface hash**: hash of this definition; nodes of another one are refused
 #![no_std]

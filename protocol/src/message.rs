@@ -25,7 +25,7 @@ mod envelope;
 pub use codec::ParseError;
 pub use envelope::Envelope;
 
-/// What a message type is for.
+/// Purpose of a message type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     /// Part of every bus cycle; never acknowledged.
@@ -68,7 +68,7 @@ macro_rules! messages {
                 match self { $( Self::$name => stringify!($name) ),* }
             }
 
-            /// What it is for.
+            /// Its purpose.
             #[must_use]
             pub const fn class(self) -> Class {
                 match self { $( Self::$name => Class::$class ),* }
@@ -130,8 +130,8 @@ macro_rules! messages {
                 match self { $( Self::$name(_) => MessageType::$name ),* }
             }
 
-            /// Whether both are the same request, field by field; what is no request is
-            /// none. A board compares nothing else, and needs no code for more.
+            /// Whether both are the same request, field by field; false for other messages. A board compares
+            /// nothing else, and needs no code for more.
             pub(crate) fn is_same_request(&self, other: &Self) -> bool {
                 match (self, other) {
                     $( (Self::$name(own), Self::$name(other)) => {
@@ -142,7 +142,7 @@ macro_rules! messages {
                 }
             }
 
-            /// `FROM_NODE`: of a message that a node sends alone.
+            /// `FROM_NODE`: only for messages that a node sends.
             fn write_payload<'a, const FROM_NODE: bool>(
                 &self,
                 out: &'a mut [u8],
@@ -157,8 +157,8 @@ macro_rules! messages {
                 )* }
             }
 
-            /// `TO_NODE`: of a message that may go from the master to a node alone, so
-            /// that no other needs a place in the image of a board.
+            /// `TO_NODE`: only for messages that may go from the master to a node, so that the image of a
+            /// board needs no code for others.
             fn read_payload<const TO_NODE: bool>(
                 message_type: MessageType,
                 payload: &[u8],
@@ -358,7 +358,7 @@ messages! {
 }
 
 impl LinkRecord {
-    /// Frames that were not taken for what was wrong with them, of every kind.
+    /// Frames rejected for an error, of every kind.
     #[must_use]
     pub fn errors(&self) -> u32 {
         [

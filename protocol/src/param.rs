@@ -1,19 +1,17 @@
 //! Parameters of the boards: one table for numbers, names, units, formats,
 //! limits and defaults.
 //!
-//! Every value travels as a raw `i32` in the format of its row. Numbers are
-//! permanent: 0x0101–0x01FF joint boards, 0x0201–0x02FF wheel boards. Names
-//! and defaults of the control parameters are those of the control crate's
-//! `JointGains`, their ranges lie within those of it (tests of the node crate
-//! hold both); the board checks a set value against `min..=max` here and against
-//! the relations between parameters there.
+//! Every value travels as a raw `i32` in the format of its row. Numbers are permanent: 0x0101–0x01FF joint
+//! boards, 0x0201–0x02FF wheel boards. Names and defaults of the control parameters are those of the control
+//! crate's `JointGains`, and their ranges lie within those there (the node crate tests both); the board
+//! checks a set value against `min..=max` here and against the relations between parameters there.
 //!
 //! Bounds and defaults are written in the unit of the row, as decimal text, and
 //! converted to raw numbers at compile time, so the table reads like a data sheet.
 
 use crate::fields::BoardKind;
 
-/// Number format of a parameter: what its raw `i32` counts.
+/// Number format of a parameter: the unit of its raw `i32`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
     /// Whole numbers.
@@ -56,8 +54,8 @@ impl Format {
         }
     }
 
-    /// The raw number nearest to a decimal text such as `-0.02`, ties away from
-    /// zero; `None` if it is no number or does not fit an `i32`.
+    /// The raw number nearest to a decimal text such as `-0.02`, ties away from zero; `None` if it is not a
+    /// number or does not fit an `i32`.
     #[must_use]
     pub const fn parse(self, text: &str) -> Option<i32> {
         decimal_to_raw(text, self.fraction_bits())
@@ -137,7 +135,7 @@ pub struct ParamInfo {
     pub persistent: bool,
     /// Whether it can be set only while disarmed.
     pub disarmed_only: bool,
-    /// What it does.
+    /// Its meaning.
     pub text: &'static str,
 }
 
@@ -149,8 +147,8 @@ impl ParamInfo {
     }
 }
 
-/// What a board needs of a row to keep its values: the table without its texts,
-/// a third of the flash.
+/// The part of a row that a board needs to keep its values: the table without its texts, a third of the
+/// flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParamLimits {
     /// Permanent number on the wire.
@@ -183,8 +181,8 @@ impl ParamLimits {
     }
 }
 
-/// Sum over the raw values of a board's parameters, in the order of its table, by which sets are
-/// told apart (SPEC.md, Parameter sets): any single value that differs changes it.
+/// Sum over the raw values of a board's parameters, in the order of its table, which identifies a set
+/// (SPEC.md, Parameter sets): any single different value changes it.
 #[must_use]
 pub fn parameter_sum(values: &[i32]) -> u32 {
     // Odd multiplier (Knuth, 2^32 / golden ratio): a bijection of the sum before.
@@ -194,7 +192,7 @@ pub fn parameter_sum(values: &[i32]) -> u32 {
     })
 }
 
-/// The limits of all rows. Evaluated at compile time alone.
+/// The limits of all rows. Evaluated only at compile time.
 #[allow(clippy::indexing_slicing)]
 const fn limits<const N: usize>(table: &'static [ParamInfo]) -> [ParamLimits; N] {
     let mut limits = [ParamLimits::of(&table[0]); N];
@@ -214,7 +212,7 @@ const fn raw(format: Format, text: &str) -> i32 {
     }
 }
 
-/// Index and row of a number. Evaluated at compile time alone.
+/// Index and row of a number. Evaluated only at compile time.
 #[allow(clippy::indexing_slicing, clippy::panic)]
 const fn find(table: &'static [ParamInfo], id: u16) -> (usize, &'static ParamInfo) {
     let mut index = 0;
@@ -465,7 +463,7 @@ const fn is_sound(table: &[ParamInfo]) -> bool {
     true
 }
 
-/// Parameters of the board at a bus address: a joint's up to 6, else a wheel's.
+/// Parameters of the board at a bus address: a joint's up to 6, otherwise a wheel's.
 #[must_use]
 pub const fn params_at(address: u8) -> &'static [ParamInfo] {
     if address <= 6 {

@@ -1,12 +1,11 @@
 //! The interface definition as text, and its 64-bit hash.
 //!
-//! The text lists everything that changes the meaning of bytes: message
-//! numbers, field names, types, sizes, Q-formats and units, enumeration values,
-//! bits, fault and limit numbers, parameters with their formats and limits. And what lets boards
-//! share the line: its speed, the cycle, the times of the slots.
-//! Sentences for people are not part of it: correcting a word does not
-//! separate boards. The hash is FNV-1a (64 bit) over exactly this text, worked
-//! out at compile time, and compared when a board is identified and armed.
+//! The text lists everything that changes the meaning of bytes: message numbers, field names, types, sizes,
+//! Q-formats and units, enumeration values, bits, fault and limit numbers, parameters with their formats and
+//! limits. And the timing that lets boards share the line: its speed, the cycle, the times of the slots.
+//! Sentences for people are not part of it: correcting a word does not separate boards. The hash is FNV-1a
+//! (64 bit) over exactly this text, computed at compile time, and compared when a board is identified and
+//! armed.
 
 use crate::fault::{FAULTS, FaultSchema, LIMITS};
 use crate::fields::{

@@ -225,8 +225,7 @@ impl SyncSlot {
         })
     }
 
-    /// The set-point as a wheel reads it; `None` if the slot is empty, or holds
-    /// what only a joint can use.
+    /// The set-point as a wheel reads it; `None` if the slot is empty, or holds values for a joint only.
     #[must_use]
     pub const fn as_wheel(&self) -> Option<WheelSetpoint> {
         if !self.is_valid() || !self.fits_wheel() {
@@ -286,7 +285,7 @@ impl JointSetpoint {
 
 /// The eight slots of SYNC, in address order: joints 1–6, wheels 7 and 8.
 ///
-/// Slots 6 and 7 can hold only what a wheel can use.
+/// Slots 6 and 7 can hold only values for a wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(into = "[SyncSlot; NODES]")]
 pub struct SyncSlots([SyncSlot; NODES]);
@@ -357,7 +356,7 @@ impl TryFrom<[SyncSlot; NODES]> for SyncSlots {
     }
 }
 
-/// In a loop: that of an array holds the code of a slot once for each.
+/// As a loop: the array's own implementation repeats a slot's code for each element.
 impl<'de> Deserialize<'de> for SyncSlots {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_tuple(NODES, Slots)

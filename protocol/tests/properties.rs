@@ -82,7 +82,7 @@ proptest! {
         }
         prop_assert_eq!(&by_byte, &in_chunks);
         prop_assert_eq!(decoder.quality(), chunked.quality());
-        // Every frame is there, in order, whatever stood between them.
+        // Every frame is there, in order, whatever came between them.
         let frames: Vec<_> = by_byte.into_iter().filter_map(Result::ok).collect();
         let sent: Vec<_> = stretches.into_iter().map(|(header, payload, _)| (header, payload)).collect();
         prop_assert_eq!(frames, sent);

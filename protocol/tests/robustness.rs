@@ -1,4 +1,4 @@
-//! What a bad line and bad neighbours can do to the decoder: nothing.
+//! A bad line and bad neighbours cannot harm the decoder.
 
 mod common;
 
@@ -51,8 +51,8 @@ fn amount(name: &str, default: usize) -> usize {
     std::env::var(name).map_or(default, |text| text.parse().expect("a number"))
 }
 
-/// Frames of every type, `per_type` of each: the vectors, and then vectors with
-/// another sequence and other bytes in the payload, as long as they are sound.
+/// Frames of every type, `per_type` of each: the vectors, and then vectors with another sequence and other
+/// payload bytes, as long as they are sound.
 fn frames_of_every_type(per_type: usize, random: &mut Random) -> Vec<Vec<u8>> {
     let vectors = vectors().accepted;
     let mut frames = Vec::new();
@@ -244,7 +244,7 @@ fn a_million_random_streams_give_no_wrong_frame() {
             decoder.reset();
         }
         if stream.last() != Some(&0) {
-            // What is left over must not count for the next stream's bookkeeping.
+            // Leftover bytes must not count for the next stream.
             decoder.push_slice(&[0], |result| {
                 assert!(result.is_err() || !allowed.is_empty())
             });
@@ -320,9 +320,8 @@ fn the_longest_frame_fits_and_one_byte_more_does_not() {
     );
 }
 
-/// The known hole of COBS with a plain CRC: the last CRC byte is zero, its code
-/// byte 01 becomes the delimiter by one flipped bit, and the frame is one byte
-/// short. Frames with that tail are made on purpose here.
+/// The known hole of COBS with a plain CRC: the last CRC byte is zero, its code byte 01 becomes the delimiter
+/// by one flipped bit, and the frame is one byte short. The test makes frames with that tail on purpose.
 #[test]
 fn the_one_bit_hole_of_cobs_is_closed() {
     let mut tried = 0;

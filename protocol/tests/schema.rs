@@ -1,4 +1,4 @@
-//! The schema hash sees every change that gives bytes another meaning.
+//! The schema hash changes with every change of the meaning of bytes.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -33,9 +33,8 @@ fn the_hash_is_fnv_1a_of_the_text() {
     assert_eq!(fnv(text().as_bytes()), SCHEMA_HASH);
 }
 
-/// The archive tells people what stands behind a hash: one file for each definition, and
-/// their order in `ORDER`, oldest first. With `UPDATE_SPEC` the definition of this build is
-/// put into it.
+/// The archive shows people the definition behind a hash: one file for each definition, and their order in
+/// `ORDER`, oldest first. With `UPDATE_SPEC` the definition of this build is added to it.
 #[test]
 fn the_archive_has_this_interface_and_every_file_has_the_hash_of_its_name() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("interfaces");
@@ -306,13 +305,13 @@ fn fault_numbers_keep_to_their_ranges_and_bits_are_unique() {
     assert_eq!(FaultClass::of(160), None);
 }
 
-/// Numbers on the wire never change: these are the ones given out so far.
+/// Numbers on the wire never change: these are the ones used so far.
 #[test]
 fn permanent_numbers_stay() {
     let faults: Vec<u8> = Fault::ALL.iter().map(|fault| fault.code()).collect();
     assert_eq!(
         faults,
-        // 4 stood for what Nack says with VersionMismatch, and is not used again.
+        // 4 meant what Nack now reports as VersionMismatch, and is not reused.
         [1, 2, 3, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44]
     );
     assert_eq!(

@@ -1,10 +1,9 @@
-//! SPEC.md and the code say the same.
+//! SPEC.md and the code agree.
 //!
-//! The tables between `<!-- begin … -->` and `<!-- end … -->` are compared with
-//! the text rendered from the code's own tables; the worked examples are read
-//! from the document, decoded, and encoded again. After a deliberate change of
-//! the interface, `UPDATE_SPEC=1 cargo test -p wheeleg-protocol` writes the
-//! tables anew, and the interface into its archive (`schema.rs`).
+//! The tables between `<!-- begin … -->` and `<!-- end … -->` are compared with the text rendered from the
+//! code's own tables; the worked examples are read from the document, decoded, and encoded again. After a
+//! deliberate change of the interface, `UPDATE_SPEC=1 cargo test -p wheeleg-protocol` rewrites the tables,
+//! and the interface in its archive (`schema.rs`).
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! What the supervision of the link says of itself.
+//! Statements of the link supervision, tested.
 
 use wheeleg_protocol::link::{ClearError, WatchdogCycles};
 

@@ -7,7 +7,7 @@ mod common;
 use common::{envelope_text, vectors};
 use wheeleg_protocol::{Decoder, Message, MessageType, checksum};
 
-/// What the crate makes of the bytes: the only frame, or why there is none.
+/// The crate's result for the bytes: the only frame, or why there is none.
 fn judge(bytes: &[u8]) -> Result<(u8, String, Message), String> {
     let mut decoder = Decoder::new();
     let mut results = Vec::new();

@@ -1,6 +1,5 @@
-//! Each behaviour of a walk with and without: pairs of runs that differ in its switch alone, held
-//! against the metric that it is there for. Three seeds here; `cargo xtask deep behaviours` runs
-//! twenty, with a sign test.
+//! Each behaviour of a walk with and without: pairs of runs that differ only in its switch, compared by the
+//! behaviour's metric. Three seeds here; `cargo xtask deep behaviours` runs twenty, with a sign test.
 
 mod every_walk;
 pub(crate) mod metrics;
@@ -23,15 +22,15 @@ struct Pair {
     /// Those that are off in both runs.
     without: &'static [Behaviour],
     robot: &'static str,
-    /// What is measured, and its unit.
+    /// The metric and its unit.
     metric: &'static str,
     /// Smaller is better.
     less: bool,
-    /// What the specification of the terrain asks of the mean with the behaviour, as a share of that
-    /// without: for `less` at most, otherwise at least.
+    /// Bound of the terrain's specification on the mean with the behaviour, as a share of the mean without:
+    /// for `less` an upper bound, otherwise a lower one.
     asked: f64,
-    /// Where that share lies as it was measured: the test fails below it as above it. `None`: there is
-    /// no effect, and `docs/records/behaviours.md` says why.
+    /// Bracket around the measured share: the test fails on either side of it. `None`: there is no effect,
+    /// and `docs/records/behaviours.md` says why.
     bracket: Option<[f64; 2]>,
     duration_s: f64,
     walk: &'static str,
@@ -84,14 +83,14 @@ fn run(pair: &Pair, seeds: u64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// So many seeds are enough for the sign test to be asked for less than [`CHANCE`].
+/// With this many seeds the sign test must stay below [`CHANCE`].
 const ENOUGH: u64 = 20;
 const CHANCE: f64 = 0.01;
 
-/// What came of a pair.
+/// Result of a pair.
 struct Judged {
-    /// The share is where it was measured, and more seeds are better than worse; of enough seeds not by
-    /// chance. `None` where no effect is asked for.
+    /// The share is in its bracket, and more seeds improve than worsen; with enough seeds not by chance.
+    /// `None` where no effect is required.
     holds: Option<bool>,
     short: String,
 }
@@ -174,7 +173,7 @@ fn each_behaviour_does_what_it_is_there_for() {
     assert!(missed.is_empty(), "not as measured: {missed:?}");
 }
 
-/// A walk whose layer 1 stands still, and what then happens to the ground.
+/// A walk whose layer 1 freezes, and the ground that then changes.
 #[test]
 fn a_walk_without_layer_1_comes_to_a_stand_and_its_behaviours_go_on() {
     let scenario = builtin::scenario("frozen-layer-1").expect("built in");

@@ -17,8 +17,8 @@ fn silent_permille() -> f64 {
     1000.0 * silent_us / f64::from(CYCLE_US)
 }
 
-/// Nobody spoke at the same time as another, nobody was late or silent: a collision
-/// destroys both frames, and then a reply or its checksum is missing.
+/// No two boards spoke at once, and none was late or silent: a collision destroys both frames, and then a
+/// reply or its checksum is missing.
 fn assert_orderly(recording: &Recording) {
     for row in &recording.bus {
         assert_eq!(usize::from(row.v.replies), NODES, "cycle {}", row.v.cycle);
@@ -44,8 +44,8 @@ fn robot_and_protocol_mean_the_same_line() {
 
 #[test]
 fn cyclic_share_on_the_line_is_the_one_computed_at_compile_time() {
-    // Standing: what is not cyclic is the master's own questions about the logs, at
-    // most one of them and its answer in some cycles.
+    // Standing: the only acyclic traffic is the master's own questions about the logs, at most one of them
+    // and its answer in some cycles.
     let recording = run(&stand(2.0, &[]), &robot(), 1);
     assert_orderly(&recording);
     assert!(
@@ -92,8 +92,8 @@ fn every_node_replies_in_every_cycle_of_the_gait() {
     assert!(low > 0.33 && high < 0.70, "load {low} … {high}");
 }
 
-/// An operator who asks all the time: the requests find their place beside the
-/// cyclic traffic, and nearly a third of the line stays free.
+/// An operator who sends requests all the time: they fit beside the cyclic traffic, and nearly a third of the
+/// line stays free.
 #[test]
 fn requests_leave_thirty_per_cent_free() {
     let events: Vec<_> = (0..200_u8)

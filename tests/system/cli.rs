@@ -101,7 +101,7 @@ fn no_colour_is_no_colour() {
     }
 }
 
-/// What the program says, word for word; `TRYCMD=overwrite` writes it anew.
+/// The program's output, word for word; `TRYCMD=overwrite` rewrites it.
 #[test]
 fn texts_are_those_of_the_files() {
     trycmd::TestCases::new()
@@ -170,7 +170,7 @@ fn targets_carry_value_unit_band_and_verdict() {
                 "{key} of {target}"
             );
         }
-        // The verdict is the comparison, nothing else.
+        // The verdict follows from the comparison alone.
         if let Some(value) = target["value"].as_f64() {
             let above = target["min"].as_f64().is_none_or(|min| value >= min);
             let below = target["max"].as_f64().is_none_or(|max| value <= max);
@@ -316,7 +316,7 @@ fn broken_toml_is_answered_with_the_line() {
 #[test]
 fn an_output_folder_that_cannot_be_made_is_named_before_the_run() {
     let dir = folder();
-    // Below a regular file: fails for root as for anybody else.
+    // Below a regular file: fails for root too.
     let file = write(dir.path(), "file", "not a folder");
     let mut command = wheeleg();
     command
@@ -348,7 +348,7 @@ fn every_mistake_of_a_file_is_told_once_with_the_name_of_the_file_above() {
     }
 }
 
-/// Below a regular file nothing can be made, so that no run begins.
+/// Nothing can be created below a regular file, so no run begins.
 #[test]
 fn options_without_a_command_are_those_of_a_run() {
     let dir = folder();
@@ -403,8 +403,8 @@ fn interfaces_are_listed_and_compared_and_bad_hashes_are_refused() {
     wheeleg().args(["interface", "--all"]).assert().code(2);
 }
 
-/// Times of events are those of the scenario wherever they are told, and a command that is
-/// refused is told like a fault, once.
+/// All outputs give the times of events as those of the scenario, and report a refused command like a fault,
+/// once.
 #[test]
 fn events_have_one_time_everywhere_and_refusals_are_told() {
     let dir = folder();
@@ -453,8 +453,7 @@ fn events_have_one_time_everywhere_and_refusals_are_told() {
     }
 }
 
-/// Ctrl-C in mid-run: the program ends by itself, says so, and the log up to
-/// then opens whole.
+/// Ctrl-C in mid-run: the program ends by itself and says so, and the log up to then opens without errors.
 #[cfg(unix)]
 #[test]
 fn a_scenario_finds_its_robot_beside_it_and_the_summary_tells_it_from_the_original() {
@@ -576,7 +575,7 @@ fn a_board_of_another_interface_is_answered_with_what_to_do_about_it() {
         .stderr(contains("build and flash this board").and(contains("supply").not()));
 }
 
-/// A program that nobody listens to works as one that somebody does.
+/// A program without a reader works like one with a reader.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_error_ends_nothing() {
@@ -604,7 +603,7 @@ fn a_full_standard_error_ends_nothing() {
     assert_eq!(run(&dir.path().join("none.toml")).code(), Some(2));
 }
 
-/// What a file says of itself stands in pages, logs, tables and other files as it is.
+/// A file's own texts appear unchanged in pages, logs, tables and other files.
 #[test]
 fn texts_of_a_file_are_quoted_wherever_they_go() {
     const HOSTILE: &str = "</script><b onload='x'>\"a\", &amp; ;\u{202e}\tend";
@@ -660,7 +659,7 @@ fn texts_of_a_file_are_quoted_wherever_they_go() {
     assert!(!urdf.contains("<b onload"));
 }
 
-/// What no page and no other file can show is refused where it is read: in a text, a source or a name.
+/// Text that no page and no other file can show is refused where it is read: in a text, a source or a name.
 #[test]
 fn control_characters_in_a_file_are_refused_with_their_place() {
     let dir = folder();

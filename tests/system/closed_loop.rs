@@ -1,5 +1,5 @@
-//! The paper's three steps through the whole stack: what was commanded, what was
-//! sensed and what physically happened agree, on either leg.
+//! The paper's three steps through the whole stack: commanded, sensed and physical values agree, on either
+//! leg.
 
 use std::sync::OnceLock;
 
@@ -14,7 +14,7 @@ use wheeleg_telemetry::{JointSample, Recording, Row};
 /// Length of the three steps, s.
 const RUN_S: f64 = 10.0;
 
-/// A recorded run and what the report says of it.
+/// A recorded run and its report.
 struct Steps {
     recording: Recording,
     analysis: Analysis,
@@ -51,7 +51,7 @@ impl Steps {
         &self.recording.joints[self.leg[2]]
     }
 
-    /// Begin, begin of the push, and end of each step, s.
+    /// Start, start of the push, and end of each step, s.
     fn steps(&self) -> Vec<[f64; 3]> {
         let gait = robot().gait;
         (0..gait.steps)
@@ -140,8 +140,8 @@ fn the_sensed_stroke_is_the_true_one_through_a_real_sensor() {
             -bound_mm < low && high < bound_mm,
             "joint {name}: {low} … {high} mm"
         );
-        // Not the true stroke handed through: its noise is there, and no more than its noise
-        // where the joint stands.
+        // Not the true stroke passed through: its noise is there, and only its noise where the joint is at
+        // rest.
         let (mean, deviation) = spread(window(rows, 0.0, 0.15).iter().map(|r| error(&r.v)));
         assert!(
             (0.6 * noise_mm..1.8 * noise_mm).contains(&deviation),
@@ -186,7 +186,7 @@ fn cylinders_follow_their_references_but_not_at_once() {
         });
         assert!((8.0..120.0).contains(&lag), "b6 lags by {lag} mm");
     }
-    // Yaw and the held leg stay where they were told to.
+    // Yaw and the held leg stay at their references.
     for joint in (0..6).filter(|j| !steps.leg[1..].contains(j)) {
         let rows = &steps.recording.joints[joint];
         let (low, high) = range(rows, |s| s.reference_mm - s.position_mm);
@@ -235,8 +235,8 @@ fn start_delays_and_force_stay_in_their_brackets() {
         let delays = steps.start_delays();
         assert_eq!(delays.len(), 9, "three moves in each of three steps");
         for (i, delay) in delays.into_iter().enumerate() {
-            // The first lift starts from chambers at supply and ambient pressure, which
-            // have to change places; later moves from what the last one left.
+            // The first lift starts from chambers at supply and ambient pressure, which have to swap; later
+            // moves start from the state that the last one left.
             let bracket = if i == 0 { 0.10..0.30 } else { 0.015..0.12 };
             assert!(bracket.contains(&delay), "move {i}: {delay} s");
         }
@@ -284,7 +284,7 @@ fn no_valve_switches_at_rest() {
             }
             all_edges += rows[rows.len() - 1].v.valve_edges;
         }
-        // Four joints never get another reference: at least their rests were looked at.
+        // Four joints never get another reference: at least their rests were checked.
         assert!(
             rest_s > 4.0 * (RUN_S - SETTLING_S) - 0.1,
             "{rest_s} joint seconds"
@@ -423,7 +423,7 @@ fn the_held_foot_slides_with_the_chassis_under_kinetic_friction() {
                 "standing: {low} … {high}"
             );
         }
-        // Wherever the soles are loaded: never more than the ground can give.
+        // On loaded soles: never more than the ground can give.
         for foot in &steps.recording.feet {
             for row in foot.iter().filter(|r| r.v.normal_force_n > 5.0) {
                 let ratio = row.v.friction_force_n.abs() / row.v.normal_force_n;

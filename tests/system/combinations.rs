@@ -1,9 +1,9 @@
-//! How likely the predictive law misses on the four axis files, with load, mass, supply, friction and valve delay off
-//! their data at random: from vented chambers, and from chambers with air that nobody knows.
+//! How likely the predictive law misses on the four axis files, with load, mass, supply, friction and valve
+//! delay varied at random: from vented chambers, and from chambers with unknown air.
 //!
-//! A miss is an error at rest beyond 0.5 mm, an overshoot beyond 6 mm, a limit cycle or a fault, in the two moves after
-//! the first one from power-up. The combinations follow from a hash of the law's sources, so that it is not tuned to them.
-//! Some here; `cargo xtask deep combinations` plays as many as it takes to hold a bar.
+//! A miss is an error at rest beyond 0.5 mm, an overshoot beyond 6 mm, a limit cycle or a fault, in the two
+//! moves after the first one from power-up. A hash of the law's sources selects the combinations, so that the
+//! law is not tuned to them. A few run here; `cargo xtask deep combinations` runs as many as a bar needs.
 
 use wheeleg_config::AxisConfig;
 use wheeleg_report::stats::{at_most, bounded_quantile, failure_bound};
@@ -15,8 +15,8 @@ const COMBINATIONS_VARIABLE: &str = "WHEELEG_COMBINATIONS";
 /// Number of the first one, instead of the hash: to compare two versions.
 const ROOT_VARIABLE: &str = "WHEELEG_COMBINATIONS_ROOT";
 
-/// Axis, whether its chambers start with unknown air, bar of the probability to miss, and the upper bound that was
-/// measured: what is clearly above it is a step back.
+/// Axis, whether its chambers start with unknown air, bar of the miss probability, and the measured upper
+/// bound: a rate clearly above it is a regression.
 const CASES: [(&str, bool, f64, f64); 8] = [
     ("bench-vq110u", true, 0.005, 0.023),
     ("bench-vq110u", false, 0.003, 0.0075),

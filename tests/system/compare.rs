@@ -1,5 +1,5 @@
-//! `wheeleg compare` and `wheeleg tune`: what they print, write and refuse, and that
-//! a row is what the same moves give without them.
+//! `wheeleg compare` and `wheeleg tune`: what they print, write and refuse; a row equals the same moves run
+//! without them.
 
 use crate::program;
 use crate::schema::assert_valid;
@@ -153,7 +153,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         assert!(!links.contains(forbidden), "{forbidden}");
     }
     assert!(page.contains("pwm-pid") && page.contains("supply 4 bar"));
-    // It says first which controller is best, and on what grounds; no word is of a number that it has not.
+    // It names the best controller first, and the grounds; no text mentions a number that it lacks.
     let verdict = "Best is predictive: it misses 0 of 2 random combinations (the other misses ";
     assert!(page.contains(verdict), "{page:.4000}");
     assert!(!page.contains("1 axes") && !page.contains("≤ –"));
@@ -432,7 +432,7 @@ fn tuning_gives_a_section_that_a_run_accepts() {
     let found = summary["found_t_on_ms"].as_f64().expect("found");
     assert!((found - 3.5).abs() < 0.3, "{found}");
 
-    // Before any table stands what came of it, and the figure that shows it, once.
+    // The result and the figure that shows it come once, before any table.
     let page = fs::read_to_string(out.join("report.html")).expect("written");
     let places =
         ["<h1 class=\"long\">", "<figure id=\"step-100\"", "<table"].map(|part| page.find(part));
@@ -550,8 +550,8 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
     }
 }
 
-/// What a drawn case draws beside its factors: pressures at which the piston stands, other ones for each, and all four
-/// ticks of the law's period.
+/// What a drawn case varies beside its factors: pressures that hold the piston, different ones for each case,
+/// and all four ticks of the law's period.
 #[test]
 fn a_drawn_case_begins_with_chambers_that_hold_the_piston() {
     let sheet = AxisConfig::load(AXIS).expect("built in").axis;

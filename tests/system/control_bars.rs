@@ -203,8 +203,8 @@ fn two_hundred_combinations() {
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn off_the_bench_axis_few_combinations_miss() {
-    // Of 1,200, 600 and 1,200 on the axes 21, 3 and 48 were measured: reversals that had not died
-    // out, a rest beside the bar, a false alarm near the target.
+    // Of 1,200, 600 and 1,200 moves on the axes we measured 21, 3 and 48: reversals that had not died out, a
+    // rest beside the bar, a false alarm near the target.
     for (name, count) in [
         ("small-12x50", 60),
         ("long-16x400", 30),
@@ -279,8 +279,8 @@ fn nothing_switches_at_rest() {
     }
 }
 
-/// Moves of the robot's cylinder between places all over its stroke, by a law that is
-/// told `axis`: 40 boards, five moves each after the first.
+/// Moves of the robot's cylinder between places all over its stroke, by a law that is configured with `axis`:
+/// 40 boards, five moves each after the first.
 fn wandering_moves(axis: &AxisData) -> Vec<Trace> {
     let sheet = wheeleg_2003_axis();
     let mut design = design(&sheet, Kind::Predictive);
@@ -300,8 +300,8 @@ fn wandering_moves(axis: &AxisData) -> Vec<Trace> {
     traces
 }
 
-/// Moves that are further than 1 mm from their target a second after their start, and
-/// those that have not come to rest within 1 mm at their end or swing about it.
+/// Moves more than 1 mm from their target a second after their start, and those not at rest within 1 mm at
+/// their end or oscillating about it.
 fn late_and_restless(traces: &[Trace]) -> (usize, usize) {
     let late = |trace: &&Trace| {
         let at = ((trace.motion.start_s() + 1.0) * 1e3).round() as usize;
@@ -319,8 +319,8 @@ fn late_and_restless(traces: &[Trace]) -> (usize, usize) {
 #[ignore = "long; `cargo xtask test` runs it"]
 fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
     let told = axis_data(&wheeleg_2003_axis());
-    // What a board takes that is told nothing: a faster valve in front of the same
-    // cylinder. Its shortest pulses, of 3.85 to 5 ms, open nothing here.
+    // The defaults of an unconfigured board: a faster valve in front of the same cylinder. Its shortest
+    // pulses, of 3.85 to 5 ms, open nothing here.
     let other = AxisData::default();
     assert!(other.valve_on < told.valve_on && other.valve_off < told.valve_off);
     assert_eq!(
@@ -386,7 +386,7 @@ fn the_start_from_home_and_what_a_preview_does() {
     );
     assert!(m.peak_speed_mm_s <= 400.0, "{m:?}");
 
-    // The default, once from where it rests, once made to push against the stop.
+    // The default law, once from its rest position, once pushed against the stop.
     let resting = design(&axis, Kind::Predictive);
     let mut pushing = resting.clone();
     pushing.gains.stroke_max = PositionMm::from_int(185);

@@ -1,9 +1,9 @@
-//! The predictive law on cylinders that nobody tuned it for, drawn at random, with loads, masses,
-//! friction and valve times off their data.
+//! The predictive law on random cylinders that it was not tuned for, with loads, masses, friction and valve
+//! times off their data.
 //!
-//! One combination on each, for several on one are not independent: with air in the chambers that nobody knows, and from
-//! any tick of the law's period. The cylinders follow from a hash of the law's sources, so that it is not tuned to them.
-//! 1,000 here; `cargo xtask deep cylinders` draws as many as it takes to hold a bar.
+//! One combination on each, because several on one are not independent: with unknown air in the chambers, and
+//! from any tick of the law's period. A hash of the law's sources selects the cylinders, so that the law is
+//! not tuned to them. 1,000 here; `cargo xtask deep cylinders` draws as many as a bar needs.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -18,7 +18,7 @@ use wheeleg_studies::compare::judging_root;
 /// How many cylinders are drawn, and the number of the first, instead of the hash.
 const CYLINDERS_VARIABLE: &str = "WHEELEG_CYLINDERS";
 const FIRST_VARIABLE: &str = "WHEELEG_CYLINDERS_FIRST";
-/// Set, chambers start vented, as they did when the first rates were measured.
+/// If set, chambers start vented, as when the first rates were measured.
 const VENTED_VARIABLE: &str = "WHEELEG_CYLINDERS_VENTED";
 /// Upper bounds of the rates that were measured, one-sided 95 %: of fine valves, of coarse ones, missed and by a fault.
 const FINE_MISSED: f64 = 0.08;
@@ -101,7 +101,7 @@ fn played(sheet: &AxisParams, which: u64) -> Vec<Trace> {
         .collect()
 }
 
-/// What came of the cylinders of a class.
+/// Results of the cylinders of a class.
 #[derive(Default)]
 struct Tally {
     cylinders: u64,
@@ -123,7 +123,7 @@ impl Tally {
         )
     }
 
-    /// Whether so many are no step back from a rate: a chance of more than 1 in 1000.
+    /// Whether this count is no regression from a rate: a chance of more than 1 in 1000.
     fn is_no_step_back(&self, count: u64, rate: f64) -> bool {
         let fewer = count
             .checked_sub(1)

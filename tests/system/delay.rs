@@ -156,7 +156,7 @@ fn taking_a_cause_away_shortens_the_delay_where_physics_demands() {
         let row = a.row(id).expect("measured");
         assert!(row.contribution_s > 1e-3, "{row:?}");
     }
-    // Times that simply add are found again: the wave's 2.9 ms; t_on's 5 ms.
+    // Times that simply add reappear: the wave's 2.9 ms; t_on's 5 ms.
     let (wave, t_on) = (a.row("wave").expect("row"), a.row("t_on").expect("row"));
     assert!((wave.contribution_s - 2.9e-3).abs() < 1e-3, "{wave:?}");
     assert!((t_on.contribution_s - 5.0e-3).abs() < 2e-3, "{t_on:?}");
@@ -287,8 +287,8 @@ fn the_report_stands_alone_and_two_runs_are_alike() {
     }
 }
 
-/// What the command line puts in the place of the file's values is judged beforehand: the option is
-/// named, with what is allowed.
+/// Command-line values that replace the file's are checked beforehand: the error names the option and what is
+/// allowed.
 #[test]
 fn a_mass_or_load_that_cannot_be_simulated_is_refused_by_its_option() {
     let dir = tempfile::tempdir().expect("temporary folder");

@@ -1,4 +1,4 @@
-//! Same scenario, robot and seed: the same telemetry, bit for bit; anything else: another.
+//! Same scenario, robot and seed: the same telemetry, bit for bit; any difference in them changes it.
 
 mod sil;
 
@@ -95,7 +95,7 @@ fn thread_and_working_directory_make_no_difference() {
 }
 
 /// A walk on rocks, where contacts come and go by the hundred: the same in two folders, on one
-/// thread after another and on two at a time; other rocks make another run.
+/// thread and on two at a time; other rocks make another run.
 #[test]
 fn a_walk_on_rocks_is_the_same_in_any_folder_on_one_thread_or_two() {
     let walk = |seed: u64| {
@@ -172,8 +172,8 @@ fn go_on(plant: &Plant, state: &mut PlantState, ticks: std::ops::Range<u64>) -> 
         .collect()
 }
 
-/// A state saved in mid-motion, with the sensors' random streams in it, goes on
-/// exactly as if it had never been saved.
+/// A state saved in mid-motion, with the sensors' random streams in it, continues exactly as if it had never
+/// been saved.
 #[test]
 fn a_saved_state_goes_on_identically() {
     let plant = Plant::new(&standing()).expect("valid");

@@ -1,5 +1,5 @@
-//! Disks that can only be read, or fill up: what is there is whole or named. Each disk is a file
-//! system in memory, of a mount name space of its own.
+//! Disks that are read-only, or fill up: every file is whole or named. Each disk is a file system in memory,
+//! in its own mount name space.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::stop::files_below;
 /// How a program ended.
 struct Ended {
     code: Option<i32>,
-    /// What it said on standard error.
+    /// Its standard error.
     said: String,
     stdout: String,
 }
@@ -42,8 +42,8 @@ fn on_a_disk(script: &str, disk: &Path, arguments: &[&str]) -> Ended {
     }
 }
 
-/// A folder that nobody may write into, and one on a disk that is mounted to be read: refused by
-/// its name before anything is computed, and nothing in it changes. In a mount name space of its own.
+/// A folder without write permission, and one on a read-only disk: refused by name before any computation,
+/// and nothing in it changes. In its own mount name space.
 #[test]
 fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
     let inputs = Inputs::new();
@@ -79,8 +79,8 @@ fn a_disk_that_can_only_be_read_is_refused_by_its_name_at_once() {
 /// Sizes of a disk, KiB: from hardly more than a lock to room for everything.
 const SIZES_KIB: [usize; 10] = [4, 12, 32, 64, 128, 256, 512, 1000, 2000, 4000];
 
-/// The disk fills under every command that writes: what is there is whole or named, nothing claims
-/// to be done, and a verdict is told whether its summary has room or not.
+/// The disk fills under every command that writes: every file is whole or named, nothing claims to be done,
+/// and the verdict is printed whether or not its summary fits.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_disk_that_fills_under_any_command_is_told() {
@@ -96,7 +96,7 @@ fn a_disk_that_fills_under_any_command_is_told() {
             tried_disks += 1;
             let serves = tried.arguments[0] == "serve";
             let seconds = if serves { 4 } else { 300 };
-            // What is left is listed before it goes with the name space. A server is told to end.
+            // The files left are listed before the name space takes them. A server gets a signal to end.
             let script = format!(
                 "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
                  disk=\"$1\"; shift\n\
@@ -128,7 +128,7 @@ fn a_disk_that_fills_under_any_command_is_told() {
                 assert!(!left.contains(half), "{half}: {told}");
             }
             filled += u32::from(full);
-            // The one file that was to be made is not there in part. A log breaks off.
+            // The single output file does not exist in part. A log breaks off.
             if full && tried.leaves == Leaves::File && option == "--out" {
                 assert_eq!(left.trim(), "", "{told}");
             }
@@ -161,8 +161,8 @@ fn a_disk_that_fills_under_any_command_is_told() {
     assert!(verdicts >= 3, "{verdicts} verdicts on a full disk");
 }
 
-/// A limit on the size of a file ends no command by its signal: each says that a file is too large, with
-/// the exit code of a file that cannot be written.
+/// A limit on file size kills no command by its signal: each reports that a file is too large, with the exit
+/// code of a file that cannot be written.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_limit_on_the_size_of_files_ends_no_command_without_a_message() {

@@ -1,5 +1,5 @@
-//! Files of this program that somebody changed, of another version, or in each other's place, and
-//! words that are longer than any: refused at once, by name, and nothing is lost.
+//! Files of this program that were edited, come from another version, or replace each other, and overlong
+//! words: refused at once, by name, and nothing is lost.
 
 use std::fs;
 use std::process::Command;
@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::program;
 
-/// Longest refusal that somebody reads, bytes.
+/// Longest readable refusal, bytes.
 const READ: usize = 3_000;
 
 /// A folder in which the program is run.
@@ -32,7 +32,7 @@ impl Place {
         fs::read_to_string(self.path(name)).expect("read")
     }
 
-    /// Runs the program; exit code and what it says, without line breaks of a terminal.
+    /// Runs the program; exit code and output, without line breaks of a terminal.
     fn said(&self, arguments: &[&str]) -> (Option<i32>, String) {
         let mut command = assert_cmd::Command::new(program::path());
         command.current_dir(self.0.path());
@@ -44,7 +44,7 @@ impl Place {
         (told.status.code(), text)
     }
 
-    /// What is said of something that is refused with this code.
+    /// The message of a refusal with this code.
     fn refusal(&self, arguments: &[&str], code: i32, words: &[&str]) {
         let (found, text) = self.said(arguments);
         assert_eq!(found, Some(code), "{arguments:?}: {text}");
@@ -54,7 +54,7 @@ impl Place {
         assert!(text.len() < READ, "{arguments:?}: {} bytes", text.len());
     }
 
-    /// A campaign of six cases that are given up after `limit`, and its table.
+    /// A campaign of six cases with this time limit each, and its table.
     fn campaign(&self, limit: &str) {
         let plan = format!(
             "name = \"six\"\nroot = 1\nlimit = \"{limit}\"\nreplicates = 6\n[base]\nscenario = \"stand\"\n"
@@ -101,7 +101,7 @@ fn a_folder_that_claims_other_cases_than_its_plan_has_is_refused() {
         }
     }
     assert!(!place.path("other.parquet").exists() && !place.path("again").exists());
-    // A pipe that nobody writes to, in the place of each file that a command reads.
+    // A pipe without a writer, in place of each file that a command reads.
     #[cfg(target_os = "linux")]
     for (pipe, arguments) in [
         ("six/plan.json", &["campaign", "status", "six"][..]),
@@ -118,8 +118,8 @@ fn a_folder_that_claims_other_cases_than_its_plan_has_is_refused() {
     assert_eq!(place.said(&["campaign", "status", "six"]).0, Some(0));
 }
 
-/// A case that was given up at the limit of its plan has a log that ends there; the full run that a
-/// replay makes goes on, and is no other case for that.
+/// A case that reached the time limit of its plan has a log that ends there; a replay runs it in full, and it
+/// remains the same case.
 #[test]
 fn a_case_that_was_given_up_is_not_told_to_differ() {
     let place = Place::new();
@@ -146,7 +146,7 @@ fn a_case_that_was_given_up_is_not_told_to_differ() {
 fn tables_in_each_others_place_are_told_in_few_words() {
     let place = Place::new();
     place.campaign("0.05 s");
-    // The page in the place of the table it is made of.
+    // The page in place of the table that it is made from.
     let table = fs::read(place.path("six.parquet")).expect("a table");
     let page = ["campaign", "report", "six.parquet", "--out", "six.parquet"];
     place.refusal(&page, 2, &["`six.parquet` is an input", "--out"]);
@@ -174,8 +174,8 @@ fn tables_in_each_others_place_are_told_in_few_words() {
     );
 }
 
-/// What another version kept is compared with what is played: a file of other combinations, or one
-/// without an end, is refused before anything is.
+/// Results kept by another version are compared with the runs: a file of other combinations, or an incomplete
+/// one, is refused before any run.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
@@ -208,7 +208,7 @@ fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
     against("/dev/zero", &["/dev/zero", "more than 64 MiB"]);
 }
 
-/// A page beside a log may be somebody's own; that of an earlier `view` is made anew.
+/// A page beside a log may be the user's own; that of an earlier `view` is remade.
 #[test]
 fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     let place = Place::new();
@@ -225,7 +225,7 @@ fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(place.text("notes.html.previous"), "mine");
     assert!(!place.path("notes.html.previous-2").exists());
-    // A log without a message is told as such by every command, not as one of another version.
+    // Every command calls a log without a message just that, not one of another version.
     let log = fs::read(place.path("notes.mcap")).expect("a log");
     fs::write(place.path("head.mcap"), &log[..300]).expect("written");
     for command in [
@@ -248,7 +248,7 @@ fn the_page_of_a_log_takes_no_place_of_somebody_elses() {
     assert_eq!(fs::read(place.path("notes.mcap")).expect("kept"), log);
 }
 
-/// Whatever is given, of a word that is longer than any path the begin is told.
+/// In every message, a word that is longer than any path is cut to its start.
 #[test]
 fn words_that_are_longer_than_any_are_told_in_short() {
     let place = Place::new();
@@ -316,7 +316,7 @@ fn a_run_with_very_many_events_has_a_page_that_opens() {
     }
 }
 
-/// Of eight times as many events a run takes less than twenty-four times as long, up to a hundred thousand.
+/// A run with eight times as many events takes less than twenty-four times as long, up to a hundred thousand.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_hundred_thousand_events_take_no_longer_than_their_number() {
@@ -377,7 +377,7 @@ fn a_run_with_very_many_faults_lists_a_few() {
     assert_eq!(summary.matches("\"pot-noisy:joint").count(), 3_000);
 }
 
-/// A command whose standard output takes nothing says so, and what is to be done.
+/// A command whose standard output takes nothing says so, and what to do.
 #[cfg(target_os = "linux")]
 fn assert_tells_full_output(mut command: Command) {
     let full = fs::OpenOptions::new().write(true).open("/dev/full");
@@ -388,8 +388,8 @@ fn assert_tells_full_output(mut command: Command) {
     assert!(said.contains("standard output"), "{command:?}: {said}");
 }
 
-/// What is read as it comes says that standard output is full, and is done without a word where
-/// nobody reads on.
+/// A command that streams its output reports a full standard output, and ends silently when the reader is
+/// gone.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_is_told_by_every_list() {
@@ -422,7 +422,7 @@ fn a_full_standard_output_is_told_by_every_list() {
     }
 }
 
-/// So does what computes: the study is in its folder all the same.
+/// So does a command that computes: the study is in its folder all the same.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_standard_output_costs_no_study() {
@@ -474,8 +474,7 @@ fn server(answer: &'static [u8], pause: Duration) -> String {
     address
 }
 
-/// A server that refuses a request for a stop, as one does that lets look alone, and begins a session
-/// byte by byte.
+/// A server that refuses a stop request, like a read-only one, and begins a session byte by byte.
 fn look_only_server(pause: Duration) -> String {
     use std::io::{Read as _, Write as _};
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -501,8 +500,8 @@ fn look_only_server(pause: Duration) -> String {
     address
 }
 
-/// Who stops a robot is told that nobody confirms, whatever answers in its place: nothing, something
-/// else, or something that does not end.
+/// If nobody confirms a stop, its sender gets a warning, for any other answer: nothing, something else, or
+/// something endless.
 #[cfg(unix)]
 #[test]
 fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
@@ -553,7 +552,7 @@ fn a_stop_that_nobody_confirms_is_told_whatever_answers() {
     let address = look_only_server(drip);
     let ctl = ["ctl", "--url", &address, "--key", "key", "stop"];
     place.refusal(&ctl, 3, &words);
-    // Over a session, too, another server is told as one.
+    // Over a session, too, another server is recognized as one.
     for answer in [&b"\x00\xff\x00\xff\r\n\r\n"[..], page] {
         let address = server(answer, none);
         let ctl = ["ctl", "--url", &address, "--key", "key", "pause"];

@@ -6,7 +6,7 @@ use wheeleg_config::builtin;
 use wheeleg_sim::{Boards, EnergyBalance, Session};
 use wheeleg_telemetry::Recorder;
 
-/// What a scenario runs for here, s: some steps of a walk, and every stop of the files.
+/// Length of a scenario here, s: some steps of a walk, and every stop of the files.
 const SHORT_S: f64 = 6.5;
 /// Longest start-up, s.
 const START_UP_S: f64 = 60.0;
@@ -63,8 +63,7 @@ fn the_energy_of_every_scenario_is_accounted_for() {
     assert!(missed.is_empty(), "{missed:?}");
 }
 
-/// An account that changes the run would be that of another run; and one that finds nothing to
-/// account for would prove nothing.
+/// The energy account must not change the run, and must find something to account for, or it proves nothing.
 #[test]
 fn an_account_of_the_energy_changes_nothing() {
     let (balance, accounted) = run("sand-flat", true);

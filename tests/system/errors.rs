@@ -20,7 +20,7 @@ use wheeleg_studies::axis_sim::suite::AxisSimError;
 use wheeleg_studies::check::vectors::VectorsError;
 use wheeleg_telemetry::LogError;
 
-/// An error with what must stand in it: the field, file or value that it is about.
+/// An error with the words it must contain: the field, file or value that it is about.
 type Driven = (&'static str, Box<dyn Diagnostic>, Vec<&'static str>);
 
 fn full() -> io::Error {
@@ -125,7 +125,7 @@ fn driven() -> Vec<Driven> {
 /// Values as a program prints them for itself.
 const DEBUG: [&str; 8] = ["Some(", "None", "Ok(", "Err(", " { ", "::", "..=", "Error"];
 
-/// Robots are run for some of them, which takes a stack as the program has it.
+/// Some of them need robot runs, which need a stack as large as the program's.
 fn on_its_stack(test: fn()) {
     let thread = std::thread::Builder::new().stack_size(16 << 20);
     let ended = thread.spawn(test).expect("a thread").join();

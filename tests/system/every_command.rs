@@ -20,7 +20,7 @@ pub(crate) fn tries(suite: usize, most: usize) -> usize {
     wanted.map_or(suite, |n| n.parse::<usize>().expect("a number").min(most))
 }
 
-/// What is left behind, and what it is judged by.
+/// What a command leaves behind, and how the test judges it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Leaves {
     /// A folder with `summary.json` and a page; the study's name.
@@ -39,7 +39,7 @@ pub(crate) enum Leaves {
 #[derive(Debug, Clone)]
 pub(crate) struct Tried {
     pub(crate) arguments: Vec<String>,
-    /// Option that says where the output goes.
+    /// Option for the output path.
     pub(crate) out: Option<&'static str>,
     pub(crate) leaves: Leaves,
     /// Code of a file that cannot be written.
@@ -66,7 +66,7 @@ fn lab() -> String {
     text
 }
 
-/// What begins as a shared library does and names its functions, and does not shrink when it is packed.
+/// Begins like a shared library, names its functions, and does not shrink when packed.
 fn library() -> Vec<u8> {
     let mut bytes = b"\x7fELF fmi2Instantiate fmi3InstantiateCoSimulation".to_vec();
     let mut state = 1_u64;
@@ -97,7 +97,7 @@ impl Inputs {
         inputs
     }
 
-    /// Path of an input, or of what a command may write.
+    /// Path of an input, or of an output of a command.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -277,7 +277,7 @@ const BRIEF: [(&str, &str); 30] = [
     ("help", "prints"),
 ];
 
-/// What the program prints as its help, from its own tree of commands.
+/// The program's help, from its own tree of commands.
 fn help(path: &[String]) -> String {
     let mut command = Command::new(program::path());
     let output = command.args(path).arg("--help").output().expect("start");
@@ -292,7 +292,7 @@ fn leaves(path: &[String], found: &mut Vec<(String, String)>) {
     let names = list
         .lines()
         .take_while(|line| !line.is_empty())
-        // What follows a name that is too long for its column stands deeper.
+        // The text after a name too long for its column is indented further.
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())
         .filter(|name| *name != "help");
@@ -307,8 +307,8 @@ fn leaves(path: &[String], found: &mut Vec<(String, String)>) {
     }
 }
 
-/// The list above is compared with the program's own: a command that can be told where to write is on
-/// it; every other is there too, or is known to be brief.
+/// The list above is compared with the program's own: every command with an output option is on it; every
+/// other is there too, or is known to be brief.
 #[test]
 fn no_command_is_left_out() {
     let inputs = Inputs {

@@ -1,5 +1,5 @@
-//! A plant that leaves physics says so at once: when, which part, what most likely did it, and what
-//! was last known of it.
+//! A plant that leaves physics reports it at once: when, which part, the likely cause, and its last known
+//! state.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -16,7 +16,7 @@ use wheeleg_studies::study::Settings;
 
 use crate::sil::robot;
 
-/// A pressure that the supply cannot have made is none, long before it is a strange number.
+/// A pressure that the supply cannot have made is an error, long before it is a strange number.
 #[test]
 fn four_times_the_supply_is_too_much() {
     let robot = robot();
@@ -40,10 +40,10 @@ fn four_times_the_supply_is_too_much() {
     assert!(error.to_string().contains("supply_pressure_pa"), "{error}");
 }
 
-/// When the robot is told to drive, s.
+/// When the robot is commanded to drive, s.
 const AT_S: f64 = 0.5;
 
-/// A robot that is told to drive, with a winding of a hundredth of an ohm and next to no torque.
+/// A robot that is commanded to drive, with a winding of a hundredth of an ohm and next to no torque.
 pub(crate) fn drives_without_torque() -> (Scenario, RobotConfig) {
     let mut robot = wheeleg_config::builtin::robot("wheeleg").expect("built in");
     for motor in &mut robot.plant.motors {
@@ -60,8 +60,8 @@ pub(crate) fn drives_without_torque() -> (Scenario, RobotConfig) {
     (scenario, robot)
 }
 
-/// A whole run of a robot that stands, and is told to drive: with a winding of a hundredth of an ohm and
-/// next to no torque, which a file may say, its motors draw more than the model means.
+/// A whole run of a robot that stands, and is commanded to drive: with a winding of a hundredth of an ohm and
+/// next to no torque, which a file may say, its motors draw more than the model allows.
 #[test]
 fn a_robot_that_explodes_ends_its_run_at_once_with_all_that_is_known() {
     let (scenario, robot) = drives_without_torque();

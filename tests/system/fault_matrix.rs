@@ -34,7 +34,7 @@ fn documented() -> BTreeSet<&'static str> {
     lines.flat_map(|(_, rows)| names(rows)).collect()
 }
 
-/// Rows that are known not to come out as they must.
+/// Rows known to come out wrong.
 fn shortfalls() -> BTreeSet<&'static str> {
     let (_, rest) = DOCUMENT
         .split_once("<!-- begin shortfalls -->")
@@ -53,7 +53,7 @@ fn the_table_has_the_rows_of_the_document() {
         "{}",
         ROWS.len()
     );
-    // What is not implemented is what the document says, and nothing else.
+    // The document lists exactly the faults that are not implemented.
     let (_, rest) = DOCUMENT.split_once("## Not implemented").expect("section");
     let (section, _) = rest.split_once("##").expect("next section");
     for row in ROWS {
@@ -103,7 +103,7 @@ fn the_document_has_the_limits_of_its_rows() {
     assert!(judged > 130, "{judged} limits");
 }
 
-/// A fault that no row injects would be one that nobody has measured.
+/// A fault that no row injects would remain unmeasured.
 #[test]
 fn every_fault_of_the_catalogue_is_in_a_row() {
     // Restarts have tests of their own (restart.rs).
@@ -137,11 +137,11 @@ fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
         if !failed && known.contains(id) {
             wrong += &format!("{id} is a known shortfall and comes out as it must\n");
         }
-        // Whatever else a row lacks: nothing is ever acted on that nobody sent.
+        // In every row: no board acts on a frame that nobody sent.
         assert_eq!(o.measured.wrong_frames, 0, "{id}");
     }
     assert!(wrong.is_empty(), "{wrong}");
-    // A minute of broken frames: most get through, some do not, none is another one.
+    // A minute of broken frames: most get through, some do not, and none turns into another one.
     let minute = outcomes.iter().find(|o| o.row.id == "bit-errors/60s");
     let m = &minute.expect("the row").measured;
     let lost = 1.0 - m.accepted_frames as f64 / m.sent_frames as f64;
@@ -169,7 +169,7 @@ fn every_row_comes_out_as_it_must_or_as_the_shortfalls_say() {
     }
 }
 
-/// A run without faults has none: over every scenario in which nothing goes wrong.
+/// A run without faults reports none: over every scenario in which nothing goes wrong.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_without_a_fault() {
@@ -209,8 +209,8 @@ fn nothing_trips_without_a_fault() {
     assert!(quiet >= 7, "{quiet} scenarios without faults");
 }
 
-/// In the row of a minute the robot holds most of the time: this one is told to walk on after
-/// every stop, so that boards that drive see the broken frames.
+/// In the row of a minute the robot holds most of the time: this one is commanded to walk on after every
+/// stop, so that driving boards see the broken frames.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_robot_that_is_started_again_and_again_acts_on_no_wrong_frame_for_a_minute() {
@@ -344,7 +344,7 @@ fn rows_can_be_run_alone_and_a_failing_or_missing_one_is_told() {
         .assert()
         .code(1)
         .stdout(failed.and(contains("not all axes stop")));
-    // What goes on has no latency of a stop.
+    // A run that continues has no stop latency.
     let json = std::fs::read_to_string(folder.path().join("matrix/summary.json"));
     let json: Value = serde_json::from_str(&json.expect("a summary")).expect("JSON");
     let measured = &json["rows"][0]["measured"];

@@ -31,7 +31,7 @@ fn tried<'a>(summary: &'a Summary, name: &str) -> &'a Tried {
     found.expect("tried")
 }
 
-/// The smoke test of what rests on 100 seeds in `cargo xtask deep field`.
+/// Smoke test of the results that rest on 100 seeds in `cargo xtask deep field`.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn the_claims_that_hold_hold_on_five_seeds() {
@@ -71,9 +71,8 @@ fn bar<'a>(tried: &'a Tried, measure: &str) -> &'a Measured {
     found.expect("a bar")
 }
 
-/// What cannot be done must not look as if it could: a wall of 30 cm, and slopes on which soft
-/// soil carries the wheels so far ahead of the axle that the robot tips, or does not carry at all.
-/// Where it can it gives up.
+/// The impossible must not look possible: a wall of 30 cm, and slopes on which soft soil carries the wheels
+/// so far ahead of the axle that the robot tips, or does not carry at all. Where it can, the robot gives up.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_wall_and_steep_sand_are_not_climbed() {
@@ -98,8 +97,8 @@ fn a_wall_and_steep_sand_are_not_climbed() {
     assert_eq!(claim.map(|c| c.met), Some(Met::NotMet));
 }
 
-/// The control experiments of co-operation: where legs and wheels get on together, wheels alone,
-/// with the legs standing, do not.
+/// The control experiments of co-operation: where legs and wheels together succeed, wheels alone, with the
+/// legs still, do not.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn wheels_alone_do_not_get_where_legs_and_wheels_do() {

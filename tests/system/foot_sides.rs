@@ -9,7 +9,7 @@ use wheeleg_plant::terrain::{Shape, Solid, Surface, Terrain};
 use wheeleg_sim as sil;
 use wheeleg_telemetry::{Cause, Recorder, Recording};
 
-/// A side of a foot: its name in scenarios, its bit in the log, and what the master calls it.
+/// A side of a foot: its name in scenarios, its bit in the log, and the master's name for it.
 type FootSide = (&'static str, u8, Sector);
 
 /// All sides, in the order of their bits.
@@ -105,15 +105,15 @@ fn assert_side(recording: &Recording, foot: usize, (side, bit, sector): FootSide
         "{leg:?} foot, {side}: sensed at first contact"
     );
 
-    // What physically is: the node follows when the level has stood for its debounce, the
-    // last of whose samples is the one that counts.
+    // The physical truth: the node follows when the level has been stable for its debounce, of which the last
+    // sample counts.
     let (ground_ns, closed) = ground_touch(recording, leg, sensed_ns - 5_000_000);
     let alone = ["front", "left", "back", "right"].map(|name| name == side);
     assert_eq!(closed, alone, "{leg:?} foot, {side}");
     let lag_ns = sensed_ns.abs_diff(ground_ns);
     assert_eq!(lag_ns, DEBOUNCE_NS, "{leg:?} foot, {side}");
 
-    // What the master makes of the replies of the next cycles.
+    // The master's conclusion from the replies of the next cycles.
     let (master_ns, reported) = reported_touch(recording, leg, sensed_ns);
     assert_eq!(reported, Some(sector), "{leg:?} foot, {side}");
     let late_ns = master_ns - sensed_ns;

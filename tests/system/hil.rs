@@ -21,8 +21,7 @@ use wheeleg_remote_link::{Hello, Image, LINK_VERSION, Reply, Request, encode};
 
 use bench::{NoTime, assert_same, closed_loop, closed_loop_as_the_host};
 
-/// The board's end of the line. It goes silent or vanishes after so many
-/// requests.
+/// The board's end of the line. It goes silent or vanishes after a number of requests.
 struct BoardEnd {
     port: TTYPort,
     requests_left: Arc<AtomicU64>,
@@ -33,7 +32,7 @@ impl Stream for BoardEnd {
         loop {
             match self.port.read(buffer) {
                 Ok(count) => return count,
-                // Nobody asks for a while: the test is over if it has let go.
+                // No request for a while: the test is over if it has let go.
                 Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {
                     if self.requests_left.load(Ordering::Relaxed) == 0 {
                         return 0;
@@ -237,7 +236,7 @@ fn other_images_are_refused_by_the_handshake() {
     );
     drop(bench);
 
-    // A plain image: nobody listens on this port.
+    // A plain image: nothing listens on this port.
     let bench = BoardBench::new(u64::MAX, |mut end| {
         let mut swallowed = [0; 64];
         while end.read(&mut swallowed) > 0 {}
@@ -247,7 +246,7 @@ fn other_images_are_refused_by_the_handshake() {
     assert!(error.contains("joint-hil"), "{error}");
     drop(bench);
 
-    // Something else altogether, talking.
+    // A talking device that is no board.
     let bench = BoardBench::new(u64::MAX, |mut end| {
         let mut swallowed = [0; 64];
         while end.read(&mut swallowed) > 0 && end.write(b"login: \0\0") {}

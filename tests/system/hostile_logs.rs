@@ -1,5 +1,4 @@
-//! Logs that somebody made to do harm: `wheeleg view` reads them in the memory of a small program,
-//! and ends.
+//! Malicious logs: `wheeleg view` reads them in the memory of a small program, and ends.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -32,7 +31,7 @@ fn view(log: &Path) -> (Output, PathBuf) {
     (output, page)
 }
 
-/// A log that is written by hand: the channel of the body, and what else is wanted.
+/// A hand-written log: the channel of the body, and any other content.
 fn written(path: &Path, write: impl FnOnce(&mut Writer<BufWriter<File>>, u16)) {
     let file = BufWriter::new(File::create(path).expect("created"));
     let mut log = Writer::new(file).expect("a log");
@@ -118,7 +117,7 @@ fn chunk(records: &[u8]) -> Vec<u8> {
     record(6, &[head.concat(), packed].concat())
 }
 
-/// A small file, and more than a gigabyte of names once it is read: what stands before them is shown.
+/// A small file with more than a gigabyte of names once read: the data before them is shown.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_log_that_swells_when_it_is_read_costs_little_memory() {

@@ -1,5 +1,5 @@
-//! Parquet files that somebody made or damaged: an error or a table, never a panic, and no more memory
-//! than a file of their size can hold.
+//! Malicious or damaged Parquet files: an error or a table, never a panic, and no more memory than a file of
+//! their size can hold.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ fn changed_bytes_are_an_error_or_a_table() {
         let mut bytes = sound.clone();
         match number % 4 {
             0 => bytes.truncate(rng.random_range(0..sound.len())),
-            // Most of what can be claimed is in the footer.
+            // Most of the claims are in the footer.
             1 => {
                 let at = bytes.len() - 1 - rng.random_range(0..900);
                 bytes[at] = rng.random();

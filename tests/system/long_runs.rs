@@ -64,7 +64,7 @@ fn peak_mb(id: u32) -> Option<f64> {
     Some(kb / 1e3)
 }
 
-/// Runs to the end; gives the most memory, MB, and the summary.
+/// Runs to the end; returns the peak memory, MB, and the summary.
 #[cfg(target_os = "linux")]
 fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
     let mut child = begin(scenario, out);
@@ -77,7 +77,7 @@ fn measured(scenario: &Path, out: &Path) -> (f64, Value) {
     let stderr = String::from_utf8_lossy(&output.stderr);
     ensure_disk_is_told(&stderr, out);
     let summary = json(&output);
-    // A missed target is told, and is no failure without `--strict`.
+    // A missed target is reported, and is no failure without `--strict`.
     assert_eq!(output.status.code(), Some(0), "{stderr}");
     (peak, summary)
 }
@@ -90,8 +90,8 @@ fn size(folder: &Path) -> f64 {
     sizes.map(|file| file.expect("a file").len() as f64).sum()
 }
 
-/// The disk that is told is what the files take, or up to three times as much: a robot that stands has
-/// less to say than one that walks.
+/// The announced disk space is what the files take, or up to three times as much: a robot that stands writes
+/// less than one that walks.
 #[cfg(target_os = "linux")]
 fn ensure_disk_is_told(stderr: &str, out: &Path) {
     let before = |what: &str| -> f64 {
@@ -111,7 +111,7 @@ fn ensure_disk_is_told(stderr: &str, out: &Path) {
     }
 }
 
-/// The scenario with the most to say takes no more disk than is told of it.
+/// The scenario that writes most takes no more disk than announced.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]
@@ -137,7 +137,7 @@ fn no_built_in_scenario_takes_more_disk_than_is_told() {
     }
 }
 
-/// Each channel of a log goes on in time to the end of the run, whatever counter has begun anew by then.
+/// Each channel of a log goes on in time to the end of the run, even if a counter has wrapped by then.
 #[cfg(target_os = "linux")]
 fn ensure_time_goes_on(log: &Path, duration_s: u32) {
     let mut newest = vec![None; channels().len()];
@@ -193,8 +193,7 @@ fn memory_does_not_grow_with_simulated_time() {
         fs::remove_dir_all(out).expect("removed");
         (peak, log as f64, summary)
     };
-    // Of 165 s and of 600 s about as many rows are kept for the figures, so that what is left
-    // between them is growth.
+    // For 165 s and for 600 s the figures keep about as many rows, so the remaining difference is growth.
     let short_s = 165;
     let (short, _, _) = run(short_s);
     let (long, log, summary) = run(long_s);
@@ -220,7 +219,7 @@ fn memory_does_not_grow_with_simulated_time() {
     assert!(slope_kb_s < 8.0, "{short} MB, then {long} MB");
 }
 
-/// A walk of 6 s over low blocks, 100 mm apart, and as many `far` ones beyond where it gets to.
+/// A walk of 6 s over low blocks, 100 mm apart, and as many `far` ones beyond its end.
 fn over_blocks(folder: &Path, far: usize) -> PathBuf {
     use std::fmt::Write as _;
     let path = folder.join(format!("blocks-{far}.toml"));
@@ -334,8 +333,8 @@ fn the_log_of_a_killed_run_is_recovered() {
     );
 }
 
-/// The disk fills up at ten different times of a run: the verdict is told and kept all the same.
-/// Each disk is a file system in memory, of a mount name space of its own.
+/// The disk fills up at ten different times of a run: the verdict is printed and kept all the same. Each disk
+/// is a file system in memory, of a mount name space of its own.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 #[cfg(target_os = "linux")]
@@ -343,7 +342,7 @@ fn a_disk_that_fills_at_any_time_keeps_the_summary() {
     let dir = tempfile::tempdir().expect("temporary folder");
     // From hardly more than the summary to room for everything.
     for kib in [96, 160, 256, 400, 640, 1000, 1600, 2500, 4000, 12_000] {
-        // What is on that disk is gone with the name space: the summary is copied out of it.
+        // That disk vanishes with the name space, so the summary is copied out of it.
         let script = format!(
             "mount -t tmpfs -o size={kib}k tmpfs \"$1\" || exit 77\n\
              \"$0\" run three-step --json --out \"$1/out\"; code=$?\n\
@@ -375,8 +374,7 @@ fn a_disk_that_fills_at_any_time_keeps_the_summary() {
     }
 }
 
-/// A limit on the size of a file stands for the full disk: log and page do not fit, the summary
-/// does.
+/// A limit on file size acts as the full disk: log and page do not fit, the summary does.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_costs_neither_verdict_nor_summary() {
@@ -410,7 +408,7 @@ fn a_full_disk_costs_neither_verdict_nor_summary() {
         "{stderr}"
     );
     assert!(stderr.contains("wheeleg log recover"), "{stderr}");
-    // What does not fit is not there in part, what fits is.
+    // Files that do not fit do not exist in part; those that fit exist.
     assert!(!out.join("report.html").exists());
     for figure in ["fig12-b5", "fig16-f6", "body"] {
         let path = out.join("figures").join(format!("{figure}.svg"));

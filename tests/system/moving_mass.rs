@@ -1,4 +1,4 @@
-//! The mass that a joint's board is told is the one that its piston feels.
+//! The mass set in a joint's board is the one that its piston feels.
 
 use wheeleg_config::builtin;
 use wheeleg_node::parameters::JointParameters;
@@ -6,7 +6,7 @@ use wheeleg_plant::dynamics::floating::state::LEG;
 use wheeleg_plant::dynamics::floating::{FloatingRobot, FloatingState, Velocity};
 use wheeleg_protocol::param::JointParam;
 
-/// What a piston must push away to move a robot that hangs free, kg: 1/(M⁻¹)ᵢᵢ.
+/// Mass that a piston feels when it moves a freely hanging robot, kg: 1/(M⁻¹)ᵢᵢ.
 fn felt_kg(robot: &FloatingRobot, state: &FloatingState, joint: usize) -> f64 {
     let kin = robot
         .prepare(state, &nalgebra::Vector3::zeros())

@@ -1,6 +1,6 @@
-//! Built-in files with mistakes in them: scenarios, robots, axes and plans of campaigns, with units,
-//! signs and magnitudes wrong, lines swapped, sections pasted from other files. Each is run or
-//! refused in words; none panics, hangs, leaves its folder, or leaves physics without a word.
+//! Built-in files with mistakes in them: scenarios, robots, axes and plans of campaigns, with wrong units,
+//! signs and magnitudes, swapped lines, sections pasted from other files. Each runs or is refused in words;
+//! none panics, hangs, writes outside its folder, or leaves physics without a message.
 //!
 //! Two hundred here; `cargo xtask deep practice` takes more, with numbers of their own.
 
@@ -35,12 +35,12 @@ const FILES: u64 = 200;
 const FEW_FILES: u64 = 20;
 /// A run that is not over is stopped with Ctrl-C then; a mistake may have made it a long one.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// One that goes on after that hangs. It may share its processor with others.
+/// A run that continues after that hangs. It may share its processor with others.
 const HUNG: Duration = Duration::from_secs(120);
 /// Simulated time of a run that has not got another by mistake, s.
 const DURATION_S: f64 = 0.3;
 
-/// What a file is.
+/// Kind of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Scenario,
@@ -49,7 +49,7 @@ enum Kind {
     Plan,
 }
 
-/// Kinds as often as they are taken.
+/// Kinds, as often as they are drawn.
 const KINDS: [Kind; 7] = [
     Kind::Scenario,
     Kind::Scenario,
@@ -60,18 +60,18 @@ const KINDS: [Kind; 7] = [
     Kind::Plan,
 ];
 
-/// What came of a file.
+/// Outcome of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Fate {
     /// It was run to its end, or until it was stopped.
     Ran,
-    /// Its run ended early, and the user is told why.
+    /// Its run ended early; the reason given to the user.
     Ended(String),
-    /// It was refused, and the user is told why.
+    /// It was refused; the reason given to the user.
     Refused(String),
 }
 
-/// Every built-in file. Scenarios are short, and what happens in them happens early.
+/// Every built-in file. Scenarios are short, and their events come early.
 fn files() -> Vec<(Kind, String)> {
     let scenarios = builtin::SCENARIOS.iter().map(|(.., text)| {
         let lines = text.lines().map(|line| {
@@ -96,12 +96,12 @@ fn files() -> Vec<(Kind, String)> {
         .collect()
 }
 
-/// A robot that stands, for robots.
+/// A standing robot, to test robot files.
 const STAND: &str = "name = \"stand\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
     duration = \"0.3 s\"\nseed = 1\ntargets = \"stand\"\n[motion]\nkind = \"stand\"\n";
 
-/// Says what a user is told, and that it is told in words: the file, the field or section, what about
-/// it, and no value as a program prints it for itself.
+/// Returns the messages to the user, and checks that they are in words: the file, the field or section, what
+/// about it, and no value in a program's debug format.
 fn messages(error: &dyn Diagnostic, file: &str) -> String {
     let mut text = error.to_string();
     let mut remedy = error.help().is_some() || error.related().is_some();
@@ -140,7 +140,7 @@ fn program_word(text: &str, file: &str) -> Option<String> {
     }
     let of_program = ["Some(", "None", "Err(", "Ok(", "::", "PlantError"];
     let found = of_program.into_iter().find(|word| {
-        // The parser of TOML names what it expected in marks of its own.
+        // The TOML parser quotes the tokens that it expected.
         text.contains(word) && !file.contains(word) && !text.contains("not valid TOML")
     });
     let not_a_number = |text: &str| {
@@ -244,7 +244,7 @@ fn refused(error: &dyn Diagnostic, text: &str) -> Fate {
     Fate::Refused(messages(error, text))
 }
 
-/// What the program makes of a file of a kind.
+/// Outcome of running a file of a kind.
 fn fate(kind: Kind, file: &Path, stop: &Stop) -> Fate {
     let folder = file.parent().expect("a folder");
     let out = folder.join("out");
@@ -306,7 +306,7 @@ fn plan_fate(
     Ok(Fate::Ran)
 }
 
-/// What comes of a file, in a thread of its own; the message of a panic, or that it hangs.
+/// Outcome of a file, run in its own thread; the message of a panic, or that it hangs.
 fn judged(kind: Kind, file: PathBuf) -> Result<Fate, String> {
     let (sender, receiver) = mpsc::channel();
     let stop = Stop::default();
@@ -329,7 +329,7 @@ fn judged(kind: Kind, file: PathBuf) -> Result<Fate, String> {
     late.unwrap_or_else(|_| Err(format!("still at work {HUNG:?} after Ctrl-C")))
 }
 
-/// A file in a folder of its own, with what it may need beside it; its path.
+/// A file in its own folder, with the files it may need beside it; its path.
 fn laid_down(folder: &Path, text: &str) -> PathBuf {
     let data = builtin::DATA.iter();
     data.for_each(|(name, bytes)| fs::write(folder.join(name), bytes).expect("written"));
@@ -339,7 +339,7 @@ fn laid_down(folder: &Path, text: &str) -> PathBuf {
     file
 }
 
-/// Names of all that is in a folder.
+/// Names of everything in a folder.
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder").flatten();
     let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
@@ -373,7 +373,7 @@ impl fmt::Display for Tally {
     }
 }
 
-/// Makes the file of a number, and tells what came of it.
+/// Makes the file of a number, and reports the outcome.
 fn try_one(files: &[(Kind, String)], number: u64, tally: &Mutex<Tally>) {
     let mut rng = Pcg64Mcg::seed_from_u64(number);
     let wanted = KINDS[rng.random_range(0..KINDS.len())];
@@ -381,7 +381,7 @@ fn try_one(files: &[(Kind, String)], number: u64, tally: &Mutex<Tally>) {
     let (kind, text) = of_kind[rng.random_range(0..of_kind.len())];
     let (_, other) = &files[rng.random_range(0..files.len())];
     let mutant = mutate(&mut rng, text, other);
-    // What leaves its folder lands in the one around it.
+    // Anything written outside its folder lands in this one.
     let around = tempfile::tempdir().expect("temporary folder");
     let folder = around.path().join("its-own");
     fs::create_dir(&folder).expect("created");

@@ -1,5 +1,5 @@
-//! Wrong inputs of what is newest: server, boards, clients, certificates, identification, campaigns.
-//! Each is refused at once, in words that name it and what is allowed.
+//! Wrong inputs of the newest parts: server, boards, clients, certificates, identification, campaigns. Each
+//! is refused at once, with a message that names it and what is allowed.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
@@ -12,7 +12,7 @@ use crate::program;
 /// Longest time that a refusal may take, on a computer that does other work, too.
 const AT_ONCE: Duration = Duration::from_secs(20);
 
-/// Arguments, and what must stand in the message.
+/// Arguments, and the words that the message must contain.
 type Case = (&'static [&'static str], &'static [&'static str]);
 
 const ANY: [&str; 3] = ["serve", "--listen", "127.0.0.1:0"];

@@ -1,7 +1,7 @@
-//! Robots that are not what their boards are told: no board takes that for a fault, over every
-//! scenario in which nothing goes wrong and with loads below the margin that the boards are told.
+//! Robots that differ from the data in their boards: no board takes that for a fault, over every scenario in
+//! which nothing goes wrong and with loads below the margin set in the boards.
 //!
-//! A few robots here; `cargo xtask deep off-data` walks as many as it takes to know a rate.
+//! A few robots here; `cargo xtask deep off-data` walks as many as a rate needs.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,13 +14,13 @@ use wheeleg_sim::{JointProbe, run_watched};
 use wheeleg_telemetry::Recorder;
 use wheeleg_tests::{STEP, mix};
 
-/// How many robots are drawn, and the number of the first: others than those that a bound was
-/// found with show whether it holds.
+/// Number of robots, and the number of the first: robots other than those that gave a bound show whether it
+/// holds.
 const ROBOTS_VARIABLE: &str = "WHEELEG_OFF_ROBOTS";
 const FIRST_VARIABLE: &str = "WHEELEG_OFF_FIRST";
 /// Loads put on each robot's walk, one a run.
 const LOADS: u64 = 2;
-/// Largest of them, N: the margin that the boards are told is 50 N.
+/// Largest of them, N: the margin set in the boards is 50 N.
 const LARGEST_LOAD_N: f64 = 48.0;
 
 /// Numbers that look random, the same for the same start.
@@ -44,8 +44,8 @@ impl Draw {
     }
 }
 
-/// A robot whose valves, friction, seals and supply are not what its boards are told: each
-/// cylinder's own, at random within what the sources in the robot file leave open.
+/// A robot whose valves, friction, seals and supply differ from the data in its boards: per cylinder, at
+/// random within the range that the sources in the robot file leave open.
 fn off_its_data(number: u64) -> RobotConfig {
     let mut robot = robot();
     let mut draw = Draw::new(number);
@@ -70,7 +70,7 @@ fn off_its_data(number: u64) -> RobotConfig {
     robot
 }
 
-/// What a board made of its piston at one instant, and what was there.
+/// A board's estimate of its piston at one instant, and the truth.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     at_s: f64,
@@ -95,7 +95,7 @@ impl Seen {
 impl fmt::Display for Seen {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let a = &self.account;
-        // The boards are told 7.01 bar, whatever the supply is.
+        // The boards are configured for 7.01 bar, for any supply.
         let [p_a, p_b] = a
             .pressures
             .map(|p| f64::from(p) / f64::from(1 << 17) * 7.013);
@@ -117,8 +117,7 @@ impl fmt::Display for Seen {
     }
 }
 
-/// What came of a run: the first fault of a joint, anything else that stopped it, and the
-/// greatest doubt.
+/// Outcome of a run: the first fault of a joint, any other stop, and the greatest doubt.
 #[derive(Debug, Default)]
 struct Walk {
     tripped: Option<Seen>,
@@ -229,7 +228,7 @@ fn nothing_trips_on_a_robot_off_its_data() {
     assert!(alarms.is_empty(), "{}", alarms.join("\n"));
 }
 
-/// The same eyes see a fault where there is one, on such robots, too.
+/// The same checks see a fault where there is one, on such robots too.
 #[test]
 fn a_frozen_potentiometer_is_found_on_a_robot_off_its_data() {
     for drawn in 1..=3 {
@@ -239,7 +238,7 @@ fn a_frozen_potentiometer_is_found_on_a_robot_off_its_data() {
         frozen.faults = vec!["pot-frozen:joint2@3.8s".parse().expect("a fault")];
         let walk = walk(&frozen, &robot, drawn);
         let seen = walk.tripped.expect("found");
-        // By rule 1, or by rule 2 where too little has been vented for certain to compare.
+        // By rule 1, or by rule 2 where too little has been vented to compare for certain.
         assert_eq!(seen.joint, 2, "{seen}");
         assert!(matches!(seen.account.rule, 1 | 2), "{seen}");
         assert!(walk.stopped.is_some());

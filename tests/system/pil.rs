@@ -70,8 +70,7 @@ impl BoardBench {
         self.ran(&edge)
     }
 
-    /// Ticks until the board tells of a reset; gives it with the time of the
-    /// provocation taken off.
+    /// Runs until the board reports a reset; returns its time since this call and its cause.
     fn until_reset(&mut self, ticks: u32) -> Option<(u64, u32)> {
         let since_ns = self.now_ns;
         (0..ticks).find_map(|_| {
@@ -161,7 +160,7 @@ fn a_processor_that_faults_is_reset_by_its_handler_at_once() {
         cause & SOFTWARE_RESET != 0 && cause & WATCHDOG_RESET == 0,
         "{cause:#x}"
     );
-    // It faults where it sleeps, less than a tick before the bench's time.
+    // It faults while asleep, less than a tick before the bench's time.
     assert!((after_ns as i64).abs() < TICK_NS as i64, "{after_ns} ns");
     // It comes up again and stays up.
     for _ in 0..20 {
@@ -272,8 +271,8 @@ fn without_figures(reply: &Reply) -> Ran {
     }
 }
 
-/// The answer begins 100 µs later: a simulator that runs on to the next edge before it is
-/// told puts it on the line too late.
+/// The answer begins 100 µs later: a simulator that runs on to the next edge before it sees the answer puts
+/// it on the line too late.
 #[test]
 fn the_answer_to_a_request_that_ends_with_a_tick_edge_is_told_with_that_edge() {
     for (address, tick_ns) in [(2, TICK_NS), (7, SAMPLE_NS)] {

@@ -1,5 +1,5 @@
-//! What shuts the valves of an emulated board that drives its cylinder when the processor, its
-//! memory, its clock or its supply fails, and after what time.
+//! What shuts the valves of an emulated board that drives its cylinder when the processor, its memory, its
+//! clock or its supply fails, and how soon.
 
 use wheeleg_remote_host::unicorn::image;
 use wheeleg_remote_link::{Hook, Power, Reply, Request, SOFTWARE_RESET, Trip, WATCHDOG_RESET};
@@ -13,7 +13,7 @@ const BROWN_OUT: u32 = 1 << 27;
 const AWAY_MS: u64 = 200;
 const LASTS_MS: u64 = 320;
 
-/// What fails.
+/// The failure.
 #[derive(Debug, Clone)]
 #[expect(clippy::large_enum_variant, reason = "a handful of them")]
 enum Failure {
@@ -21,7 +21,7 @@ enum Failure {
     Supply,
 }
 
-/// What came of it.
+/// Its result.
 #[derive(Debug)]
 struct Outcome {
     /// Ticks from the failure on in which a valve was still energised.
@@ -82,8 +82,8 @@ fn outcome(failure: &Failure) -> Outcome {
     }
 }
 
-/// Each failure, how many ticks a valve may still be energised, within how many ms the board is
-/// reset, and the flag of that reset.
+/// Each failure, for how many ticks a valve may stay energised, within how many ms the board is reset, and
+/// the flag of that reset.
 #[test]
 fn what_fails_shuts_the_valves_in_time() {
     let hook = Failure::Hook;

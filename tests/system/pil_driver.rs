@@ -70,7 +70,7 @@ impl BoardBench {
         assert_eq!(self.board.ask(&hook), Reply::Done);
     }
 
-    /// Asks for the faults; gives the answer that the board wants to send.
+    /// Asks for the faults; returns the answer that the board wants to send.
     fn answer(&mut self) -> Vec<u8> {
         self.sequence += 1;
         let address = Address::new(self.kind.1).expect("a node");
@@ -119,10 +119,10 @@ fn limit(image: &Path, kind: Kind, times: u8) -> Result<(), String> {
     };
     ensure(&bench, 0)?;
     bench.stretch(times);
-    // It stands ready as a whole; its beginning is all that goes out.
+    // The whole answer is ready; only its beginning goes out.
     assert_eq!(bench.answer().len() as u32, length);
     ensure(&bench, 1)?;
-    // The transmitter is sound again: the board can still send, and tells.
+    // The transmitter is sound again: the board can still send, and reports.
     bench.stretch(1);
     let record = bench.faults();
     ensure(&bench, 1)?;
@@ -136,7 +136,7 @@ fn limit(image: &Path, kind: Kind, times: u8) -> Result<(), String> {
 fn hardware_ends_the_drive_of_a_transmission_that_takes_too_long_and_the_board_latches_it() {
     for kind in [JOINT, WHEEL] {
         let image = image(kind.0).expect("an image");
-        // Twice, more, and so much that no byte is over when the driver goes.
+        // Twice, more, and long enough that no byte is over when the driver goes.
         for times in [2, 3, 100] {
             let found = limit(&image, kind, times);
             assert_eq!(found, Ok(()), "{}, {times} times as long", kind.0);

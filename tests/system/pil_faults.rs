@@ -134,7 +134,7 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     for (board, rows) in pil.boards.iter().zip(&recording.links) {
         assert_eq!(board.late_frames, 0, "{}", board.node);
         let counted = &rows.last().expect("an answer of every board").v;
-        // Eight frames a cycle, but for what was broken.
+        // Eight frames a cycle, minus the broken ones.
         let broken = counted.truncated + counted.short + counted.crc;
         assert!(
             counted.frames > 1_000 && broken > 3,
@@ -145,8 +145,7 @@ fn on_a_disturbed_line_every_image_hears_and_counts_what_the_host_does() {
     }
 }
 
-/// Joint 2 is disarmed and shut from `from_s` on, every other axis is held, and all of
-/// that stays.
+/// Joint 2 is disarmed and shut from `from_s` on, every other axis is held, and this lasts.
 fn assert_all_stopped(recording: &Recording, from_s: f64) {
     for (joint, rows) in recording.joints.iter().enumerate() {
         let rest = window(rows, from_s, f64::INFINITY);
@@ -175,7 +174,7 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
             "joint {} moves {low} … {high} mm",
             joint + 1
         );
-        // What the board senses is what is there, to the noise.
+        // The board senses the truth, to the noise.
         for row in rest.iter().skip(100) {
             let error = row.v.sensed_mm - row.v.position_mm;
             assert!(error.abs() < 2.0, "joint {}: {error} mm", joint + 1);
@@ -183,9 +182,8 @@ fn assert_all_stopped(recording: &Recording, from_s: f64) {
     }
 }
 
-/// What a reset of joint 2 at `t` must lead to, once its outputs were off `commanded`
-/// seconds later: valves shut, one reset, all axes stopped. Gives the time until the
-/// valves are shut.
+/// Required effects of a reset of joint 2 at `t`, with its outputs off `commanded` seconds later: valves
+/// shut, one reset, all axes stopped. Returns the time until the valves are shut.
 fn assert_shut_after_one_reset(
     what: &str,
     recording: &Recording,
@@ -217,7 +215,7 @@ fn a_stopped_program_is_reset_by_its_watchdog_with_the_outputs_off() {
     let scenario = gait_with(&format!("node-hang:joint2@{t:.3}s"), t + 1.0);
     let (recording, pil) = run_with(&scenario, &one("joint2=pil"));
     let rows = &recording.joints[1];
-    // The hardware goes on with what it was told last.
+    // The hardware keeps its last outputs.
     let hung = window(rows, t + 2.0 * TICK_S, t + 0.040);
     let told = |row: &Row<JointSample>| {
         [
@@ -277,7 +275,7 @@ fn a_wheel_that_lost_its_supply_counts_from_zero_again_as_its_hardware_does() {
         "{count}, {read:?}"
     );
     assert!(read.is_sorted() && read.last() > read.first(), "{read:?}");
-    // It may hold already: the master has told all axes to.
+    // It may hold already: the master has commanded all axes to.
     let drives = [NodeMode::Armed.code(), NodeMode::Tracking.code()];
     let modes = after.iter().map(|row| row.v.mode);
     assert!(modes.clone().all(|m| !drives.contains(&m)), "armed again");
@@ -328,7 +326,7 @@ fn a_native_run_is_that_of_boards_that_were_down_to_the_last_bit_of_the_log() {
         let said = String::from_utf8_lossy(&ran.stderr);
         assert!(ran.status.success(), "{pair:?}: {said}");
         let summary: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("a summary");
-        // Each of them was down once, and that is not what was compared away.
+        // Each of them was down once, and the comparison did not remove that.
         for board in summary["pil"]["boards"].as_array().expect("boards") {
             assert_eq!(board["resets"], 1, "{pair:?}: {board}");
         }
@@ -371,7 +369,7 @@ impl Saver {
         self.board.ran(&Request::Run(run))
     }
 
-    /// Switches the supply off and on; gives the set that is found then.
+    /// Switches the supply off and on; returns the set found then.
     fn restart(&mut self) -> Set {
         self.run(5, Power::BrownOut);
         // The supply comes back at the end of a run.

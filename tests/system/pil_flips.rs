@@ -24,7 +24,7 @@ const BYTE_NS: u64 = 10_000;
 /// Puts a request to the board.
 type Ask<'a> = dyn FnMut(&Request) -> Reply + 'a;
 
-/// One board and what it does while bits of it flip.
+/// One board and its motion while bits of it flip.
 struct Subject {
     /// Its image.
     image: &'static str,
@@ -76,7 +76,7 @@ const WHEEL: Subject = Subject {
 /// The second wheel: it has no dump valve, which acts at once.
 const WHEEL_ADDRESS: u8 = 8;
 const SAMPLE_NS: u64 = 520_000;
-/// Speed that the wheel is to have, counts/s.
+/// Target speed of the wheel, counts/s.
 const SPEED: f64 = 5_000.0;
 /// Speed at full drive, counts/s, and the time in which it comes (ASSUMED: any motor
 /// that the loop can hold will do).
@@ -166,19 +166,19 @@ impl Flip {
     }
 }
 
-/// What a flip came to.
+/// Result of a flip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Came {
     /// The outputs are off from the second tick after it on.
     Held,
     /// They are off in the second tick after the next SYNC, which did not fit.
     HeldBySync,
-    /// The board did exactly what it does without.
+    /// The board did exactly the same as without the flip.
     Nothing,
     /// The processor was reset, and its outputs are off from then on.
     Reset,
-    /// The board took the link for lost within two ticks, says so, and does what it does
-    /// then: a wheel's drive falls, and turns nowhere.
+    /// The board took the link for lost within two ticks, says so, and reacts as to a lost link: a wheel's
+    /// drive falls, and turns nowhere.
     LinkLost,
     /// It hit the decoder of the bus: the board does exactly what it does when the
     /// next frame is lost on the line, and has counted that frame as a broken one.
@@ -187,7 +187,7 @@ enum Came {
     Changed,
 }
 
-/// What drives something; a bridge at zero has no direction.
+/// Driven outputs; a bridge at zero has no direction.
 fn driven(outputs: &Outputs) -> [u16; 6] {
     let [a, b, c, d] = outputs.valve_on_us;
     let backward = outputs.bridge_backward && outputs.bridge_percent > 0;
@@ -196,7 +196,7 @@ fn driven(outputs: &Outputs) -> [u16; 6] {
 
 const OFF: [u16; 6] = [0; 6];
 
-/// What happens to a board in its timeline.
+/// Event of a board in its timeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Incident {
     None,
@@ -205,17 +205,17 @@ enum Incident {
     Lost(usize),
 }
 
-/// What a board did.
+/// Record of a board's behaviour.
 #[derive(Debug, Clone, PartialEq)]
 struct Timeline {
-    /// What it drove from edge to edge.
+    /// Its outputs from edge to edge.
     driving: Vec<[u16; 6]>,
     /// Edges before each delivery.
     delivered: Vec<usize>,
     reset: bool,
-    /// Sound frames and broken ones that it says it has heard.
+    /// Sound and broken frames that it reports as heard.
     heard: Option<[u32; 2]>,
-    /// The first fault that it tells of, and when it was found, ns.
+    /// The first fault that it reports, and when it was found, ns.
     fault: Option<(Fault, u64)>,
 }
 
@@ -275,8 +275,7 @@ fn run_timeline(subject: &Subject, incident: Incident) -> Timeline {
     did
 }
 
-/// What the board answers after its last edge when it is asked what it has heard and
-/// what is wrong.
+/// The board's answers after its last edge to questions about frames heard and faults.
 fn ask_both(board: &mut Board, subject: &Subject, mut edge_ns: u64) -> Vec<Message> {
     let address = Address::new(subject.address).expect("a board");
     let mut answers = Vec::new();
@@ -319,8 +318,8 @@ fn took_the_link_for_lost(subject: &Subject, flip: Flip, flipped: &Timeline) -> 
     within && named && shut && rest.windows(2).all(falls)
 }
 
-/// Whether the board did what it does when the first frame after the flip is lost, and
-/// counted that frame as broken.
+/// Whether the board did the same as when the first frame after the flip is lost, and counted that frame as
+/// broken.
 fn lost_one_frame(subject: &Subject, baseline: &Timeline, flip: Flip, flipped: &Timeline) -> bool {
     let next = baseline
         .delivered
@@ -343,7 +342,7 @@ fn judge(subject: &Subject, baseline: &Timeline, flip: Flip) -> Came {
     );
     // An emulator that has stopped says nothing about the rest.
     let whole = flipped.driving.len() == baseline.driving.len();
-    // The edge after the flip still shows what was prepared before it.
+    // The edge after the flip still shows outputs prepared before it.
     let off = |from: usize| whole && flipped.driving[from..].iter().all(|d| *d == OFF);
     match () {
         () if flipped.driving == baseline.driving => Came::Nothing,
@@ -401,8 +400,7 @@ fn every_flip_is_found_or_does_nothing(subject: &Subject) {
         count(Came::FrameLost),
         changed.len()
     );
-    // At most three standard deviations of so many draws below: the flips do hit what is
-    // sealed.
+    // At most three standard deviations below this share of draws: the flips do hit sealed state.
     let (draws, share) = (flips as f64, subject.sealed);
     let spread = 3.0 * (draws * share * (1.0 - share)).sqrt();
     assert!(
@@ -428,9 +426,9 @@ const TURNED: u64 = 60;
 /// Counts of each sample until then.
 const COUNTS: i32 = 5_000;
 
-/// What a wheel says of its position once a flip of bit 17 of this word of its
-/// application has been found and its fault was cleared: its count less the true one.
-/// `None` without an answer: it was reset, or is no longer where it can be reached.
+/// Error of a wheel's reported position once a flip of bit 17 of this word of its application has been found
+/// and its fault cleared: its count less the true one. `None` without an answer: it was reset, or can no
+/// longer be reached.
 fn error_after_clear(word: u32) -> Option<i32> {
     let address = Address::wheel(WHEEL_ADDRESS).expect("a wheel");
     let mut board = Board::new(image("wheel").expect("an image"));
@@ -509,8 +507,8 @@ fn a_wheel_knows_its_position_when_the_fault_of_a_flipped_bit_is_cleared() {
     );
 }
 
-/// What `judge` says of each number below `count`, on two boards at a time; which one
-/// takes a number changes nothing.
+/// Results of `judge` for each number below `count`, on two boards at a time; which one takes a number
+/// changes nothing.
 fn in_two_halves<T: Send>(count: u64, judge: impl Fn(u64) -> T + Sync) -> Vec<T> {
     std::thread::scope(|scope| {
         let judge = &judge;

@@ -114,7 +114,7 @@ fn the_robot_walks_with_a_joint_and_a_wheel_on_the_bench() {
     assert_eq!(pil.differing_bits, 0, "{:?}", pil.first_difference);
     assert!(pil.compared_bits > 200_000, "{}", pil.compared_bits);
     assert!(pil.boards.iter().all(|b| b.resets == 0 && b.ticks > 1_000));
-    // And the robot does what it does without.
+    // And the robot does the same as without it.
     let native = sil::run(&gait(LegChoice::Left, 1.2, &[]), &robot(), 1);
     assert!(recording.joints == native.joints && recording.wheels == native.wheels);
     let moves = |rows: &[wheeleg_telemetry::Row<_>]| {

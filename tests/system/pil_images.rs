@@ -1,6 +1,6 @@
-//! Images that are not what is wanted: told before anything is started, with the file,
-//! what it is, what is wanted and the command that builds it; results of an earlier run
-//! stay where they are. `cargo xtask pil` builds what this needs and runs it.
+//! Wrong firmware images: reported before anything starts, with the file, its kind, the wanted kind and the
+//! command that builds it; results of an earlier run stay. `cargo xtask pil` builds the images for this and
+//! runs it.
 
 use crate::program;
 use std::path::{Path, PathBuf};
@@ -85,7 +85,7 @@ struct Run {
 }
 
 impl Run {
-    /// What the program says, without the frames and breaks of its error messages.
+    /// The program's output, without the frames and breaks of its error messages.
     fn says(&self) -> String {
         plain(&self.output.stderr)
     }
@@ -209,7 +209,7 @@ fn an_image_of_another_bus_interface_is_refused() {
         &format!("{other:016x} is not an interface of this archive"),
         "cargo xtask firmware",
     ]);
-    // Who has no such board does not care.
+    // A run without such a board does not care.
     assert!(images.run("joint3=pil", &[]).output.status.success());
 }
 
@@ -227,7 +227,7 @@ fn an_image_of_other_sources_gives_a_warning_and_no_verdict_on_equality() {
         "cargo xtask firmware",
         "without --compare-sil",
     ]);
-    // The same run with the image as it was built, without a word.
+    // The same run with the unchanged image, without a message.
     let good = Images::with("joint", &std::fs::read(built("joint")).expect("the image"));
     let run = good.run("joint3=pil", &["--compare-sil"]);
     assert!(run.output.status.success(), "{}", run.says());

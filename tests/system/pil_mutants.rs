@@ -1,6 +1,5 @@
-//! Images that are wrong on purpose, one line of board support each: the
-//! comparison on emulated boards finds every one of them, and nothing in the images
-//! that are flashed. `cargo xtask pil` builds both and runs this.
+//! Images that are wrong on purpose, one line of board support each: the comparison on emulated boards finds
+//! every one of them, and no difference in the flashed images. `cargo xtask pil` builds both and runs this.
 
 use crate::program;
 use std::path::PathBuf;
@@ -13,7 +12,7 @@ const MUTANTS: &str = "WHEELEG_MUTANTS";
 /// Folder of the images that are flashed.
 const IMAGES: &str = "WHEELEG_IMAGES";
 
-/// What the comparison of a run says.
+/// Result of the comparison of a run.
 #[derive(Debug)]
 struct Verdict {
     compared_bits: u64,

@@ -72,7 +72,7 @@ impl BoardBench {
         }
     }
 
-    /// Sends a request in the middle of a tick; gives the answer.
+    /// Sends a request in the middle of a tick; returns the answer.
     fn request(&mut self, message: Message) -> Message {
         self.sequence += 1;
         let address = Address::new(ADDRESS).expect("a joint");
@@ -115,7 +115,7 @@ impl BoardBench {
         matches!(self.request(ParamSave {}.into()), Message::Ack(_))
     }
 
-    /// Switches the supply off and on; gives why the board says that it started.
+    /// Switches the supply off and on; returns the reported reason of the start.
     fn restart(&mut self) -> FaultRecord {
         self.ticks(5, Power::BrownOut);
         self.ticks(START_MS, Power::Good);
@@ -192,7 +192,7 @@ fn save(node: u8) -> EventAction {
     EventAction::Command(Command::SaveParameters { node })
 }
 
-/// Parameters that the master was told in a run: board, number, raw value.
+/// Parameters that the master received in a run: board, number, raw value.
 fn parameters(recording: &Recording) -> Vec<(u8, u16, i32)> {
     let events = recording.events.iter();
     events

@@ -1,6 +1,6 @@
-//! Walks with eight emulated boards: the images do, bit for bit, what the boards in the simulator do,
-//! over sand, over rocks, and after layer 1 stands still. 10 s of each here; `cargo xtask deep
-//! pil-walks` runs them to their ends.
+//! Walks with eight emulated boards: the images match the boards in the simulator bit for bit, over sand,
+//! over rocks, and after layer 1 freezes. 10 s of each here; `cargo xtask deep pil-walks` runs them to their
+//! ends.
 
 use std::ops::ControlFlow;
 
@@ -14,7 +14,7 @@ use wheeleg_telemetry::Recorder;
 const WHOLE: &str = "WHEELEG_PIL_WHOLE";
 const SUITE_S: f64 = 10.0;
 
-/// What happened, and the hash of the log.
+/// The outcome, and the hash of the log.
 fn played(scenario: &Scenario, nodes: &Nodes) -> (RunOutcome, String) {
     let robot = builtin::robot(&scenario.robot).expect("built in");
     let mut recorder = Recorder::in_memory();

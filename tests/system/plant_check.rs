@@ -1,4 +1,4 @@
-//! `wheeleg plant check`, calibrated: what is sound passes, what is planted is found.
+//! `wheeleg plant check`, calibrated: sound plants pass, planted errors are found.
 
 use crate::axis_text::changed;
 use rand::{RngExt as _, SeedableRng as _};
@@ -28,7 +28,7 @@ pub(crate) fn text(seed: u64) -> String {
     // The port is larger than the valve, the end stop holds the force within 0.1 to 0.3 mm.
     let end_stop_n_mm = (force_n / log(0.1, 0.3)).clamp(20.0, 9000.0);
     let dead_cm3 = log(0.15, 0.4) * piston_cm2;
-    // Every ratio that a file may say, evenly: those of two valves and a tube are independent.
+    // Every permitted ratio, evenly: those of two valves and a tube are independent.
     let mut ratio = || 0.9 * (log(1.0, std::f64::consts::E)).ln();
     let ratios = [ratio(), ratio(), ratio()];
     let changes = [
@@ -124,7 +124,7 @@ const SHORT: [[f64; 6]; 10] = [
     [10.0, 4.0, 25.0, 0.05, 5.0, 2.5],
     [12.0, 6.0, 25.0, 0.05, 5.0, 2.5],
     [16.0, 6.0, 10.0, 0.1, 5.0, 2.5],
-    // ISO 21287: so large a force, and such slow valves, that no mass keeps the piston off its stops.
+    // ISO 21287: the force is so large, and the valves so slow, that no mass keeps the piston off its stops.
     [40.0, 16.0, 10.0, 0.8, 15.0, 6.0],
     [50.0, 20.0, 25.0, 1.5, 25.0, 8.0],
     [63.0, 20.0, 10.0, 2.0, 5.0, 14.0],
@@ -132,7 +132,7 @@ const SHORT: [[f64; 6]; 10] = [
     [80.0, 25.0, 25.0, 3.0, 25.0, 30.0],
 ];
 
-/// One of them, moving what a hundredth of its force can.
+/// One of them, moving the load that a hundredth of its force can move.
 fn short([bore, rod, stroke, conductance, ms, dead]: [f64; 6]) -> AxisParams {
     let area_mm2 = 0.25 * std::f64::consts::PI * bore * bore;
     let mass_kg = (0.0065 * area_mm2).max(0.1);
@@ -182,7 +182,7 @@ fn short_strokes_raise_no_false_alarm() {
     }
 }
 
-/// What is planted into an axis of a short stroke is found as well.
+/// Errors planted into an axis of a short stroke are found as well.
 #[test]
 fn an_exponent_that_is_wrong_is_found_on_a_short_stroke() {
     let axis = short(SHORT[6]);
@@ -206,7 +206,7 @@ fn an_exponent_that_is_wrong_is_found_on_a_short_stroke() {
     assert_eq!(verdicts, [Verdict::Wrong], "{check:#?}");
 }
 
-/// What is wrong in a plant that was built or kept up like this.
+/// Quantities that are wrong in a plant built or maintained like this.
 fn wrong(
     build: &dyn Fn(&AxisParams) -> Result<Axis, PlantError>,
     after_tick: &dyn Fn(&mut AxisState),
@@ -222,7 +222,7 @@ fn wrong(
     wrong
 }
 
-/// A plant of which something was changed when it was built.
+/// A plant changed when it was built.
 fn built(change: &dyn Fn(&mut AxisParams)) -> Vec<Quantity> {
     wrong(
         &|params| {
@@ -238,7 +238,7 @@ fn built(change: &dyn Fn(&mut AxisParams)) -> Vec<Quantity> {
 fn planted_errors_are_found() {
     assert_eq!(wrong(&Axis::new, &|_| {}), [], "the plant as it is");
 
-    // Past the piston goes what about 2 % of a valve lets through.
+    // The leak past the piston is about 2 % of a valve's flow.
     let leak = built(&|p| p.cylinder.piston_leak_m3_s_pa = 2e-11);
     assert!(leak.contains(&Quantity::Pressure), "{leak:?}");
 
@@ -256,7 +256,7 @@ fn planted_errors_are_found() {
     });
     assert!(lost.contains(&Quantity::MassResidual), "{lost:?}");
 
-    // Heat that warms what is warm: what the wall gave in a tick is taken twice.
+    // Heat that warms warm gas: the wall's heat of a tick counts twice.
     let heat = {
         let before = std::cell::Cell::new(0.0);
         wrong(

@@ -1,5 +1,5 @@
-//! Inputs from practice: axes of catalogue cylinders and valves, and files made after reports of
-//! users. What came of all that was tried is in docs/records/practice-inputs.md.
+//! Inputs from practice: axes of catalogue cylinders and valves, and files based on user reports. The results
+//! of all of them are in docs/records/practice-inputs.md.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,7 +70,7 @@ fn cylinder(
     ]
 }
 
-/// Bore 80 x 200 mm with slow valves; `dead_cm3` is what may be too little.
+/// Bore 80 x 200 mm with slow valves; `dead_cm3` may be too little.
 fn wide(dead_cm3: f64) -> Changes {
     let mut all = valves(4.0, 0.35, 31.0, 40.0);
     let size = [80.0, 25.0, 200.0];
@@ -86,7 +86,7 @@ fn rodless(stroke_mm: f64) -> Changes {
     all
 }
 
-/// Figures of a tuning that are worse after than before, as this test judges them: by more than a tenth, and
+/// Figures of a tuning that are worse after than before, by this test's rule: by more than a tenth, and
 /// beyond what is good enough, mm.
 fn found_worse(summary: &Value) -> Vec<String> {
     let tests = summary["tests"].as_array().expect("a list");
@@ -138,8 +138,8 @@ fn found_worse(summary: &Value) -> Vec<String> {
     worse
 }
 
-/// Tunes an axis. Either it is at least as good as before and its parameters are written, or it is
-/// refused with what became worse, without them. The exit code.
+/// Tunes an axis. Either it is at least as good as before and its parameters are written, or it is refused
+/// with the figures that got worse, without parameters. Returns the exit code.
 fn tuned(base: &str, changes: &Changes) -> i32 {
     let folder = tempfile::tempdir().expect("temporary folder");
     let out = folder.path().join("out");
@@ -215,8 +215,8 @@ fn tuning_makes_no_random_axis_worse() {
     );
 }
 
-/// A standard stroke works. A longer one, which no board can be told, is refused by its own range by
-/// everything that reads the file.
+/// A standard stroke works. A longer one, which no board accepts, is refused by its own range by everything
+/// that reads the file.
 #[test]
 fn the_longest_standard_stroke_is_tuned() {
     assert_eq!(tuned(HEAVY, &rodless(500.0)), 0);
@@ -242,7 +242,7 @@ fn the_longest_standard_stroke_is_tuned() {
     }
 }
 
-/// What `plant check` says of an axis: its exit code and its text.
+/// Result of `plant check` for an axis: its exit code and its text.
 fn checked(base: &str, changes: &Changes) -> (Option<i32>, String) {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = axis(folder.path(), base, changes);
@@ -326,7 +326,7 @@ fn names_of_axes_are_checked_before_anything_is_played() {
     }
 }
 
-/// Runs a command with its arguments; exit code and what it says, without line breaks of a terminal.
+/// Runs a command with its arguments; exit code and output, without line breaks of a terminal.
 fn said(arguments: &[&str]) -> (Option<i32>, String) {
     let mut command = Command::new(program::path());
     command.env("NO_COLOR", "1").args(arguments);
@@ -336,7 +336,7 @@ fn said(arguments: &[&str]) -> (Option<i32>, String) {
     (told.status.code(), text.replace("\n  │ ", " "))
 }
 
-/// A scenario of the robot's that its plant refuses: a block stands where the robot does.
+/// A scenario that the robot's plant refuses: a block occupies the robot's place.
 const NO_PLACE: &str = "name = \"no-place\"\ndescription = \"\"\nrobot = \"wheeleg\"\n\
     duration = \"1 s\"\nseed = 1\ntargets = \"none\"\n[motion]\nkind = \"stand\"\n[[terrain]]\n\
     kind = \"block\"\nx = { value = [-0.1, 0.1], unit = \"m\" }\n\
@@ -372,8 +372,8 @@ fn a_run_that_is_refused_leaves_no_folder_and_costs_no_earlier_results() {
     assert_eq!(left, 1, "nothing beside it");
 }
 
-/// Pipes that nobody writes to, devices without an end and folders, in the place of a log: refused at
-/// once, by name, with what to give instead.
+/// Pipes without a writer, endless devices and folders, in place of a log: refused at once, by name, with
+/// what to give instead.
 #[cfg(target_os = "linux")]
 #[test]
 fn what_is_no_file_is_no_log() {
@@ -411,8 +411,8 @@ fn what_is_no_file_is_no_log() {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// A scenario may come from a pipe. One that nobody writes to is waited for until a signal comes,
-/// and then at once.
+/// A scenario may come from a pipe. The program waits for a pipe without a writer until a signal comes, and
+/// then ends at once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_pipe_that_nobody_writes_to_ends_with_the_first_signal() {
@@ -450,7 +450,7 @@ fn a_pipe_that_nobody_writes_to_ends_with_the_first_signal() {
     }
 }
 
-/// The table of a campaign and its page take nobody's place: a file is set aside, what is no file is
+/// The table of a campaign and its page overwrite nothing: an existing file is set aside, anything else is
 /// refused and stays.
 #[cfg(target_os = "linux")]
 #[test]
@@ -488,7 +488,7 @@ fn a_table_takes_no_place_of_a_file_or_a_pipe_unseen() {
         assert_eq!(code, Some(0), "{write}: {text}");
         let kept = fs::read_to_string(format!("{out}.previous"));
         assert_eq!(kept.expect("set aside"), "mine", "{write}");
-        // The same once more is no change.
+        // The same again is no change.
         let before = fs::read(&out).expect("written");
         assert_eq!(give().0, Some(0));
         assert_eq!(fs::read(&out).expect("written"), before);
@@ -502,7 +502,7 @@ fn a_table_takes_no_place_of_a_file_or_a_pipe_unseen() {
     assert_eq!(left.count(), 0);
 }
 
-/// The record of what was tried names tests and files that there are.
+/// The record of the inputs names tests and files that exist.
 #[test]
 fn the_record_names_tests_that_exist() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -570,8 +570,7 @@ fn a_log_whose_head_has_no_room_leaves_nothing() {
     }
 }
 
-/// A limit on the size of a file that is met later: verdict and summary are there, and what is missing is
-/// named.
+/// A limit on file size that is reached later: verdict and summary exist, and missing files are named.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_file_that_may_grow_no_further_is_told_as_a_full_disk() {
@@ -608,8 +607,8 @@ fn a_board_seats_where_the_relation_takes_it_to() {
     }
 }
 
-/// Cylinders that are 3 mm longer than their boards are told: refused by the fields; with what is advised
-/// the robot gets ready.
+/// Cylinders that are 3 mm longer than their boards know: refused by the fields; with the advised values the
+/// robot gets ready.
 #[test]
 fn a_longer_stroke_is_told_to_the_boards_too() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -640,7 +639,7 @@ fn a_longer_stroke_is_told_to_the_boards_too() {
     assert_eq!(ready.status.code(), Some(0), "{said}");
 }
 
-/// A reservoir that begins empty is waited for; one that never fills is named, with what decides it.
+/// The program waits for a reservoir that begins empty; one that never fills is named, with the cause.
 #[test]
 fn a_robot_that_begins_without_air_waits_for_it() {
     let folder = tempfile::tempdir().expect("temporary folder");

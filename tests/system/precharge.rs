@@ -1,5 +1,5 @@
-//! Precharge on simulated cylinders: what it makes of the first motion after a stop, and how far
-//! the piston moves while the chambers are filled. The board is the whole application.
+//! Precharge on simulated cylinders: its effect on the first motion after a stop, and how far the piston
+//! moves while the chambers fill. The board is the whole application.
 
 use crate::sil::{range, robot, robot_with, run, stand, story, window};
 use wheeleg_config::{AxisConfig, EventAction};
@@ -13,7 +13,7 @@ use wheeleg_telemetry::Cause;
 
 /// Raw value of a bar.
 const BAR: f64 = 65_536.0;
-/// Records with which a board's log tells that its precharge is over, and how.
+/// Log records with which a board reports the end of its precharge, and how it ended.
 const ENDED: [LogEvent; 3] = [
     LogEvent::Precharged,
     LogEvent::PrechargeMoved,
@@ -34,7 +34,7 @@ fn axes() -> Vec<(&'static str, AxisParams)> {
     axes
 }
 
-/// A bench whose board fills its chambers to `bar` when it is armed; 0: it does not.
+/// A bench whose board fills its chambers to `bar` when armed; 0: no precharge.
 fn bench(axis: &AxisParams, bar: f64) -> AxisSim<Node> {
     let sheet = design(axis, Kind::FuzzyPd);
     let raw = (bar * BAR).round() as i32;
@@ -42,7 +42,7 @@ fn bench(axis: &AxisParams, bar: f64) -> AxisSim<Node> {
     AxisSim::new(axis, 1, node).unwrap()
 }
 
-/// A run from an arming on, and what the precharge in it did.
+/// A run from an arming on, and the effect of its precharge.
 struct Start {
     trace: Trace,
     /// Length of the precharge, ms.
@@ -53,7 +53,7 @@ struct Start {
     least_bar: f64,
 }
 
-/// Runs from here on, where the board is about to be armed or just was.
+/// Runs from here on, with the board about to be armed or just armed.
 fn start(bench: &mut AxisSim<Node>, motion: &Motion, duration_s: f64) -> Start {
     let from_m = bench.state.core.motion.stroke_m;
     let (mut filled_ms, mut way_m, mut least_pa) = (0, 0.0_f64, 0.0_f64);
@@ -74,8 +74,8 @@ fn start(bench: &mut AxisSim<Node>, motion: &Motion, duration_s: f64) -> Start {
     }
 }
 
-/// Strokes and contents of the chambers at which a piston may stand when it is armed: emptied, or
-/// with air that the board knows nothing of, in balance with the load.
+/// Strokes and chamber contents at which a piston may rest when it is armed: emptied, or with air unknown to
+/// the board, in balance with the load.
 fn standing(axis: &AxisParams) -> Vec<AxisParams> {
     let loads = [-60.0, -12.0, -4.0, 0.0, 4.0, 12.0, 60.0];
     let ambient = axis.gas.ambient_pressure_pa;

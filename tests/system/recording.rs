@@ -1,4 +1,4 @@
-//! The program records a live robot: whatever ends it, what was recorded can be repeated.
+//! The program records a live robot: however the recording ends, it can be repeated.
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -107,7 +107,7 @@ fn a_server_that_does_not_start_leaves_the_keys_as_they_are() {
     served.end("TERM");
 }
 
-/// Whoever asks how the robot is reads of a stop first, and who pressed it.
+/// The robot's status starts with a stop and its sender.
 #[test]
 fn the_status_of_a_stopped_robot_begins_with_the_stop() {
     let served = Served::new("");
@@ -217,7 +217,7 @@ fn a_walk_that_is_interrupted_ends_on_both_feet_and_control_is_free() {
     assert_eq!(served.end("TERM").0, Some(143));
 }
 
-/// A computer that sleeps for a while under a walking robot: nobody has seen it meanwhile.
+/// A computer that sleeps for a while under a walking robot: nobody has watched it meanwhile.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
@@ -236,7 +236,7 @@ fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
     let state = served.until("held", |state| !state["hold"].is_null());
     assert_eq!(state["hold"], "operator_lost", "{state}");
     assert!(state["pace"]["shifts"].as_u64() > before["pace"]["shifts"].as_u64());
-    // From a look before it slept to one after it woke: what passed awake, and no second more.
+    // From a look before the sleep to one after it: the time awake, and not a second more.
     let passed = Duration::from_micros(us(&state) - us(&before));
     assert!(
         passed < woken.elapsed() + Duration::from_secs(3),
@@ -247,7 +247,7 @@ fn a_server_that_was_suspended_holds_and_makes_up_for_nothing() {
     assert_eq!(served.end("TERM").0, Some(143));
 }
 
-/// A file that may not grow stands for a disk that is full.
+/// A file with a size limit acts as a full disk.
 #[test]
 fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {
     let served = Served::new("trap '' XFSZ; ulimit -f 1200;");
@@ -271,7 +271,7 @@ fn a_full_disk_ends_the_recording_is_told_and_the_robot_goes_on() {
     assert_eq!(told["same"], true, "{told}");
 }
 
-/// What the command line gives of a wrong command is told whole, and takes the control from nobody.
+/// The command line reports every error of a wrong command, and takes control from no one.
 #[test]
 fn a_wrong_command_is_told_with_every_value_and_range() {
     let served = Served::new("");
@@ -351,7 +351,7 @@ fn parameters_of_a_board_are_read_written_and_saved_from_the_command_line() {
     assert!(before.ends_with(" mm") && before != "21.0 mm", "{before}");
     let (code, written, told) = param(&["set", "3", "error_scale", "21"]);
     assert_eq!((code, &*written), (Some(0), "21.0 mm"), "{told}");
-    // That board alone, and it has it.
+    // Only that board, and it has the value.
     assert_eq!(param(&["get", "3", "error_scale"]).1, "21.0 mm");
     assert_eq!(param(&["get", "2", "error_scale"]).1, before);
     let json = served.ctl(&["--json", "param", "get", "3", "error_scale"]);
@@ -376,7 +376,7 @@ fn parameters_of_a_board_are_read_written_and_saved_from_the_command_line() {
     }
     let (code, said, told) = param(&["save", "3"]);
     assert_eq!((code, &*said), (Some(0), "done"), "{told}");
-    // Not under an armed robot, and not beside who drives.
+    // Not while the robot is armed, and not while someone drives.
     assert!(served.ctl(&["take", "--", "Arm"]).status.success());
     let (code, _, told) = param(&["save", "3"]);
     assert_eq!(code, Some(1), "{told}");

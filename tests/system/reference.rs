@@ -1,6 +1,6 @@
-//! docs/reference is made from the code: the committed pages equal what it says.
+//! docs/reference is generated from the code: the committed pages equal the generated ones.
 //!
-//! `UPDATE_REFERENCE=1 cargo test -p wheeleg-tests --test system reference` writes them anew.
+//! `UPDATE_REFERENCE=1 cargo test -p wheeleg-tests --test system reference` rewrites them.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -1,6 +1,5 @@
-//! Restarts of master, boards and the user's program, in every order, while the robot
-//! walks: all come back within a second, disarmed, and nothing moves until the user says
-//! so.
+//! Restarts of master, boards and the user's program, in every order, while the robot walks: all return
+//! within a second, disarmed, and nothing moves until the user commands it.
 
 use crate::sil::{at, energised, gait, range, robot, run, stand, story, window};
 use wheeleg_config::{EventAction, LegChoice};
@@ -79,7 +78,7 @@ fn every_order_of_restarts_recovers_disarmed_within_a_second() {
             let what = format!("{order:?}, {gap_s} s apart\n{told}");
             let armed_s = last_s + RECOVERED_S;
 
-            // All walked before; then nobody drives until the user arms.
+            // All walked before; then no one drives until the user arms.
             let safe_s = last_s + 0.1;
             for (i, rows) in recording.joints.iter().enumerate() {
                 assert_eq!(at(rows, FIRST_S).mode, 3, "{what}");
@@ -142,7 +141,7 @@ fn a_master_that_starts_again_after_minutes_is_noticed_as_well() {
     assert!(told.contains("cycle counter does not advance"), "{told}");
 }
 
-/// The user's program may come back alone: the robot goes on, and listens to it.
+/// The user's program may restart alone: the robot continues, and listens to it.
 #[test]
 fn a_client_that_comes_back_is_heard_and_nothing_else_happens() {
     let events = [(3.0, EventAction::Command(Command::Hold))];

@@ -14,7 +14,7 @@ use wheeleg_tests::{STEP, mix};
 const REACTION_S: f64 = 0.060;
 /// Wheels stopped, and a staged exhaust not before this, s.
 const STAGE_S: f64 = 0.500;
-/// A rim slower than this stands, mm/s.
+/// A rim slower than this is at rest, mm/s.
 const STANDING_MM_S: f64 = 5.0;
 const TICK_S: f64 = 1e-3;
 
@@ -64,8 +64,8 @@ fn assert_shut(recording: &Recording, t: f64, reaction_s: f64) -> u32 {
     for (joint, rows) in recording.joints.iter().enumerate() {
         let valves = &robot.plant.cylinders[joint];
         let name = joint + 1;
-        // From the coil's end to the end of the flow: the valve closes, and what it did
-        // has to travel through the line.
+        // From the end of the coil current to the end of the flow: the valve closes, and its effect has to
+        // travel through the line.
         let t_off = valves.fill_valve.t_off_s.max(valves.vent_valve.t_off_s) + valves.line_delay_s;
         let held = window(rows, t, t + STAGE_S);
         let commanded = last(held, t, energised);
@@ -84,7 +84,7 @@ fn assert_shut(recording: &Recording, t: f64, reaction_s: f64) -> u32 {
             // Otherwise the last pulse was cut before the valve opened.
             && physical > commanded
         {
-            // As much later as it takes: not at once, and the coil is off within its tick.
+            // Later by the expected delay: not at once, and the coil is off within its tick.
             let takes = physical - commanded;
             assert!(
                 (t_off - TICK_S..t_off + TICK_S).contains(&takes),
@@ -227,7 +227,7 @@ fn losing_the_master_at_any_instant_is_safe() {
             );
         }
     }
-    // The instants reach what they are meant to reach.
+    // The instants reach their intended phases.
     assert!(
         flights >= 2 && stances >= 5,
         "{flights} flights, {stances} stances"
@@ -319,8 +319,7 @@ fn e_stop_holds_everything_and_dumps_the_supply() {
     }
 }
 
-/// After an E-stop: clear, wait for the supply, arm. The axes take over where
-/// they are.
+/// After an E-stop: clear, wait for the supply, arm. The axes resume from their positions.
 #[test]
 fn coming_back_from_an_e_stop_moves_nothing() {
     let robot = robot();
@@ -356,7 +355,7 @@ fn coming_back_from_an_e_stop_moves_nothing() {
                 rows[armed..].iter().all(|r| r.v.mode == ARMED),
                 "joint {name}\n{told}"
             );
-            // Reference := where it is.
+            // Reference := position.
             let now = &rows[armed].v;
             assert!(
                 (now.reference_mm - now.sensed_mm).abs() < 0.2,

@@ -1,5 +1,4 @@
-//! What a study or a campaign writes is what its published schema says, and that schema is the one of
-//! the code.
+//! The output of a study or a campaign matches its published schema, and that schema is the one of the code.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -40,7 +39,7 @@ fn the_committed_schemas_are_the_generated_ones() {
             .expect("wheeleg.FORM/VERSION");
         assert!(version.parse::<u32>().is_ok(), "{name}");
         let file = format!("{form}.json");
-        // A key of a study that is also one of all studies would stand twice in its summary.
+        // A key of both a study and all studies would appear twice in its summary.
         let required = schema["required"].as_array().expect("required keys");
         let keys: BTreeSet<&str> = required.iter().filter_map(|key| key.as_str()).collect();
         assert_eq!(keys.len(), required.len(), "{name}: {required:?}");
@@ -79,7 +78,7 @@ pub(crate) fn assert_form(document: &Value, name: &str) {
     assert!(wrong.is_empty(), "{name}: {wrong:#?}");
 }
 
-/// Fails unless a summary is as the schema says that it names, and it is of this study.
+/// Fails unless a summary matches the schema that it names and is of this study.
 pub(crate) fn assert_valid(summary: &Value, study: &str) {
     let name = summary["schema"].as_str().expect("a schema");
     let prefix = format!("wheeleg.{study}/");

@@ -1,5 +1,5 @@
-//! What a person does with boards, by the command line: commission them, change and
-//! store a parameter, and read who is at fault.
+//! A technician's work on boards with the command line: commission them, change and store a parameter, and
+//! read which one is at fault.
 
 use crate::program;
 use std::fs;
@@ -26,7 +26,7 @@ fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
     path
 }
 
-/// A robot that stands for `duration_s`, and what is done to it.
+/// A robot that stands for `duration_s`, and its events.
 fn scenario(folder: &Path, duration_s: f64, events: &str) -> PathBuf {
     let text = format!(
         "name = \"service\"\ndescription = \"boards\"\nrobot = \"wheeleg-2003\"\n\
@@ -108,7 +108,7 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
             &format!("command = \"WriteParameter\"\n{of}\nvalue = 777"),
         ),
         event(1.1, &format!("command = \"ReadParameter\"\n{of}")),
-        // Within its own limits, and below the board's `stroke_min`: the board alone refuses it.
+        // Within its own limits, but below the board's `stroke_min`: only the board refuses it.
         event(
             1.2,
             "command = \"WriteParameter\"\nboard = 1\nparameter = \"stroke_max\"\nvalue = -10",
@@ -120,7 +120,7 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
     let fault = "brown-out:wheel8=30@0.6s";
     let (good, said) = wheeleg(&["run", &scenario, "--out", &out_text, "--fault", fault]);
     assert!(good, "{said}");
-    // Printed: what happened, why, and the remedy.
+    // Printed: the event, why, and the remedy.
     for words in [
         "wheel 8 is lost",
         "wheel 8 says why: it has restarted",
@@ -137,13 +137,13 @@ fn a_parameter_that_was_saved_is_back_after_the_board_lost_its_power() {
     assert_eq!(values, ["12345 counts", "777 counts", "12345 counts"]);
     assert!(events.contains("SaveParameters done"));
     assert!(events.contains("WriteParameter refused: joint 1: A value is outside"));
-    // Logs of the boards stand beside it.
+    // The boards' logs are beside it.
     assert!(events.contains(" logs at "));
     let page = fs::read_to_string(out.join("report.html")).expect("report");
     assert!(!page.contains(" logs at "));
 }
 
-/// Lost, half loaded or set by somebody: the sum that a board tells is not that of the file.
+/// Lost, half loaded or changed: the sum that a board reports is not that of the file.
 #[test]
 fn the_console_names_a_joint_with_other_parameters_than_the_robot_files() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,5 +1,5 @@
-//! A session that somebody drives from outside: how time is cut changes nothing, inputs at the
-//! same times give the same recording, and commands and faults act.
+//! A session driven from outside: how time is cut changes nothing, inputs at the same times give the same
+//! recording, and commands and faults act.
 
 use wheeleg_config::builtin;
 use wheeleg_config::faults::{FaultSpec, FaultTarget};
@@ -74,7 +74,7 @@ fn inputs_from_outside_act_and_repeat() {
     assert_ne!(at(3, 1.10).faults, 0);
 }
 
-/// What cannot begin or end changes nothing, and what ends by itself can begin again.
+/// Input that cannot begin or end changes nothing, and input that ends by itself can begin again.
 #[test]
 fn a_fault_that_cannot_be_injected_is_refused() {
     let fault = |text: &str| text.parse().expect("a fault");
@@ -119,7 +119,7 @@ fn a_fault_that_cannot_be_injected_is_refused() {
     assert!(again.is_ok(), "it restarted long ago");
 }
 
-/// A robot at a console: nobody arms it, and the same inputs give the same recording.
+/// A robot at a console: no one arms it, and the same inputs give the same recording.
 #[test]
 fn a_live_session_does_what_its_clients_ask_and_repeats() {
     let drive = || {
@@ -205,7 +205,7 @@ fn a_session_knows_its_times() {
     session
         .step_to(500 * MS, &mut recorder)
         .expect("it goes on");
-    // Whatever is due at the time is done, nothing after it.
+    // Everything due at that time is done, and nothing after it.
     assert!(
         (499 * MS..=500 * MS).contains(&session.now_ns()),
         "{}",

@@ -1,4 +1,4 @@
-//! A robot that does not get ready is told by the fields of its file that decide it.
+//! A robot that does not get ready is reported by the fields of its file that decide it.
 
 use miette::Diagnostic as _;
 use wheeleg_config::{RobotConfig, builtin};
@@ -7,7 +7,7 @@ use wheeleg_studies::StudyError;
 use wheeleg_studies::run::run_read;
 use wheeleg_studies::study::Settings;
 
-/// What a robot that is to stand is told, and how to help it; empty if it stands.
+/// The error for a robot that should stand, and its help; empty if it stands.
 fn told(robot: &RobotConfig) -> [String; 2] {
     let mut scenario = builtin::scenario("stand").expect("built in");
     scenario.duration_s = 0.1;
@@ -47,7 +47,7 @@ fn the_limit_of_the_start_up_is_kept() {
     }
 }
 
-/// A pose that its joint does not come to rest in is told by the field of the gait that asks for it.
+/// A pose in which its joint does not come to rest is reported by the field of the gait that asks for it.
 #[test]
 fn a_pose_that_does_not_settle_is_named_by_its_field() {
     for stroke_m in [0.005, 0.09] {

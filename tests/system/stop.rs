@@ -1,4 +1,4 @@
-//! Studies that a signal stops write what they have and say so; two of them never share a folder.
+//! Studies stopped by a signal write their results so far and say so; two of them never share a folder.
 
 use std::fs;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::every_command::{Inputs, Leaves, tries};
 use crate::schema::assert_valid;
 use crate::{cli, program};
 
-/// Longest time that a program may take to begin, or to end once it was asked to.
+/// Longest time that a program may take to begin, or to end on request.
 const HUNG: Duration = Duration::from_secs(120);
 /// Longest time from a signal to the end, on a computer that does other work, too: a part of a study
 /// is not finished first, a row of the fault matrix least of all.
@@ -172,7 +172,7 @@ fn a_run_that_is_terminated_or_hung_up_leaves_log_summary_and_report() {
     for (name, code) in [("TERM", 143), ("HUP", 129)] {
         let folder = tempfile::tempdir().expect("temporary folder");
         let out = folder.path().join("out");
-        // Nobody reads what a program says whose terminal is gone.
+        // No one reads the output of a program whose terminal is gone.
         let mut child = long_run(folder.path(), &out, Stdio::piped);
         drop((child.stdout.take(), child.stderr.take()));
         signal(&child, name);
@@ -187,7 +187,7 @@ fn a_run_that_is_terminated_or_hung_up_leaves_log_summary_and_report() {
     }
 }
 
-/// Twenty instants of a run, from its first to its last milliseconds: what was begun is whole.
+/// Twenty instants of a run, from its first to its last milliseconds: every file begun is whole.
 #[test]
 fn a_run_can_be_terminated_at_any_time() {
     let mut stopped = 0;
@@ -221,9 +221,9 @@ fn a_run_can_be_terminated_at_any_time() {
     assert!(stopped > 0, "at least one was stopped on its way");
 }
 
-/// Every command that computes for long or waits, each signal, at instants from its first
-/// milliseconds on: the program ends soon, with the code of the signal or because it was done; what
-/// is there is whole, and nothing else is.
+/// Every command that computes for long or waits, each signal, at instants from its first milliseconds on:
+/// the program ends soon, with the code of the signal or because it was done; its files are whole, and there
+/// are no others.
 #[test]
 fn every_long_command_can_be_stopped_at_any_time() {
     use std::os::unix::process::ExitStatusExt as _;
@@ -272,11 +272,11 @@ fn every_long_command_can_be_stopped_at_any_time() {
                 }
                 continue;
             }
-            // What a scheduler has ended it starts again, which is code 75.
+            // A scheduler restarts what it has ended, which is code 75.
             let again = tried.arguments[0] == "campaign" && name != "INT";
             let expected = if again { 75 } else { code };
             let ended = output.status.code().expect("a code");
-            // What ran to its end says what came of it: 1 where a move or a bar is missed.
+            // A run that reached its end reports its result: 1 where a move or a bar is missed.
             assert!([expected, 0, 1].contains(&ended), "{ended}, {told}");
             assert!(
                 over || ended != expected || !stderr.is_empty(),
@@ -306,8 +306,8 @@ fn every_long_command_can_be_stopped_at_any_time() {
     assert!(3 * stopped >= started, "{stopped} of {started}");
 }
 
-/// Every study and campaign is caught at its work by one of some instants after it has taken its folder:
-/// it ends with the code of the signal, and says which it was and how far it came.
+/// One of several instants after it has taken its folder catches every study and campaign at work: it ends
+/// with the code of the signal, and reports the signal and its progress.
 #[test]
 fn every_study_that_is_caught_at_its_work_names_the_signal() {
     let inputs = Inputs::new();
@@ -368,8 +368,8 @@ fn parts(out: &Path) -> Vec<(String, Vec<u8>)> {
     parts
 }
 
-/// From the instant at which a campaign makes its folder on: what a signal ends leaves nothing, or a
-/// folder with its plan, with which the same command goes on to the same parts.
+/// From the instant at which a campaign makes its folder on: a signal leaves nothing, or a folder with its
+/// plan, from which the same command continues to the same parts.
 #[test]
 fn a_campaign_that_is_stopped_has_written_nothing_or_goes_on() {
     use std::os::unix::process::ExitStatusExt as _;
@@ -431,7 +431,7 @@ pub(crate) fn files_below(folder: &Path) -> Vec<String> {
     found
 }
 
-/// The folder of a run goes while it is under way: the verdict is told all the same.
+/// The folder of a run is removed while it is under way: the verdict is printed all the same.
 #[test]
 fn a_folder_that_vanishes_costs_no_verdict() {
     let dir = tempfile::tempdir().expect("temporary folder");
@@ -450,12 +450,12 @@ fn a_folder_that_vanishes_costs_no_verdict() {
         said.contains("log.mcap") && said.contains("csv") && !said.contains("panicked"),
         "{said}"
     );
-    // What can be made anew is.
+    // Files that can be remade are.
     assert_valid(&summary(&out), "run");
 }
 
-/// The folder of any study goes while it is under way: what is made anew has its summary, or nothing
-/// is there. A report alone would pass for a whole study.
+/// The folder of any study is removed while the study runs: a remade one has its summary, or nothing is
+/// there. A report alone would pass for a whole study.
 #[test]
 fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
     let inputs = Inputs::new();
@@ -498,8 +498,8 @@ fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
     assert!(remade >= 8, "{remade} folders were made anew");
 }
 
-/// It goes as soon as it is there: whatever of it is made anew, the verdict is told, and that the
-/// log is gone.
+/// It is removed as soon as it exists: in any case the verdict is printed, and the loss of the log is
+/// reported.
 #[test]
 fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
     let mut lost = 0;
@@ -519,7 +519,7 @@ fn a_folder_that_vanishes_in_the_first_milliseconds_costs_no_verdict() {
             assert!(said.contains("log.mcap"), "{delay_ms} ms: {said}");
             lost += 1;
         } else {
-            // It could not even begin, and says of which file.
+            // It could not even begin, and names the file.
             assert!(said.contains("cannot "), "{delay_ms} ms: {said}");
         }
     }
@@ -601,7 +601,7 @@ fn a_second_run_in_a_folder_is_refused_by_name_of_the_lock_and_the_first_loses_n
     assert!(next.status.success());
 }
 
-/// What is at the place of the lock and is none is not written to.
+/// Anything at the lock's path that is no lock is not written to.
 #[test]
 fn a_lock_that_is_a_link_or_somebody_elses_file_is_refused() {
     let folder = tempfile::tempdir().expect("temporary folder");

@@ -1,4 +1,4 @@
-//! Texts of files and of servers stand in what the program says, and do not act on a terminal.
+//! Texts from files and servers appear in the program's output, and do not act on a terminal.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;
@@ -15,7 +15,7 @@ fn wheeleg(arguments: &[&str], home: &std::path::Path) -> Output {
     command.output().expect("run")
 }
 
-/// What was told is shown, and nothing of it acts.
+/// The output shows the text, and no control sequence in it acts.
 fn assert_harmless(told: &[u8], shown: &str) {
     let told = String::from_utf8_lossy(told);
     assert!(told.contains(shown), "{told:?}");
@@ -49,7 +49,7 @@ fn texts_of_a_file_do_not_act_on_a_terminal() {
     }
 }
 
-/// What a command says to a server in place of ours, which does not have the key, and answers so.
+/// A command's output about a false server, which does not have the key and sends this answer.
 fn asked_of(command: &str, status: &'static str, body: &serde_json::Value) -> Output {
     let home = tempfile::tempdir().expect("a folder");
     wheeleg_console::keys::Keys::open(&home.path().join("wheeleg")).expect("keys");

@@ -7,7 +7,7 @@ use wheeleg_master::layer1::walk::{WalkGeometry, WalkOrder};
 use wheeleg_studies::analysis::{Target, analyse};
 use wheeleg_units::VelocityMmS;
 
-/// What a seed makes of the scenario's bars.
+/// Results of the scenario's bars for a seed.
 fn targets(scenario: &Scenario, seed: u64) -> Vec<Target> {
     let robot = builtin::robot(&scenario.robot).expect("built in");
     let recording = sil::run(scenario, &robot, seed);
@@ -96,7 +96,7 @@ fn the_robot_walks_backward_and_turns_on_the_spot() {
     met(&walk(spin, &bars), [1]);
 }
 
-/// The master is told the leg's dimensions: led by those of the paper's leg, the feet would go ahead
+/// The master is configured with the leg's dimensions: with those of the paper's leg, the feet would go ahead
 /// of the ground in a turn, or lag, and the wheels slip.
 #[test]
 fn a_robot_with_another_leg_walks_and_turns_as_it_is_told() {

@@ -1,5 +1,5 @@
-//! The rules of the house that a compiler does not check: who may depend on
-//! whom, one place for versions and lints, nothing that refers outside.
+//! House rules that a compiler does not check: which crate may depend on which, one place for versions and
+//! lints, no references outside.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,8 +13,8 @@ mod assertions;
 mod circles;
 mod documents;
 
-/// Who may depend on which of our own crates (ARCHITECTURE.md). Development
-/// dependencies count too: a test is no back door.
+/// Which of our own crates each may depend on (ARCHITECTURE.md). Development dependencies count too: a test
+/// is no back door.
 const ARROWS: [(&str, &[&str]); 32] = [
     ("wheeleg-identity", &[]),
     ("wheeleg-units", &[]),
@@ -270,7 +270,7 @@ const TESTED: [&str; 21] = [
     "wheeleg-units",
 ];
 
-/// Folders in which `unsafe` may stand: board glue.
+/// Folders that may contain `unsafe`: board glue.
 const UNSAFE_ALLOWED: [&str; 4] = [
     "firmware/board/src/",
     "firmware/board-qemu/",
@@ -400,7 +400,7 @@ fn arrows_point_one_way() {
     }
 }
 
-/// Of the crates that `name` depends on, those that its line in the table does not allow.
+/// Dependencies of `name` that its line in the table does not allow.
 fn upward(name: &str, dependencies: &BTreeSet<String>) -> Vec<String> {
     let line = ARROWS.iter().find(|(listed, _)| *listed == name);
     let (_, allowed) = line.expect("a line in the table");
@@ -412,7 +412,7 @@ fn upward(name: &str, dependencies: &BTreeSet<String>) -> Vec<String> {
         .collect()
 }
 
-/// A `use` of a crate above needs a dependency on it, and that is what is found.
+/// A `use` of a crate above needs a dependency on it, which this finds.
 #[test]
 fn an_arrow_that_points_up_is_found() {
     let packages = packages();
@@ -428,7 +428,7 @@ fn an_arrow_that_points_up_is_found() {
     }
 }
 
-/// Each crate explains the terms that it uses, where its documentation begins.
+/// Each crate explains its terms at the start of its documentation.
 #[test]
 fn every_crate_opens_with_its_glossary() {
     let mut without = Vec::new();
@@ -466,8 +466,8 @@ fn built_from(name: &str, packages: &BTreeMap<String, Value>, found: &mut BTreeS
     }
 }
 
-/// An image tells by a digest of its sources whether it is up to date: a crate that the list
-/// behind it lacks could change unseen, one too many would age images for nothing.
+/// A digest of its sources shows whether an image is up to date: a crate missing from the list could change
+/// unseen, a surplus one would age images for nothing.
 #[test]
 fn digests_of_images_are_of_all_crates_that_they_are_made_of_and_no_others() {
     let (packages, root) = (packages(), root().canonicalize().expect("the root"));
@@ -500,8 +500,8 @@ fn digests_of_images_are_of_all_crates_that_they_are_made_of_and_no_others() {
     }
 }
 
-/// Parts of two programs are told apart by the sources that rows depend on: a crate that the list
-/// lacks could change them unseen.
+/// The sources that rows depend on tell parts of two programs apart: a crate missing from the list could
+/// change them unseen.
 #[test]
 fn the_digest_of_campaigns_is_of_all_crates_that_they_are_made_of() {
     let (packages, root) = (packages(), root().canonicalize().expect("the root"));
@@ -574,7 +574,7 @@ fn versions_and_lints_stand_in_one_place() {
     }
 }
 
-/// The compiler denies `unsafe` where nobody allows it.
+/// The compiler denies `unsafe` where nothing allows it.
 #[test]
 fn unsafe_is_allowed_for_board_glue_alone() {
     let lint = concat!("unsafe", "_code");
@@ -654,8 +654,7 @@ fn images_that_are_wrong_on_purpose_are_built_by_their_own_step_alone() {
             assert!(!enabled.contains(MUTANT), "{name}: {dependency}");
         }
     }
-    // One place builds them, and it knows all of them; the list of the images that
-    // are flashed has none.
+    // One place builds all of them; the list of the flashed images has none.
     let builder = "xtask/src/firmware.rs";
     let source = fs::read_to_string(root().join(builder)).expect(builder);
     let listed: BTreeSet<&str> = source
@@ -687,8 +686,7 @@ fn images_that_are_wrong_on_purpose_are_built_by_their_own_step_alone() {
     }
 }
 
-/// What an operator does, and what a robot does, depends on no clock that somebody sets: the server's
-/// and the page's are those that only go on.
+/// No action of an operator or a robot depends on a settable clock: server and page use monotonic ones.
 #[test]
 fn no_clock_on_the_wall_reaches_the_console() {
     let mut read = Vec::new();

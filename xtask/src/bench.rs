@@ -1,9 +1,9 @@
-//! `cargo xtask bench`: our own code beside the C references, in one run.
+//! `cargo xtask bench`: our own code compared with the C references, in one run.
 //!
-//! Reference and own program run in the same round, seconds apart, and the ratio is taken round by
-//! round: absolute times move with whatever else the machine does, ratios hardly. Every program
-//! prints `RESULT case peer unit cpu wall check`; `check` shows that the work was the same. A target
-//! missed is a FAIL in the table and a non-zero exit status, and so is what could not be run.
+//! Reference and own program run in the same round, seconds apart, and the ratio is taken round by round:
+//! absolute times vary with the machine's load, ratios hardly. Every program prints `RESULT case peer unit
+//! cpu wall check`; `check` shows that the work was the same. A missed target is a FAIL in the table and a
+//! non-zero exit status, and so is a case that could not be run.
 
 mod instructions;
 mod table;

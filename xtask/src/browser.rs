@@ -24,7 +24,7 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
         ensure_chromium()?;
         let python = tools::python()?;
-        // A relative folder is meant from where the user stands, not from the root.
+        // A relative folder is relative to the user's current folder, not to the root.
         check(
             command(python)
                 .arg("tests/python/check_report.py")
@@ -77,7 +77,7 @@ fn of_program(check: &str) -> StepResult<Command> {
     Ok(python)
 }
 
-/// A page whose line, server or view is gone: what is late in it is told by clocks on the wall.
+/// Checks a page whose connection, server or view is gone: it marks late data by wall-clock time.
 pub(crate) fn lines() -> StepResult<String> {
     last_line(&mut console("tests/python/check_console_lines.py")?)
 }
@@ -95,7 +95,7 @@ pub(crate) fn page_hours() -> StepResult<String> {
     last_line(&mut console("tests/python/check_page_hours.py")?)
 }
 
-/// A robot driven by a program of its own, with the client that we give away.
+/// A robot driven by a separate program, with the client that we distribute.
 pub(crate) fn client(report: &mut Report) {
     report.step("console from Python", || {
         check(&mut of_program("tests/python/check_client.py")?)?;
@@ -111,19 +111,19 @@ pub(crate) fn api(report: &mut Report) {
     });
 }
 
-/// Boards that are a process of their own, led over a pseudo-terminal. On a computer that is busy with something else they
-/// miss cycles, as they should, and nothing is compared.
+/// Boards in a separate process, led over a pseudo-terminal. On a busy computer they miss cycles, as they
+/// should, and nothing is compared.
 pub(crate) fn port() -> StepResult<String> {
     last_line(&mut of_program("tests/python/check_port.py")?)
 }
 
-/// What a check says of itself at its end.
+/// The last line of a check's output.
 fn last_line(check: &mut Command) -> StepResult<String> {
     let told = output(check)?;
     Ok(told.lines().last().unwrap_or_default().to_owned())
 }
 
-/// A robot looked at by a client of Foxglove's protocol, from its published text alone.
+/// A client written only from Foxglove's published protocol watches a robot.
 pub(crate) fn viewer(report: &mut Report) {
     report.step("console for Foxglove and Lichtblick", || {
         check(&mut of_program("tests/python/check_foxglove.py")?)?;

@@ -23,7 +23,7 @@ const IMAGES: [(&str, &[&str]); 2] = [
     ("hil", &["joint-hil", "wheel-hil"]),
 ];
 
-/// The profile of an image, by its name: flash is short on a joint board alone.
+/// The profile of an image, by its name: only a joint board is short of flash.
 pub(crate) fn profile(image: &str) -> &'static str {
     if image.contains("joint") {
         "firmware-joint"
@@ -35,8 +35,8 @@ pub(crate) fn profile(image: &str) -> &'static str {
 /// Images that drive outputs: the ones with budgets.
 pub(crate) const SHIPPED: [&str; 2] = ["joint", "wheel"];
 
-/// Images that are wrong on purpose, which the tests on emulated boards must find: the
-/// feature, what is then wrong, and the images that show it.
+/// Images with deliberate bugs that the tests on emulated boards must find: the feature, the bug, and the
+/// images that show it.
 const MUTANTS: [(&str, &str, &[&str]); 5] = [
     (
         "mutant-valve-pins",
@@ -67,21 +67,20 @@ const MUTANTS: [(&str, &str, &[&str]); 5] = [
 /// The mark that such an image carries (firmware/board/src/g431/mutant.rs).
 const MUTANT_MARK: &str = "THIS_IMAGE_IS_WRONG_ON_PURPOSE";
 
-/// What saves parameters, for power cuts in mid-save, and what copies and clears memory.
+/// Code that saves parameters, for power cuts in mid-save, and code that copies and clears memory.
 const PROBES: [&str; 2] = ["probe_store", "probe_memory"];
 
-/// What a reachable panic leaves for the linker to complain about.
+/// Undefined symbol that a reachable panic leaves for the linker to report.
 const PANIC_SYMBOL: &str = "this_image_can_panic";
 
-/// Images for a bench board, beside the shipped one of the same kind.
+/// Images for a bench board, each with the shipped one of the same kind.
 const BENCH: [(&str, &str); 2] = [("joint-hil", "joint"), ("wheel-hil", "wheel")];
 
-/// What the compiler says to both of `outputs` and `hil` (firmware/board/src/g431/mod.rs).
+/// The compiler's message if both `outputs` and `hil` are on (firmware/board/src/g431/mod.rs).
 const EXCLUSION: &str =
     "a hardware-in-the-loop image must not contain the code that drives outputs";
 
-/// Registers that a bench image has no business with: where they lie, and which of the
-/// shipped images use them.
+/// Registers that a bench image must not use: their addresses, and the shipped images that use them.
 const DRIVERS: [(&str, Range<u32>, &[&str]); 5] = [
     (
         "TIM1 (valves)",
@@ -106,7 +105,7 @@ const DRIVERS: [(&str, Range<u32>, &[&str]); 5] = [
 pub(crate) struct Image {
     pub(crate) name: &'static str,
     pub(crate) elf: PathBuf,
-    /// BLAKE3 of what goes into flash.
+    /// BLAKE3 of the flash contents.
     pub(crate) hash: String,
 }
 
@@ -125,12 +124,12 @@ pub(crate) fn steps(report: &mut Report) {
     report.step("lints of the board support", lint);
 }
 
-/// Builds all images and says how.
+/// Builds all images and prints how.
 pub(crate) fn build() -> StepResult<Vec<Image>> {
     build_into(way(TARGET)?, &target_dir().join("firmware"))
 }
 
-/// Builds all images in one of the ways and lays them down in `folder`.
+/// Builds all images in one of the ways and puts them into `folder`.
 pub(crate) fn build_into(way: Way, folder: &Path) -> StepResult<Vec<Image>> {
     println!("    way: {}", way.text());
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -170,8 +169,8 @@ pub(crate) fn probes(way: Way, folder: &Path) -> StepResult {
     Ok(())
 }
 
-/// Builds the images that are wrong on purpose, those of a mutation into a folder:
-/// `<folder>/<feature>/joint.elf`. Never beside the images that are flashed.
+/// Builds the images with deliberate bugs, those of a mutation into a folder: `<folder>/<feature>/joint.elf`.
+/// Never beside the images for flashing.
 pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
     for (feature, what, images) in MUTANTS {
         let place = folder.join(feature);
@@ -191,8 +190,8 @@ pub(crate) fn mutants(way: Way, folder: &Path) -> StepResult {
     Ok(())
 }
 
-/// Links each image with a panic handler that does not exist. A third program,
-/// with a panic planted in it, must *not* link: else the check shows nothing.
+/// Links each image with a panic handler that does not exist. A third program, with a deliberate panic, must
+/// *not* link: otherwise the check proves nothing.
 pub(crate) fn link_check() -> StepResult {
     let way = way(TARGET)?;
     for name in ["link_check_joint", "link_check_wheel"] {
@@ -208,7 +207,7 @@ fn must_not_link(command: &mut Command) -> anyhow::Result<()> {
         .context("the link check does not find a planted panic")
 }
 
-/// A build that must fail, and must say so with these words.
+/// Runs a build that must fail with these words.
 fn must_not_build(command: &mut Command, words: &str) -> anyhow::Result<()> {
     let output = command
         .stdout(Stdio::null())
@@ -224,9 +223,9 @@ fn must_not_build(command: &mut Command, words: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// No image for a bench board can be built together with the code that drives outputs,
-/// and none holds the address of a register that does. The shipped images hold them, or
-/// the search would show nothing.
+/// Checks that no image for a bench board can be built together with the code that drives outputs, and that
+/// none holds the address of a register that does. The shipped images must hold them, or the search would
+/// prove nothing.
 fn exclusion_check() -> StepResult {
     let way = way(TARGET)?;
     println!("    both of the features must be refused");
@@ -314,8 +313,7 @@ fn folder(way: Way) -> PathBuf {
     })
 }
 
-/// `cargo <sub>` for an image of the board crate alone, so that no other crate's
-/// features reach into it.
+/// `cargo <sub>` for an image of only the board crate, so that no other crate's features affect it.
 fn cargo(way: Way, sub: &str, features: &str, image: &str) -> StepResult<Command> {
     let mut command = cargo_for(way, sub);
     command
@@ -323,8 +321,8 @@ fn cargo(way: Way, sub: &str, features: &str, image: &str) -> StepResult<Command
         .args(["--profile", profile(image), "--target", TARGET])
         .args(["--bin", image])
         .env("CARGO_TARGET_DIR", folder(way))
-        // Stack sizes go into a section that is not loaded; the flag is unstable,
-        // what it does to the code is nothing.
+        // Stack sizes go into a section that is not loaded; the flag is unstable, but does not affect the
+        // code.
         .env("RUSTC_BOOTSTRAP", "1")
         .env("RUSTFLAGS", "-Zemit-stack-sizes");
     give_linker(way, &mut command)?;

@@ -19,7 +19,7 @@ pub(crate) const VERSION: &str = "0.13.2";
 /// The fuzzers' folder, from the root.
 const FOLDER: &str = "tests/fuzz";
 
-/// The targets, and the longest input that each is given.
+/// The targets, with the longest input of each.
 const TARGETS: [(&str, u32); 13] = [
     ("decoder", 2000),
     ("frames", 4000),
@@ -131,7 +131,7 @@ struct Fuzzers {
 }
 
 impl Fuzzers {
-    /// Builds what the named targets need.
+    /// Builds the named targets.
     fn build(tree: PathBuf, names: &[&str]) -> Result<Self> {
         let sim = names.iter().any(|name| OF_THE_SIMULATOR.contains(name));
         let fuzzers = Self { tree, sim };
@@ -154,7 +154,7 @@ impl Fuzzers {
         command
     }
 
-    /// Gives a target inputs, or folders of them of which the first takes new ones.
+    /// Runs inputs, or folders of them; new inputs go to the first folder.
     fn run(&self, name: &str, inputs: &[PathBuf], options: &[String]) -> Result<Output> {
         let longest = TARGETS.iter().find(|(other, _)| *other == name);
         let (_, longest) = longest.with_context(|| format!("no target `{name}`"))?;
@@ -248,8 +248,8 @@ fn patches() -> Result<Vec<Patch>> {
     Ok(patches)
 }
 
-/// Each seeded bug in a copy of the commit: the targets that it names must find it, starting
-/// without a corpus, and what they found must be due to it.
+/// Applies each seeded bug to a copy of the commit: the targets that it names must find it, starting without
+/// a corpus, and their findings must be due to it.
 fn seeded(report: &mut Report) {
     let copy = report.step("a copy of the commit", || {
         let copy = work_folder().join("seeded");

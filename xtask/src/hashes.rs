@@ -1,6 +1,6 @@
-//! The log hash of every built-in scenario, beside those of an earlier record.
+//! The log hash of every built-in scenario, compared with an earlier record.
 //!
-//! A change of the code that means to change nothing leaves them all as they are.
+//! A refactoring leaves them all unchanged.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::process::{command, output, remove_folder, step_folder, wheeleg};
 use crate::report::Report;
 use crate::rust;
 
-/// Digits that are printed: enough to tell runs apart.
+/// Printed digits: enough to distinguish runs.
 const DIGITS: usize = 16;
 
 #[derive(Args)]
@@ -40,7 +40,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
     });
 }
 
-/// Scenarios in the order of `wheeleg list`, each with the begin of its hash.
+/// Scenarios in the order of `wheeleg list`, each with the start of its hash.
 fn hashes() -> Result<Vec<(String, String)>> {
     let list = json(&["list", "--json"])?;
     let scenarios = list["scenarios"].as_array().context("no scenarios")?;

@@ -12,9 +12,9 @@ use crate::report::Report;
 pub(crate) struct Machine(File);
 
 impl Machine {
-    /// If `wanted`, keeps standard output for the figures: what is told people from now
-    /// on, by this program and those that it starts, goes to standard error. `None`, and
-    /// a failed step, if the system does not give another handle.
+    /// If `wanted`, keeps standard output for the figures: all texts for people from now on, of this program
+    /// and those that it starts, go to standard error. `None`, and a failed step, if the system does not give
+    /// another handle.
     pub(crate) fn of(report: &mut Report, wanted: bool) -> Option<Option<Self>> {
         if !wanted {
             return Some(None);

@@ -1,8 +1,7 @@
 //! The one entry point for developers: `cargo xtask <command>`.
 //!
-//! `cargo xtask test` is the whole test suite; the other commands are its
-//! parts, so that what fails in one place can be repeated alone. A step either
-//! passed, failed, or was NOT RUN because a tool is missing; the last two both
+//! `cargo xtask test` is the whole test suite; the other commands are its parts, so that a failed part can be
+//! repeated alone. A step either passed, failed, or was NOT RUN because a tool is missing; the last two both
 //! end the program with a non-zero status.
 //!
 //! # Glossary
@@ -150,8 +149,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The whole suite. Every step is run, whatever the ones before it did, so
-/// that one run shows everything that is wrong.
+/// The whole suite. Every step is run, even if earlier ones failed, so that one run shows all errors.
 fn test(report: &mut Report) {
     setup::steps(report);
     lints(report);

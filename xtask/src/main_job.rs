@@ -50,7 +50,7 @@ fn simulate(name: &str) -> Result<Summary> {
     Ok(Summary { folder, json })
 }
 
-/// What stands on standard output stands in the folder.
+/// The file in the folder equals standard output.
 fn check_file(folder: &Path, json: &Value) -> Result<()> {
     let path = folder.join("summary.json");
     let text = fs::read_to_string(&path).with_context(|| format!("{}", path.display()))?;
@@ -59,7 +59,7 @@ fn check_file(folder: &Path, json: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Every required target is met, and none of the paper's list is left out.
+/// Every required target is met, and none in the paper's list is missing.
 fn check_targets(json: &Value) -> Result<()> {
     let targets = json["targets"].as_array().context("no `targets`")?;
     for id in ["A19", "A20", "A21", "A22", "A23", "A25", "A26", "A27"] {

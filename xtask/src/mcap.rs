@@ -22,7 +22,7 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
     report.step("MCAP log in the Python reader", || {
         let run_dir = run_dir.ok_or_else(|| anyhow!("there is no run to open"))?;
         let python = tools::python()?;
-        // A relative folder is meant from where the user stands, not from the root.
+        // A relative folder is relative to the user's current folder, not to the root.
         let run_dir = std::path::absolute(run_dir)?;
         run(command(python)
             .arg("tests/python/check_mcap.py")
@@ -56,7 +56,7 @@ pub(crate) fn steps(report: &mut Report, run_dir: Option<&Path>) {
     );
 }
 
-/// Frames, joints, scene, tables and bag of a run, by the readers of those who made the formats.
+/// Checks frames, joints, scene, tables and bag of a run with the formats' own readers.
 fn viewers(run_dir: &Path) -> StepResult<()> {
     let folder = step_folder("exports");
     empty_folder(&folder)?;

@@ -1,5 +1,5 @@
-//! Mutations of the code that decides safe states: each is built and tested;
-//! one that no test notices must stand in `firmware/SURVIVORS.md` with a reason.
+//! Mutations of the code that decides safe states: each is built and tested; one that no test notices must be
+//! listed in `firmware/SURVIVORS.md` with a reason.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,8 +13,8 @@ use crate::report::{Report, StepError, StepResult};
 /// Pinned, because another version makes other mutations.
 const VERSION: &str = "27.1.0";
 
-/// Files whose mistakes could leave an axis energised, and the packages whose
-/// tests must notice. What stands together is built and tested together.
+/// Files whose mistakes could leave an axis energised, and the packages whose tests must notice. Each group
+/// is built and tested together.
 const GROUPS: [(&[&str], &[&str]); 4] = [
     (
         &[
@@ -125,8 +125,8 @@ fn install() -> StepResult {
     }
 }
 
-/// Mutates a copy of the sources, as cargo-mutants does by itself; what it builds
-/// stays below the target folder for the next time.
+/// Mutates a copy of the sources, as cargo-mutants does itself; its build stays below the target folder for
+/// the next time.
 fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> {
     install()?;
     let folder = target_dir().join("mutants");
@@ -141,7 +141,7 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
         .arg("--output")
         .arg(&out)
         .env("CARGO_TARGET_DIR", folder.join("build"))
-        // Short builds: there are some five hundred of them, each of one changed line.
+        // Short builds: there are some five hundred of them, each with one changed line.
         .env("CARGO_PROFILE_TEST_INCREMENTAL", "true")
         .env("CARGO_PROFILE_TEST_OPT_LEVEL", "1")
         .env("CARGO_PROFILE_TEST_DEBUG", "false")
@@ -176,8 +176,8 @@ fn group(index: usize, files: &[&str], packages: &[&str]) -> StepResult<String> 
     ))
 }
 
-/// A mutant's name without its place in the file, which moves with every edit. One
-/// reason stands for all mutants of a file that have the same name.
+/// A mutant's name without its place in the file, which moves with every edit. One reason covers all mutants
+/// of a file with the same name.
 fn name_of(line: &str) -> &str {
     line.split_once(": ").map_or(line, |(_, name)| name).trim()
 }

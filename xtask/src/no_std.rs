@@ -1,13 +1,13 @@
-//! Every `no_std` crate is checked for a target without an operating system,
-//! where no `std` exists to lean on by mistake.
+//! Checks every `no_std` crate for a target without an operating system, where there is no `std` to use by
+//! mistake.
 //!
 //! Two ways, tried in this order:
 //! 1. the target's `core` from rustup, with the toolchain in use;
 //! 2. Debian's compiler with its packaged library source, which builds `core`
 //!    itself (`-Zbuild-std`), for machines whose rustup cannot reach its server.
 //!
-//! Each crate is checked alone (`-p`), so that no other member can switch on a
-//! `std` feature of a shared dependency.
+//! Each crate is checked alone (`-p`), so that no other member can switch on a `std` feature of a shared
+//! dependency.
 
 use std::env;
 use std::path::Path;
@@ -161,8 +161,7 @@ mod tests {
     use super::{CRATES, Way, cargo_for};
     use crate::process::root;
 
-    /// The list above is the list of crates that say `#![no_std]`: neither can
-    /// grow without the other.
+    /// The list above equals the list of crates with `#![no_std]`: neither can grow without the other.
     #[test]
     fn the_checked_crates_are_the_no_std_crates() {
         let manifest = std::fs::read_to_string(root().join("Cargo.toml")).expect("Cargo.toml");
@@ -172,7 +171,7 @@ mod tests {
             .expect("members");
         let mut found = Vec::new();
         for member in members.iter().filter_map(toml::Value::as_str) {
-            // What is on a board is built for that board.
+            // Board crates are built for their board.
             if member.starts_with("firmware/board") {
                 continue;
             }

@@ -29,7 +29,7 @@ use further::{eventful, mixed, predictive};
 use speed::{SPEED_LEAST, Speed, is_met, speed_verdict, watched};
 
 const PACKAGE: &str = "wheeleg-pil-unicorn";
-/// What building the Unicorn engine takes, as Debian packages.
+/// Debian packages for building the Unicorn engine.
 pub(crate) const PACKAGES: [&str; 3] = ["cmake", "pkg-config", "libclang-dev"];
 
 /// Arguments of `cargo xtask pil`.
@@ -45,7 +45,7 @@ pub(crate) struct Options {
     /// went; of other runs: `WHEELEG_PIL_PROFILE=FOLDER wheeleg run SCENARIO --nodes pil`.
     #[arg(long)]
     profile: bool,
-    /// How fast the boards run is told, not judged: in the suite, which runs on any machine.
+    /// Print the boards' speed without judging it: in the suite, which runs on any machine.
     #[arg(skip)]
     any_speed: bool,
 }
@@ -88,7 +88,7 @@ pub(crate) fn steps(report: &mut Report, options: &Options) {
         return;
     }
     report.step("lints and tests of the emulator", || {
-        // As the emulator itself is built: each further profile builds the engine once more.
+        // Like the emulator itself: each further profile builds the engine again.
         let package = ["--locked", "--release", "--package", PACKAGE];
         run(cargo()
             .args(["clippy", "--all-targets"])
@@ -175,8 +175,7 @@ struct Images {
 }
 
 impl Images {
-    /// Builds them in one of the ways, below the target folder; `all` says whether
-    /// those for the tests, too.
+    /// Builds them in one of the ways, below the target folder; `all`: including those for the tests.
     fn build(way: Way, name: &str, all: bool) -> StepResult<Self> {
         let images = Self {
             folder: target_dir().join(name),
@@ -219,7 +218,7 @@ fn test_programs(emulator: &Path, images: &Images, names: &[&str]) -> Command {
     test
 }
 
-/// The emulator and the images that are flashed, built where they are not.
+/// The emulator and the images for flashing, built if missing.
 fn boards() -> StepResult<(PathBuf, Images)> {
     tools()?;
     let images = Images::build(way(firmware::TARGET)?, "firmware", false)?;
@@ -294,9 +293,8 @@ fn ensure_file(path: &Path) -> anyhow::Result<()> {
 /// Runs of the boards in which they may show that they are fast enough.
 const TIMES_MOST: usize = 4;
 
-/// Runs the paper's test twice on eight emulated boards, or up to `times` where it is slower
-/// than it must be: no bit may differ from the host, nor between the runs. The second is the
-/// verdict on their speed.
+/// Runs the paper's test twice on eight emulated boards, or up to `times` if it is slower than required: no
+/// bit may differ from the host, nor between the runs. The second is the verdict on their speed.
 fn figures(
     emulator: &Path,
     images: &Path,

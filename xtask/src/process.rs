@@ -1,4 +1,4 @@
-//! Running other programs: where the repository is, what is installed.
+//! Running other programs: the place of the repository, and installed tools.
 
 use std::collections::VecDeque;
 use std::io::{BufRead as _, BufReader, ErrorKind};
@@ -8,7 +8,7 @@ use std::{env, fs};
 
 use anyhow::{Context, Result, bail};
 
-/// Lines that an error repeats of what a check said.
+/// Lines of a check's output that an error repeats.
 const LAST_LINES: usize = 12;
 
 /// The root of the repository.
@@ -25,7 +25,7 @@ pub(crate) fn target_dir() -> PathBuf {
     }
 }
 
-/// Removes a folder with all that is in it, if it is there.
+/// Removes a folder with its contents, if it is there.
 pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     match fs::remove_dir_all(folder) {
         Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -35,7 +35,7 @@ pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     }
 }
 
-/// Makes an empty folder, in place of what was there.
+/// Makes an empty folder, removing any old contents.
 pub(crate) fn empty_folder(folder: &Path) -> Result<()> {
     remove_folder(folder)?;
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
@@ -76,14 +76,14 @@ pub(crate) fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// As [`run`], for a check that says what it found: the end of that stands in the error as well,
-/// since of a long log often only the summary is read.
+/// As [`run`], for a check that prints its findings: the error also holds the end of its output, since of a
+/// long log often only the summary is read.
 pub(crate) fn check(command: &mut Command) -> Result<()> {
     let line = line(command);
     println!("    $ {line}");
     let (says, end) = std::io::pipe()?;
     let child = command.stdout(end.try_clone()?).stderr(end).spawn();
-    // What is read ends when nobody holds the other end.
+    // The pipe ends when nobody holds its other end.
     command.stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = child.with_context(|| format!("cannot start `{line}`"))?;
     let mut last = VecDeque::new();
@@ -112,8 +112,8 @@ pub(crate) fn output(command: &mut Command) -> Result<String> {
     Ok(text)
 }
 
-/// Prints and runs a program that measures; gives the lines of its standard output that
-/// are `wanted`. If it fails, they stand first in the error: what missed its bar is told.
+/// Prints and runs a program that measures; gives the lines of its standard output that are `wanted`. If it
+/// fails, they come first in the error: they name the missed bar.
 pub(crate) fn figures(command: &mut Command, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
     let (text, status) = captured(command)?;
     let found: Vec<String> = text
@@ -160,8 +160,8 @@ pub(crate) fn ask(command: &mut Command) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// A command as it is told: the program by its name, since where it stands is a matter of the
-/// machine, and `docs/records/deep.md` keeps what failed.
+/// A command as it is printed: the program by its name, since its path depends on the machine, and
+/// `docs/records/deep.md` keeps what failed.
 fn line(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let name = program.file_name().unwrap_or(program.as_os_str());

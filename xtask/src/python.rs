@@ -45,8 +45,8 @@ pub(crate) fn steps(report: &mut Report) {
         identification(&python, &wheeleg)
     });
     report.step("fmu: units in FMPy, equal to the package", || {
-        // The program links this crate, and cargo builds all its kinds for that. To build it alone would
-        // build what it needs a second time, with other features.
+        // The program links this crate, so cargo builds all its kinds. Building it alone would build its
+        // dependencies a second time, with other features.
         rust::build_wheeleg()?;
         let folder = step_folder("fmu");
         empty_folder(&folder)?;
@@ -82,7 +82,7 @@ fn print_figures(check: &mut Command, name: &str) -> StepResult {
     Ok(())
 }
 
-/// The interpreter of an environment that has the wheel, and beside it the suite's packages.
+/// The interpreter of an environment with the wheel and the suite's packages.
 fn installed() -> StepResult<PathBuf> {
     let suite = tools::python()?;
     let folder = step_folder("python");
@@ -117,13 +117,13 @@ fn installed() -> StepResult<PathBuf> {
         "import sysconfig; print(sysconfig.get_path('purelib'))",
     ]))?;
     run(command(&python).args(["-c", borrow, place.trim()]))?;
-    // What the wheel says it needs must be there, in a version that it accepts.
+    // The wheel's dependencies must be there, in a version that it accepts.
     run(command(&python).args(["-m", "pip", "check", "--disable-pip-version-check"]))?;
     Ok(python)
 }
 
-/// One wheel for every Python from 3.10 on, and for every Linux whose C library is not older than the
-/// tag says. A tag without a version would be for this computer alone.
+/// One wheel for every Python from 3.10 on, and for every Linux whose C library is not older than the tag
+/// says. A tag without a version would only be for this computer.
 fn for_any_linux(wheel: &Path) -> Result<()> {
     let name = wheel.file_name().unwrap_or_default().to_string_lossy();
     let tags = ["-cp310-abi3-", "manylinux_2_"];

@@ -21,8 +21,7 @@ const TARGET: &str = "thumbv7em-none-eabi";
 const PACKAGE: &str = "wheeleg-board-qemu";
 const IMAGES: [&str; 3] = ["qemu-joint", "qemu-wheel", "qemu-hil-joint"];
 
-/// What is counted in the images that have a tick: name of the region, and the
-/// functions that mark its begin and end.
+/// Regions counted in the images that have a tick: name, and the functions that mark begin and end.
 const REGIONS: [(&str, &str, &str); 2] = [
     ("tick", "mark_tick_begins", "mark_tick_ended"),
     ("bytes", "mark_bytes_begin", "mark_bytes_ended"),
@@ -67,8 +66,7 @@ pub(crate) fn emulator() -> StepResult {
     Ok(())
 }
 
-/// Builds the images in one of the ways; gives the folder in which they lie. They link
-/// only if no panic can be reached.
+/// Builds the images in one of the ways; returns their folder. They link only if no panic can be reached.
 pub(crate) fn images(way: Way) -> StepResult<PathBuf> {
     println!("    way: {}", way.text());
     let products = match way {
@@ -188,8 +186,7 @@ fn counts_file() -> PathBuf {
     target_dir().join("qemu-counts.json")
 }
 
-/// Instructions as counted by the last `cargo xtask qemu` in this target folder;
-/// null where there was none.
+/// Instructions counted by the last `cargo xtask qemu` in this target folder; null if there was none.
 pub(crate) fn counts() -> Value {
     let text = fs::read_to_string(counts_file()).unwrap_or_default();
     serde_json::from_str(&text).unwrap_or(Value::Null)
@@ -234,8 +231,7 @@ fn parse(line: &str, region: &str) -> Option<Line> {
     })
 }
 
-/// All emulators together; the median is that of the emulator that passed most
-/// often.
+/// All emulators together; the median is that of the emulator with the most passes.
 fn merge(lines: &[Line]) -> Option<Line> {
     let longest = lines.iter().max_by_key(|line| line.passes)?;
     Some(Line {

@@ -1,5 +1,5 @@
-//! The record of long checks: a dated line each, so that what was last looked at, and when,
-//! is in the repository.
+//! The record of long checks: a dated line for each, so that the repository shows what was last checked, and
+//! when.
 
 use std::fmt::Display;
 use std::fs::OpenOptions;

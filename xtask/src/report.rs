@@ -1,4 +1,4 @@
-//! The list of steps, what became of each, and the closing table.
+//! The list of steps, their results, and the closing table.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -47,10 +47,10 @@ impl<E: Into<anyhow::Error>> From<E> for StepError {
     }
 }
 
-/// What a step returns.
+/// Result of a step.
 pub(crate) type StepResult<T = ()> = Result<T, StepError>;
 
-/// What became of a step.
+/// Outcome of a step.
 #[derive(Debug, PartialEq, Eq, Clone)]
 enum Outcome {
     Passed,

@@ -15,7 +15,7 @@ const ROBOT: &str = "wheeleg-2003";
 const SEED: &str = "1";
 const STATES: &str = "200";
 
-/// Exports the robot, lets our dynamics and Pinocchio compute the same states, compares; then
+/// Exports the robot, computes the same states with our dynamics and with Pinocchio, compares them; then
 /// falsifies the export in many places, each of which must be noticed.
 pub(crate) fn steps(report: &mut Report) {
     let folder = step_folder("rigid-body");

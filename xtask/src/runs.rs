@@ -1,4 +1,4 @@
-//! Runs of the program with boards outside of it, and what is read from their summaries.
+//! Runs of the program with boards outside of it, and data from their summaries.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::process::{command, output, target_dir};
 use crate::rust;
 
-/// What is measured of each board.
+/// Measured figures of each board.
 const MEASURED: [&str; 6] = [
     "tick_instructions_mean",
     "tick_instructions_median",
@@ -18,7 +18,7 @@ const MEASURED: [&str; 6] = [
     "stack_size_bytes",
 ];
 
-/// Runs the paper's test with all nodes of one kind; gives its summary.
+/// Runs the paper's test with all nodes of one kind; returns its summary.
 pub(crate) fn three_steps(
     nodes: &str,
     folder: &str,
@@ -35,8 +35,7 @@ pub(crate) fn three_steps(
     )
 }
 
-/// Builds the program and runs a scenario with it; gives its summary. `nodes` says which
-/// node runs where.
+/// Builds the program and runs a scenario with it; returns its summary. `nodes` says where each node runs.
 pub(crate) fn run_nodes(
     scenario: &Path,
     nodes: &[&str],

@@ -7,16 +7,15 @@ use anyhow::Context;
 use crate::process::{cargo, figures, run, wheeleg};
 use crate::report::StepResult;
 
-/// All that needs neither boards nor an emulator's build tools: what `cargo xtask pil` builds is
-/// left out. One selection for all steps, since each has its own set of features to build for.
+/// Everything that needs neither boards nor an emulator's build tools: without the builds of `cargo xtask
+/// pil`. One selection for all steps, since each selection needs its own set of features.
 pub(crate) const HOST: [&str; 3] = ["--workspace", "--exclude", "wheeleg-pil-unicorn"];
 
 /// Seed of the property tests in the suite.
 const PROPTEST_SEED: &str = "20030001";
 
-/// Builds `targets` of the host's release build. With a test beside them, because what only
-/// tests depend on adds features to what all depend on: without one everything would be
-/// built a second time.
+/// Builds `targets` of the host's release build, together with a test, because dependencies of tests add
+/// features to common dependencies: without a test everything would be built a second time.
 pub(crate) fn build(targets: &[&str]) -> anyhow::Result<()> {
     run(cargo()
         .args(["build", "--locked", "--release", "--test", "determinism"])
@@ -50,10 +49,9 @@ pub(crate) fn clippy() -> StepResult {
     Ok(())
 }
 
-/// All host tests, doc tests and system tests, with the long ones that `cargo test` leaves out and
-/// names as ignored. One failing test program does not hide the others. In the release build, which
-/// the later steps need anyway and whose arithmetic and assertions are checked: a second build of
-/// everything takes as long as the tests.
+/// All host tests, doc tests and system tests, with the long ones that `cargo test` lists as ignored. One
+/// failing test program does not hide the others. In the release build, which the later steps need anyway and
+/// whose arithmetic and assertions are checked: a second build of everything takes as long as the tests.
 pub(crate) fn test() -> StepResult {
     // One seed for the property tests, so that the same sources give the same
     // verdict; `cargo test` alone draws new cases every time.
@@ -65,9 +63,8 @@ pub(crate) fn test() -> StepResult {
     Ok(())
 }
 
-/// The line of a test program's output that has `marker`, with one of its tests run by
-/// name in the build of the suite, as often as these variables say. It is printed if the test
-/// fails, too.
+/// Runs one test by name in the build of the suite, as often as these variables say, and returns the line of
+/// its output that has `marker`. It is also printed if the test fails.
 pub(crate) fn measured(
     [program, test]: [&str; 2],
     amounts: &[(&str, u32)],

@@ -1,5 +1,5 @@
-//! `cargo xtask setup`: what the suite needs beside cargo and a C compiler. It says what it
-//! is going to install and how, then does it. No other command installs anything.
+//! `cargo xtask setup`: installs the needs of the suite besides cargo and a C compiler. It prints what it is
+//! going to install and how, then does it. No other command installs anything.
 //!
 //! Ways used: rustup (components and targets), cargo (tools), apt as root, pip and npm into
 //! folders of our own below the target folder. Nothing else on the machine is touched.
@@ -19,7 +19,7 @@ use crate::{browser, fuzz, no_std, pil, qemu};
 /// Oldest Python that the scripts are written for.
 const PYTHON_MIN: (u32, u32) = (3, 9);
 
-/// Something the suite needs: what, whether it is here, how it gets here.
+/// A need of the suite: its name, whether it is here, and how to install it.
 struct Need(&'static str, fn() -> bool, Way);
 
 #[derive(Clone, Copy)]
@@ -34,7 +34,7 @@ enum Way {
     Cargo(&'static str, &'static str),
     /// A virtual environment with [`REQUIREMENTS`] in it.
     Python,
-    /// What [`NODE_LOCK`] names.
+    /// Packages of [`NODE_LOCK`].
     Node,
 }
 
@@ -85,7 +85,7 @@ const NEEDS: [Need; 12] = [
     ),
 ];
 
-/// Installs what is missing; a step for each, which names the command where it cannot.
+/// Installs what is missing; one step each, which names the command if it cannot run it.
 pub(crate) fn steps(report: &mut Report) {
     let missing: Vec<&Need> = NEEDS.iter().filter(|need| !(need.1)()).collect();
     if missing.is_empty() {
@@ -126,7 +126,7 @@ impl Way {
         }
     }
 
-    /// Tries; whether it helped is seen by looking for what was missing.
+    /// Tries; a new search shows whether it helped.
     fn install(self) -> StepResult {
         match self {
             Self::Apt(packages) => apt_install(packages),
@@ -174,7 +174,7 @@ fn cargo_has(sub: &str) -> bool {
     succeeds(cargo().args([sub, "--version"]))
 }
 
-/// Makes the environment anew.
+/// Recreates the environment.
 fn install_python() -> StepResult {
     let system = system_python().context("no Python for a virtual environment")?;
     let venv = virtual_environment();
@@ -188,7 +188,7 @@ fn install_python() -> StepResult {
     Ok(())
 }
 
-/// Makes the folder of the Node packages anew, exactly as they are pinned.
+/// Recreates the folder of the Node packages, exactly as they are pinned.
 fn install_node() -> StepResult {
     let folder = node_folder();
     empty_folder(&folder)?;

@@ -84,9 +84,9 @@ fn stack_fits(image: &Image) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Holds what runs on emulated boards have measured (`tick_instructions_worst`,
-/// `tick_instructions_mean` and `stack_used_bytes` of each image in `figures`) and the images themselves against budget
-/// and static bound, and puts those beside it.
+/// Compares the measurements of runs on emulated boards (`tick_instructions_worst`, `tick_instructions_mean`
+/// and `stack_used_bytes` of each image in `figures`) and the images themselves with budget and static bound,
+/// and adds those.
 pub(crate) fn check_run(images: &Path, figures: &mut Value) -> StepResult {
     let mut breaches = Vec::new();
     for name in SHIPPED {

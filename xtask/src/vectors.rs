@@ -1,14 +1,13 @@
-//! Reference vectors: the independent generators are rerun, and what they
-//! write must equal, byte for byte, what is checked in.
+//! Reference vectors: the independent generators are rerun, and their output must equal, byte for byte, the
+//! checked-in files.
 //!
-//! A generator is a Python script in a folder `tests/vectors` of a crate (or
-//! in `tests/vectors` itself) that writes its data files beside itself, or to
-//! standard output if it documents the call `python3 NAME.py > FILE`. It is
-//! run in a copy of the folder from which all data files have been removed, so
-//! that only what it really computes is compared.
+//! A generator is a Python script in a folder `tests/vectors` of a crate (or in `tests/vectors` itself) that
+//! writes its data files beside itself, or to standard output if it documents the call `python3 NAME.py >
+//! FILE`. It is run in a copy of the folder without any data files, so that only its own results are
+//! compared.
 //!
-//! A data file without a generator (digitised or taken from elsewhere) must be
-//! named in the folder's README.md, which says where it comes from.
+//! A data file without a generator (digitised or taken from elsewhere) must be named in the folder's
+//! README.md, with its source.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -23,7 +22,7 @@ use crate::tools;
 /// Folders that hold crates, searched for `tests/vectors`.
 const CRATE_PARENTS: [&str; 3] = [".", "firmware", "host-sim"];
 
-/// What counts as data.
+/// Extensions of data files.
 const DATA: [&str; 4] = ["json", "csv", "txt", "bin"];
 
 type Files = BTreeMap<String, Vec<u8>>;

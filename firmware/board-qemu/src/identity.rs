@@ -3,7 +3,7 @@
 use wheeleg_identity::{Digest, Identity};
 pub use wheeleg_identity::{Kind, Record};
 
-/// What this build was made of.
+/// Digest of the sources of this build.
 const SOURCES: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
 
 /// The record of an image of this build.

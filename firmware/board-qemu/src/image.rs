@@ -9,8 +9,7 @@ use crate::uart::Uart;
 const HOST: &str = "QEMU mps2-an386 (Cortex-M4)";
 const HOST_HIL: &str = "QEMU mps2-an386, HIL over UART";
 
-/// Runs a board whose messages go through semihosting; ends the emulator when
-/// the simulator has gone.
+/// Runs a board whose messages go through semihosting; ends the emulator when the simulator has gone.
 pub fn run_on_semihosting<'p, B: Board<'p>>(pins: &'p B::Pins) -> ! {
     let Some(mut pipes) = HostPipes::open() else {
         semihosting::fail();

@@ -7,7 +7,7 @@ use wheeleg_remote::Stream;
 const READ_BINARY: usize = 1;
 /// `fopen` mode "wb".
 const WRITE_BINARY: usize = 5;
-/// What SYS_OPEN gives when it fails.
+/// Result of SYS_OPEN when it fails.
 const FAILED: usize = usize::MAX;
 
 /// Two open files of the host.

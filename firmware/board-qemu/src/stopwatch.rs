@@ -14,9 +14,9 @@ pub const CLOCK_HZ: u32 = 25_000_000;
 const COUNTS_PER_US: u32 = CLOCK_HZ / 1_000_000;
 /// SysTick has 24 bits.
 const RELOAD: u32 = 0x00FF_FFFF;
-/// What cortex-m-rt paints the stack with.
+/// Value with which cortex-m-rt paints the stack.
 const PAINT: u32 = 0xCCCC_CCCC;
-/// The stack is searched in every so many calls: a search takes longer than a tick.
+/// Calls between two searches of the stack: a search takes longer than a tick.
 const SEARCH_EVERY: u16 = 1024;
 
 unsafe extern "C" {

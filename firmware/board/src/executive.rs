@@ -1,10 +1,9 @@
-//! The main loop of a board, over whatever hardware.
+//! The main loop of a board, for any hardware.
 //!
-//! Interrupt handlers only latch what the hardware saw and when; everything that
-//! touches the application runs here, one event after the other, in the order of
-//! the time stamps. So the order, and with it every output bit, does not depend
-//! on how long a handler or a tick takes, there is no shared state to lock, and
-//! the stack holds one chain of calls and one interrupt frame.
+//! Interrupt handlers only latch what the hardware saw and when; all code that touches the application runs
+//! here, one event after the other, in the order of the time stamps. So the order, and with it every output
+//! bit, does not depend on how long a handler or a tick takes, there is no shared state to lock, and the
+//! stack holds one chain of calls and one interrupt frame.
 
 use wheeleg_node::hardware::{
     DumpValve, Encoder, MotorDrive, ParameterStore, PositionSensor, SwitchBank, ValveBank,
@@ -29,17 +28,17 @@ pub trait Application {
     fn period(&self) -> Micros;
     /// Whether nothing has damaged that.
     fn period_is_sound(&self) -> bool;
-    /// Whether the parameters are to be stored.
+    /// Whether the parameters should be stored.
     fn save_is_due(&self) -> bool;
     /// Stores the parameters.
     fn save(&mut self, store: &mut impl ParameterStore, at: Micros);
     /// The board's transmitter was cut off by its time limit.
     fn driver_cut_off(&mut self, at: Micros);
-    /// A frame that was taken was not sent: its slot had passed.
+    /// A taken frame was not sent: its slot had passed.
     fn missed_slot(&mut self);
 }
 
-/// What both kinds of node have by the same names.
+/// Methods that both kinds of node have under the same names.
 macro_rules! of_the_node {
     () => {
         fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
@@ -100,7 +99,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
     }
 }
 
-/// What the hardware latched.
+/// An event latched by the hardware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Bytes are in the receive buffer; the last of them ended at this time.
@@ -111,8 +110,7 @@ pub enum Event {
 
 /// The hardware as the main loop sees it.
 pub trait Board {
-    /// The oldest event that has not been taken; a tick's inputs become those
-    /// that the sensors give.
+    /// Takes the oldest event; for a tick, its latched inputs become the readings of the sensors.
     fn next_event(&mut self) -> Option<Event>;
 
     /// Hands over the bytes of the [`Event::Bytes`] taken last, each piece with
@@ -122,8 +120,8 @@ pub trait Board {
     /// The clock now.
     fn now(&self) -> Micros;
 
-    /// A tick is over: the watchdog is fed and the next tick edge is one period
-    /// after the edge of this one. A period that is new is taken over if `confirmed`.
+    /// Ends a tick: the watchdog is fed and the next tick edge is one period after the edge of this one. A
+    /// new period is taken over if `confirmed`.
     fn tick_finished(
         &mut self,
         report: &TickReport,
@@ -134,17 +132,16 @@ pub trait Board {
     /// Whether a transmission may be handed over.
     fn transmitter_is_free(&self) -> bool;
 
-    /// Schedules a transmission. A start that is past becomes as soon as possible: one of a
-    /// slot is not handed over then.
+    /// Schedules a transmission. A start in the past becomes as soon as possible; the caller drops frames
+    /// whose slot has passed.
     fn transmit(&mut self, transmission: &Transmission);
 
     /// Whether the driver's time limit has cut the transmission off that is under way;
     /// then the transmitter is free. Asked while it is not.
     fn take_cut_off(&mut self) -> bool;
 
-    /// Gives the parameter memory to `save`, which may keep the processor from
-    /// everything else for tens of milliseconds, and forgets what was received
-    /// meanwhile: its times are wrong.
+    /// Gives the parameter memory to `save`, which may keep the processor from everything else for tens of
+    /// milliseconds, and discards the bytes received meanwhile: their times are wrong.
     fn store(&mut self, save: impl FnOnce(&mut Self::Memory));
 
     /// Memory that keeps parameters.
@@ -175,9 +172,8 @@ pub fn older(bytes: Option<Micros>, tick: Option<Micros>) -> Option<Event> {
     }
 }
 
-/// Takes one event; without one, sends what waits, or sleeps. A frame is sent at once
-/// behind the bytes that asked for it, and looked for before every sleep, so not between
-/// waking and the tick.
+/// Takes one event; without one, sends a waiting frame, or sleeps. A frame is sent directly after the bytes
+/// that asked for it, and otherwise before a sleep, so not between waking and the tick.
 pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
     match board.next_event() {
         Some(Event::Bytes(_)) => {
@@ -207,8 +203,8 @@ pub fn step<A: Application, B: Board>(application: &mut A, board: &mut B) {
     }
 }
 
-/// Sends the next frame if there is one and the transmitter is free; whether it did. A slot
-/// whose start has passed stays empty: its reply would fall into the slots of other boards.
+/// Sends the next frame if there is one and the transmitter is free; returns whether it did. A slot whose
+/// start has passed stays empty: its reply would fall into the slots of other boards.
 fn send<A: Application, B: Board>(application: &mut A, board: &mut B) -> bool {
     if !board.transmitter_is_free() {
         return false;
@@ -244,7 +240,7 @@ mod tests {
     use wheeleg_node::mode::Mode;
     use wheeleg_protocol::FaultBits;
 
-    /// What happened, in order.
+    /// The events, in order.
     #[derive(Clone, Debug, PartialEq)]
     enum Did {
         Bytes(Vec<u8>, u32),

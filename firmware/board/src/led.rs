@@ -1,4 +1,4 @@
-//! What the status LED shows.
+//! Patterns of the status LED.
 //!
 //! | pattern | meaning |
 //! |---|---|
@@ -13,7 +13,7 @@ use wheeleg_node::snapshot::TickReport;
 use wheeleg_protocol::FaultBits;
 use wheeleg_units::Micros;
 
-/// State of the board as the LED tells it.
+/// State of the board that the LED shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Not armed, no fault.

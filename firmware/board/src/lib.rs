@@ -1,8 +1,7 @@
-//! Board support of the joint and wheel boards, and what every board shares.
+//! Board support of the joint and wheel boards, and the parts that every board shares.
 //!
-//! `BOARD.md` beside this crate holds the pin table and says which register is
-//! used for what. The modules outside [`g431`] know no register: they build and
-//! are tested on the host, and serve any other board as well.
+//! `BOARD.md` beside this crate holds the pin table and the use of each register. The modules outside
+//! [`g431`] know no register: they build and are tested on the host, and serve any other board as well.
 //!
 //! | module | what |
 //! |---|---|

@@ -11,7 +11,7 @@ mod csr {
     pub(super) const IWDGRSTF: u32 = 1 << 29;
 }
 
-/// What a handler leaves in a word of RAM before it resets the processor.
+/// Note that a handler leaves in a word of RAM before it resets the processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Note {
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn the_watchdog_is_told_from_power_and_software() {
-        // Every reset pulls the pin low as well, so its flag says least.
+        // Every reset pulls the pin low as well, so its flag means least.
         let pin = csr::PINRSTF;
         let cause = |flags: u32, note: u32| decode(flags | pin, note);
         assert_eq!(cause(csr::IWDGRSTF, 0), ResetCause::Watchdog);

@@ -19,8 +19,8 @@ pub struct RxTimestamp {
 
 /// Queue with one producer and one consumer.
 ///
-/// When full, a new stamp replaces none and is counted: its bytes are handed over
-/// with the next stamp, and the frame check decides about them.
+/// When full, a new stamp is dropped and counted: its bytes are passed on with the next stamp, and the frame
+/// check decides about them.
 #[derive(Debug)]
 pub struct RxTimestamps {
     times: [AtomicU32; CAPACITY],
@@ -53,7 +53,7 @@ impl RxTimestamps {
         counter as usize % CAPACITY
     }
 
-    /// Adds a stamp; the interrupt handler alone calls this.
+    /// Adds a stamp; only the interrupt handler calls this.
     pub fn push(&self, stamp: RxTimestamp) {
         let head = self.head.load(Ordering::Relaxed);
         if head.wrapping_sub(self.tail.seen()) >= CAPACITY as u32 {
@@ -69,7 +69,7 @@ impl RxTimestamps {
         self.head.announce(head.wrapping_add(1));
     }
 
-    /// The oldest stamp; the main loop alone calls this and [`RxTimestamps::pop`].
+    /// The oldest stamp; only the main loop calls this and [`RxTimestamps::pop`].
     #[must_use]
     pub fn peek(&self) -> Option<RxTimestamp> {
         let tail = self.tail.load(Ordering::Relaxed);

@@ -7,14 +7,14 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, compiler_fence};
 
-/// An atomic that one side writes when what it announces is in place.
+/// An atomic that one side writes once the data that it announces is in place.
 pub(crate) trait Announce {
     type Value;
 
-    /// What was announced; what is read after this is at least as new.
+    /// The announced value; data read after this is at least as new.
     fn seen(&self) -> Self::Value;
 
-    /// Announces what was written before this.
+    /// Announces the data written before this.
     fn announce(&self, value: Self::Value);
 }
 

@@ -1,5 +1,4 @@
-//! What a firmware image says of itself: a record of 40 bytes in its ELF file, by which
-//! the host knows what it starts.
+//! A firmware image's identity: a record of 40 bytes in its ELF file, by which the host knows what it starts.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -10,8 +9,8 @@
 //! | 8…15 | hash of the board bus's interface, little-endian |
 //! | 16…39 | digest of the sources (feature `sources`) |
 //!
-//! The record stands in the section [`SECTION`], which the linker scripts keep and do
-//! not load: it takes no flash. It goes with the ELF file, not with a raw binary.
+//! The record is in the section [`SECTION`], which the linker scripts keep and do not load: it takes no
+//! flash. It goes with the ELF file, not with a raw binary.
 //!
 //! # Glossary
 //!
@@ -49,7 +48,7 @@ const _: () = assert!(LENGTH == 40 && align_of::<Record>() == 1);
 /// Digest of the sources that something was built from.
 pub type Digest = [u8; 24];
 
-/// What an image is, and what it runs on. The numbers stand in records.
+/// Kind of an image, and its hardware. Records hold these numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -81,7 +80,7 @@ impl Kind {
         Self::QemuHilJoint,
     ];
 
-    /// The image's name, as it is built.
+    /// The image's name in a build.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -95,7 +94,7 @@ impl Kind {
         }
     }
 
-    /// What it is, for people.
+    /// Its description, for people.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -125,7 +124,7 @@ impl Kind {
     }
 }
 
-/// The record as it stands in the file.
+/// The record as it is in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(C)]
 pub struct Record {
@@ -152,10 +151,10 @@ impl Record {
     }
 }
 
-/// What a record says.
+/// Contents of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity {
-    /// What the image is.
+    /// Kind of the image.
     pub kind: Kind,
     /// Version of the board link; 0 in an image that does not speak it.
     pub link: u16,
@@ -172,7 +171,7 @@ pub enum NoRecord {
     Other,
     /// A record of another version.
     Version(u8),
-    /// A kind that nobody knows.
+    /// An unknown kind.
     Kind(u8),
 }
 
@@ -230,7 +229,7 @@ fn take<const N: usize>(bytes: &[u8]) -> Result<([u8; N], &[u8]), NoRecord> {
 mod tests {
     use super::*;
 
-    /// As the record stands in a file.
+    /// The record's bytes in a file.
     fn bytes(identity: &Identity) -> Vec<u8> {
         let record = Record::new(identity);
         let mut bytes = record.mark.to_vec();

@@ -1,11 +1,10 @@
-//! Digest of the sources that an image is made of, for build scripts.
+//! Digest of the sources of an image, for build scripts.
 //!
-//! It depends on names below the workspace's root and on contents, not on where the
-//! workspace lies, on times or on the way lines end. Images and host have the same one if
-//! and only if the files listed here are the same. A change of the simulator's sources
-//! leaves it; one of the root `Cargo.toml` or `Cargo.lock` does not, even if it concerns the
-//! simulator alone (one of its dependencies, a member of the workspace), because versions and
-//! profiles of the images stand there, too.
+//! It depends on names below the workspace's root and on contents, not on the place of the workspace, on
+//! times or on line ends. Images and host have the same one if and only if the files listed here are the
+//! same. It does not change with the simulator's sources; it does with the root `Cargo.toml` or `Cargo.lock`,
+//! even if only the simulator is concerned (one of its dependencies, a member of the workspace), because they
+//! also hold versions and profiles of the images.
 
 use std::ffi::OsStr;
 use std::io;
@@ -14,7 +13,7 @@ use std::{env, fs};
 
 use crate::Digest;
 
-/// What every image is made of.
+/// Sources of every image.
 const COMMON: [&str; 8] = [
     "Cargo.toml",
     "Cargo.lock",
@@ -43,7 +42,7 @@ pub enum Images {
 }
 
 impl Images {
-    /// What these images alone are made of.
+    /// Sources of only these images.
     const fn own(self) -> [&'static str; 2] {
         match self {
             Self::G431 => ["firmware/board", "memory.x"],
@@ -51,7 +50,7 @@ impl Images {
         }
     }
 
-    /// All that they are made of.
+    /// All their sources.
     fn sources(self) -> Vec<&'static str> {
         let common = COMMON.into_iter().chain([LINK]);
         common.chain(self.own()).collect()
@@ -78,7 +77,7 @@ pub fn digest_of(root: &Path, names: &[&str]) -> io::Result<(Digest, Vec<PathBuf
             files.push(path);
             continue;
         }
-        // What is neither file nor crate has no sources.
+        // A path to neither a file nor a crate has no sources.
         files.push(path.join(MANIFEST));
         walk(&path.join(SOURCES), &mut files)?;
         let script = path.join(BUILD_SCRIPT);
@@ -114,7 +113,7 @@ pub fn emit(root: &Path, images: Images, name: &str) -> io::Result<()> {
     emit_of(root, &images.sources(), name)
 }
 
-/// The same of the crates and files with these names.
+/// The same for the crates and files with these names.
 ///
 /// # Errors
 /// As [`emit`].
@@ -123,7 +122,7 @@ pub fn emit_of(root: &Path, names: &[&str], name: &str) -> io::Result<()> {
     for file in files {
         println!("cargo:rerun-if-changed={}", file.display());
     }
-    // Files that come anew: a folder's time is that of its newest entry.
+    // New files: a folder's time is that of its newest entry.
     for name in names {
         let sources = root.join(name).join(SOURCES);
         if sources.is_dir() {
@@ -232,7 +231,7 @@ mod tests {
                 }
             }
             assert_eq!(before, of(root, images));
-            // A board's own support concerns its own images alone.
+            // A board's own support concerns only its own images.
             let [own, _] = images.own();
             let other = [Images::G431, Images::Qemu].map(|i| of(root, i));
             write(root, &format!("{own}/src/new.rs"), "a line\n");
@@ -258,7 +257,7 @@ mod tests {
                     [name.to_owned()].into_iter().chain(inside)
                 })
                 .collect();
-            // Three files, eight crates of which each has a manifest and sources.
+            // Three files, and eight crates with a manifest and sources each.
             assert_eq!(missing.len(), 3 + 3 * 8, "{missing:?}");
             for name in missing {
                 let path = root.join(&name);

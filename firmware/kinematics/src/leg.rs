@@ -128,7 +128,7 @@ impl<T: Scalar> LegGeometry<T> {
             theta1_second: inv_b2 * (theta3_prime * inv_cos3 * inv_cos3 - theta1_prime),
             phi_second: tan3 * theta3_prime * phi_prime,
         };
-        // What the accessors multiply without a way to refuse: N, Ṅ and the foot Jacobian.
+        // Factors that the accessors multiply without being able to refuse: N, Ṅ and the foot Jacobian.
         let yaw_arm = lengths.b5_m * phi_prime;
         let terms = [
             theta1_prime,

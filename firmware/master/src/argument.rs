@@ -1,8 +1,7 @@
 //! Arguments of the user's commands: name, kind, unit and range of each.
 //!
-//! This is the one place of these ranges. The table of commands lists them, the layers check
-//! by them, scenario and robot files are read by them, and `docs/reference/commands.md` is
-//! written from them.
+//! This is the one place of these ranges. The table of commands lists them, the layers check them, scenario
+//! and robot files are read with them, and `docs/reference/commands.md` is generated from them.
 
 use core::fmt;
 
@@ -24,7 +23,7 @@ impl<T: PartialOrd> Limits<T> {
     }
 }
 
-/// What an argument may be, with its range.
+/// Kind of an argument, with its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArgumentKind {
     /// A whole number.
@@ -51,7 +50,7 @@ pub enum ArgumentKind {
 }
 
 impl ArgumentKind {
-    /// Unit for people, `1` for what has none.
+    /// Unit for people, `1` without a unit.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -200,7 +199,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// A unit behind a number; nothing where there is none.
+/// A unit behind a number; empty if there is none.
 struct Suffix(ArgumentKind);
 
 impl fmt::Display for Suffix {
@@ -266,8 +265,7 @@ const FULL_STROKE: ArgumentKind = ArgumentKind::Length(Limits {
 });
 /// A coefficient in one byte.
 const BYTE: ArgumentKind = ArgumentKind::Whole(Limits { min: 0, max: 255 });
-/// An instant within a step of the gait. Their order is checked beside
-/// (`GaitParams::validate`).
+/// An instant within a step of the gait. `GaitParams::validate` checks their order.
 const INSTANT: ArgumentKind = ArgumentKind::Time(Limits {
     min: 0,
     max: 60_000_000,

@@ -1,7 +1,6 @@
-//! The behaviours of a walking robot: their names, the set that may act, their counters, and what
-//! they tell.
+//! The behaviours of a walking robot: their names, the set that may act, their counters, and their reports.
 //!
-//! What they sense and do stands in [`crate::layer0::behaviours`].
+//! [`crate::layer0::behaviours`] describes their inputs and actions.
 
 use crate::contact::Side;
 
@@ -24,7 +23,7 @@ macro_rules! behaviours {
                 match self { $(Self::$name => $key,)* }
             }
 
-            /// What it does.
+            /// Its action.
             #[must_use]
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$name => concat!($($doc),*).trim_ascii(),)* }
@@ -89,7 +88,7 @@ impl Behaviours {
     /// None.
     pub const NONE: Self = Self(0);
 
-    /// The set with these bits; what is no behaviour is left out.
+    /// The set with these bits; other bits are dropped.
     #[must_use]
     pub const fn from_bits(bits: u16) -> Self {
         Self(bits & Self::ALL.0)
@@ -125,7 +124,7 @@ impl Default for Behaviours {
 pub struct Tally([u32; BEHAVIOURS]);
 
 impl Tally {
-    /// It has acted once more.
+    /// Counts one more action.
     pub fn count(&mut self, one: Behaviour) {
         if let Some(count) = self.0.get_mut(one.index()) {
             *count = count.saturating_add(1);
@@ -148,7 +147,7 @@ impl Tally {
     }
 }
 
-/// What a behaviour tells when it acts.
+/// Report of a behaviour that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
     /// An axis pulls at its limit and does not move: it holds.
@@ -158,12 +157,12 @@ pub enum Act {
     },
     /// No foot carries: the wheels slow down, so that the robot does not fall on its tail.
     TipGuard,
-    /// A foot has met the ground far above where it was expected.
+    /// A foot has met the ground far above the expected height.
     EarlyGround(
         /// Its leg.
         Side,
     ),
-    /// A foot has met the ground far below where it was expected.
+    /// A foot has met the ground far below the expected height.
     LateGround(
         /// Its leg.
         Side,
@@ -196,7 +195,7 @@ pub enum Act {
 }
 
 impl Act {
-    /// Whose act it is.
+    /// The behaviour that acts.
     #[must_use]
     pub const fn behaviour(self) -> Behaviour {
         match self {

@@ -180,7 +180,7 @@ pub enum Command {
     StopGait,
     /// Walk, or change the order of the walk under way.
     Walk(
-        /// What is asked for.
+        /// The walk.
         WalkOrder,
     ),
     /// Replace the gait parameters.
@@ -243,7 +243,7 @@ pub struct CommandInfo {
     pub name: &'static str,
     /// Arguments, each with its range.
     pub arguments: &'static [Argument],
-    /// What it does.
+    /// Its effect.
     pub effect: &'static str,
 }
 

@@ -10,9 +10,9 @@ use crate::setpoint::NODES;
 /// Unique id of a board's processor.
 pub type UniqueId = [u8; 12];
 
-/// Time without a newer sight of the robot after which the operator is gone, µs (ASSUMED).
+/// Time without a newer view of the robot after which the operator counts as gone, µs (ASSUMED).
 pub const OPERATOR_TIMEOUT_US: u32 = 400_000;
-/// Shortest such time, µs: shorter than this and a browser that collects garbage is gone.
+/// Shortest such time, µs: with less, a browser's garbage collection would count as gone.
 pub const OPERATOR_TIMEOUT_MIN_US: u32 = 200_000;
 /// Longest such time, µs. It cannot be switched off.
 pub const OPERATOR_TIMEOUT_MAX_US: u32 = 1_000_000;
@@ -31,8 +31,8 @@ pub enum SwitchFrame {
 /// How the wheels are led.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WheelDrive {
-    /// The slot holds the end of the motion; the wheel board makes its own
-    /// trapezoid with the speed and acceleration it was given.
+    /// The slot holds the end of the motion; the wheel board makes its own trapezoid with its configured
+    /// speed and acceleration.
     #[default]
     Profile,
     /// The slot holds the position of the master's trapezoid at this instant.
@@ -65,10 +65,10 @@ pub struct MasterConfig {
     /// Boards that were commissioned, by address 1..=8. Another board at such an
     /// address bars arming; `None` takes any.
     pub commissioned: [Option<UniqueId>; NODES],
-    /// Sum of the parameters that each board should have in force (protocol/SPEC.md, Parameter
-    /// sets), by address 1..=8; `None` takes any. Wheels are given theirs at every arming.
+    /// Sum of the parameters that each board should have in force (protocol/SPEC.md, Parameter sets), by
+    /// address 1..=8; `None` accepts any. Wheels get theirs at every arming.
     pub parameters: [Option<u32>; NODES],
-    /// Time without a newer sight of the robot after which the operator is gone, µs, kept within
+    /// Time without a newer view of the robot after which the operator counts as gone, µs, kept within
     /// [`OPERATOR_TIMEOUT_MIN_US`] and [`OPERATOR_TIMEOUT_MAX_US`].
     pub operator_timeout_us: u32,
 }

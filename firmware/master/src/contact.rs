@@ -66,9 +66,8 @@ impl FootSwitches {
     /// Bearing of the touching side in the robot's frame, rad in (−π, π]:
     /// 0 ahead, +π/2 left, π behind, −π/2 right.
     ///
-    /// `None` if no switch is closed or if the closed ones cancel (opposite
-    /// pairs, all four): then no side is meant. The right leg's frame is
-    /// mirrored in Y, so its outer side is the robot's right.
+    /// `None` if no switch is closed or if the closed ones cancel (opposite pairs, all four): then no side is
+    /// indicated. The right leg's frame is mirrored in Y, so its outer side is the robot's right.
     #[must_use]
     pub fn bearing_rad(self, side: Side) -> Option<f32> {
         let (forward, outward) = self.direction();
@@ -93,8 +92,8 @@ impl FootSwitches {
 /// [`BEARING_ERROR_RAD`] of the exact arctangent. (0, 0) gives 0.
 #[must_use]
 pub fn bearing_of(left: f32, forward: f32) -> f32 {
-    // By its full name: where `std` is linked, `left.atan2(forward)` would be
-    // another function, and host and target would differ.
+    // By its full name: if `std` is linked, `left.atan2(forward)` would be another function, and host and
+    // target would differ.
     F32Ext::atan2(left, forward)
 }
 

@@ -90,8 +90,8 @@ pub enum Refusal {
     NotAtStart,
     /// An E-stop or HOLD is latched: clear it first.
     Latched,
-    /// The supply pressure switch is open: wait until the pressure is there (after an E-stop,
-    /// until the reservoir is filled again), then ask anew.
+    /// The supply pressure switch is open: wait until there is pressure (after an E-stop, until the reservoir
+    /// is filled again), then ask again.
     NoAir,
     /// A node has not been heard.
     NodeMissing {
@@ -135,7 +135,7 @@ pub enum Refusal {
         /// Active fault bits.
         faults: u16,
     },
-    /// A node was reset while it did this: nobody knows whether it is done.
+    /// A node was reset during this: nobody knows whether it is done.
     NodeReset {
         /// Bus address.
         node: u8,
@@ -217,7 +217,7 @@ impl Dispatcher {
         }
     }
 
-    /// Forgets the numbers of a client that connects anew.
+    /// Forgets the command numbers of a client that reconnects.
     pub fn open_session(&mut self, client: u8) {
         if let Some(last) = self.last.get_mut(usize::from(client)) {
             *last = None;

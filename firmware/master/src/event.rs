@@ -1,4 +1,4 @@
-//! What the master reports to its user: a bounded queue of events.
+//! Reports of the master to its user: a bounded queue of events.
 
 use heapless::Deque;
 use wheeleg_protocol::{FaultRecord, LinkRecord, LogEntry, Warning};
@@ -10,7 +10,7 @@ use crate::contact::{Sector, Side};
 use crate::dispatcher::{Refusal, Ticket};
 use crate::finding::Finding;
 
-/// Why all axes were told to hold.
+/// Why all axes hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldReason {
     /// A node missed three cycles in a row.
@@ -25,8 +25,7 @@ pub enum HoldReason {
         /// Active fault bits, protocol's table of faults.
         faults: u16,
     },
-    /// A node that had been armed is so no longer, although nobody asked for it:
-    /// it has restarted.
+    /// A node that was armed no longer is, although nobody asked for it: it has restarted.
     NodeDisarmed(
         /// Bus address.
         u8,
@@ -74,7 +73,7 @@ pub enum Event {
         /// The node's firmware version: major, minor, patch.
         firmware: [u8; 3],
     },
-    /// A node is not the kind of board its address stands for.
+    /// A node is not the kind of board that belongs to its address.
     WrongRole(
         /// Bus address.
         u8,
@@ -92,12 +91,12 @@ pub enum Event {
         node: u8,
         /// Unique id that was commissioned.
         commissioned: UniqueId,
-        /// Unique id that was found.
+        /// Unique id found.
         found: UniqueId,
         /// Address at which the board found was commissioned, if at any.
         belongs: Option<u8>,
     },
-    /// A board was taken over as the one at its address.
+    /// A board was accepted as the one at its address.
     Commissioned {
         /// Bus address.
         node: u8,
@@ -106,12 +105,12 @@ pub enum Event {
     },
     /// Something is wrong with a board or with the line.
     Found {
-        /// Bus address; `None`: nobody can tell.
+        /// Bus address; `None`: unknown.
         node: Option<u8>,
-        /// What.
+        /// The finding.
         finding: Finding,
     },
-    /// A board has said why it stopped or started; asked for by the master itself.
+    /// A board has reported why it stopped or started, at the master's own request.
     Diagnosis {
         /// Bus address.
         node: u8,
@@ -120,7 +119,7 @@ pub enum Event {
         /// Time since its first fault, µs, modulo 2^32. A fault may be older than this master.
         ago_us: u32,
     },
-    /// A board has said what it has heard; asked for in turn.
+    /// A board has reported what it has heard; boards are asked in turn.
     Link {
         /// Bus address.
         node: u8,
@@ -164,7 +163,7 @@ pub enum Event {
     Armed,
     /// All axes are disarmed.
     Disarmed,
-    /// All axes were told to hold; the gait is over.
+    /// All axes were commanded to hold; the gait is over.
     Hold(
         /// Why.
         HoldReason,
@@ -206,7 +205,7 @@ pub enum Event {
         side: Side,
         /// Side of the foot it is on, in the robot's frame.
         sector: Option<Sector>,
-        /// What is wrong with it.
+        /// Its problem.
         warning: Warning,
     },
     /// Answer to `TransmitPosition`.
@@ -224,13 +223,13 @@ pub const EVENT_DEPTH: usize = 32;
 /// How long an event stays in a full queue, the least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Weight {
-    /// It comes again, or is told elsewhere.
+    /// It comes again, or is reported elsewhere.
     Routine,
     /// It happened once.
     Told,
-    /// A person has to know why the robot stopped or does not start, and which board is to blame.
+    /// A person must know why the robot stopped or does not start, and which board is to blame.
     Cause,
-    /// A command of the user ends with it, or asked for it: whoever gave one waits.
+    /// It ends a command of the user, or answers one: its sender waits for it.
     Outcome,
 }
 
@@ -256,7 +255,7 @@ impl Event {
     }
 }
 
-/// Bounded queue of events. When it is full the oldest of the least weight goes, which may be
+/// Bounded queue of events. When it is full, the oldest event of the least weight is dropped, which may be
 /// the newcomer: an outcome of a command stays as long as anything else is there.
 #[derive(Debug, Default)]
 pub struct Events {

@@ -29,15 +29,15 @@ pub const TELEMETRY_STORAGE: usize = 33;
 pub type CommandFifo = Queue<Accepted, COMMAND_STORAGE>;
 /// Layer 1 to layer 0: one set of references per bus cycle.
 pub type SetpointFifo = Queue<Setpoints, SETPOINT_STORAGE>;
-/// Layer 0 to layer 1: what the nodes measured in the last cycle.
+/// Layer 0 to layer 1: the nodes' measurements in the last cycle.
 pub type FeedbackFifo = Queue<Feedback, FEEDBACK_STORAGE>;
 /// Layer 0 to layer 2: one record per bus cycle.
 pub type TelemetryFifo = Queue<Record, TELEMETRY_STORAGE>;
 
-/// What happens to an item that finds its queue full.
+/// Handling of an item that finds its queue full.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhenFull {
-    /// The new item is refused and its sender is told why.
+    /// The new item is refused, and its sender gets the reason.
     Reject,
     /// The oldest item is dropped, the new one stored, and a counter advances.
     DropOldest,

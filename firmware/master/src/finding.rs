@@ -1,9 +1,9 @@
-//! Findings: what the master detects about the boards and the line by itself, with the sentence and
-//! the remedy of each. (Faults that a board latches have theirs in the protocol's table.)
+//! Findings: problems of the boards and the line that the master detects by itself, with the sentence and the
+//! remedy of each. (Faults that a board latches have theirs in the protocol's table.)
 
 macro_rules! findings {
     ($( $name:ident: $sentence:literal, $remedy:literal; )*) => {
-        /// Something that a person has to know and can mend.
+        /// A problem that a person must know and can mend.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Finding { $( #[doc = $sentence] $name, )* }
 

@@ -27,9 +27,8 @@ pub const LOCAL_DEADLINE_US: u64 = 1_000_000;
 
 /// The master.
 ///
-/// Call [`Self::cycle`] every 10 ms and send its bytes at once; give every
-/// byte heard to [`Self::on_bus_bytes`]; ask [`Self::next_acyclic`] after the last
-/// slot and after every answer.
+/// Call [`Self::cycle`] every 10 ms and send its bytes at once; pass every received byte to
+/// [`Self::on_bus_bytes`]; call [`Self::next_acyclic`] after the last slot and after every answer.
 #[derive(Debug)]
 pub struct Master {
     dispatcher: Dispatcher,
@@ -93,16 +92,16 @@ impl Master {
         self.submit_request(request, now_us)
     }
 
-    /// Submits a numbered command with a deadline. The ticket says that it is on
-    /// its way; [`Event::Done`] or [`Event::Refused`] with the same ticket follows.
+    /// Submits a numbered command with a deadline. The ticket means that it is on its way; [`Event::Done`] or
+    /// [`Event::Refused`] with the same ticket follows.
     ///
     /// # Errors
     /// See [`Reject`].
     pub fn submit_request(&mut self, request: Request, now_us: u64) -> Result<Ticket, Reject> {
         let accepted = self.dispatcher.admit(&request, now_us)?;
         if matches!(request.command, Command::EmergencyStop) {
-            // A stop neither queues nor expires, and what was queued before it
-            // must not undo it: a clear would take it back in the next cycle.
+            // A stop neither queues nor expires, and commands queued before it must not undo it: a clear
+            // would take it back in the next cycle.
             drop_waiting(&mut self.commands0, now_us, &mut self.events);
             self.layer0.emergency_stop(now_us, &mut self.events);
             self.events.push(now_us, Event::Done(accepted.ticket));
@@ -116,12 +115,12 @@ impl Master {
         Dispatcher::route(accepted, &mut to_layer0, &mut to_layer1)
     }
 
-    /// Forgets the command numbers of a client that connects anew.
+    /// Forgets the command numbers of a client that reconnects.
     pub fn open_session(&mut self, client: u8) {
         self.dispatcher.open_session(client);
     }
 
-    /// The operator in control has seen the robot as it was at `seen_us`; see
+    /// The operator in control has seen the robot's state of `seen_us`; see
     /// [`Lease::beat`](crate::layer0::operator::Lease::beat).
     pub fn beat(&mut self, seen_us: u64, now_us: u64) {
         self.layer0.beat(seen_us, now_us);
@@ -158,7 +157,7 @@ impl Master {
             self.answer_for_layer_one(now_us);
         }
         if held && !self.layer0.lease().is_held() {
-            // Nobody would watch what begins now.
+            // Nobody would watch a motion that begins now.
             drop_waiting(&mut self.commands1, now_us, &mut self.events);
         }
         if self.layer1_enabled {
@@ -177,8 +176,8 @@ impl Master {
         self.layer0.start_cycle(now_us, newest)
     }
 
-    /// A layer 1 that was given up answers nothing. Of what it is asked only a hold can be done: at
-    /// once, by layer 0.
+    /// A layer 1 that was given up answers nothing. Of its commands only a hold can be carried out: at once,
+    /// by layer 0.
     fn answer_for_layer_one(&mut self, now_us: u64) {
         for _ in 0..self.commands1.capacity() {
             let Some(Accepted {
@@ -204,9 +203,8 @@ impl Master {
         self.layer0.on_bus_bytes(bytes, t_end_us, &mut self.events);
     }
 
-    /// The next acyclic request to send at `now_us`, if one is due and its
-    /// answer fits before the next SYNC. To be asked when the line is silent
-    /// after the last slot, and again after each answer.
+    /// The next acyclic request to send at `now_us`, if one is due and its answer fits before the next SYNC.
+    /// To be called when the line is silent after the last slot, and again after each answer.
     pub fn next_acyclic(&mut self, now_us: u64) -> Option<TxBytes> {
         self.layer0.next_acyclic(now_us, &mut self.events)
     }

@@ -1,4 +1,4 @@
-//! What layers 0 and 1 tell each other once per bus cycle.
+//! Data that layers 0 and 1 exchange once per bus cycle.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -98,7 +98,7 @@ impl Phase {
         !matches!(self, Self::Idle | Self::Ready | Self::Done | Self::Hold)
     }
 
-    /// Whether `StopGait` ends what the robot does: a gait, a walk or a trajectory.
+    /// Whether `StopGait` ends the robot's motion: a gait, a walk or a trajectory.
     #[must_use]
     pub const fn is_stepping(self) -> bool {
         self.is_moving() && !matches!(self, Self::Homing)
@@ -114,7 +114,7 @@ pub struct NextReference {
     pub cycles: u8,
 }
 
-/// What a node does when the bus falls silent in this phase, `docs/decisions/0010-safe-states.md`.
+/// A node's reaction when the bus falls silent in this phase, `docs/decisions/0010-safe-states.md`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLinkLoss {
     /// Valves shut, air trapped: a loaded leg must not collapse.
@@ -127,7 +127,7 @@ pub enum OnLinkLoss {
 /// Leg–wheel co-operation and touchdown reflexes of layer 0 on one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reflex {
-    /// The reference goes out as it is.
+    /// The reference goes out unchanged.
     #[default]
     None,
     /// The reference goes out minus the measured wheel travel since layer 1
@@ -155,9 +155,9 @@ pub struct JointSetpoint {
 /// Reference of one wheel's travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WheelTravel {
-    /// Distance in mm from where the motion began, now.
+    /// Current distance in mm from the start of the motion.
     pub travel_mm: PositionMm,
-    /// Distance in mm at the end of the motion; where no end is planned, as `travel_mm`.
+    /// Distance in mm at the end of the motion; equal to `travel_mm` if no end is planned.
     pub target_mm: PositionMm,
     /// Speed of the reference, mm/s.
     pub velocity_mm_s: VelocityMmS,
@@ -184,15 +184,15 @@ impl TravelSetpoint {
     }
 }
 
-/// A foot that goes down does so fast to so far above the ground that is expected, then slowly.
+/// A foot goes down fast to this height above the expected ground, then slowly.
 pub const APPROACH_MM: PositionMm = PositionMm::from_int(10);
-/// A stance presses on by so much beyond where its foot has touched: it takes its share of the load
-/// (4 mm against the stiffness of the air, about 2.7 N/mm).
+/// A stance presses on by this much beyond where its foot has touched: it takes its share of the load (4 mm
+/// against the stiffness of the air, about 2.7 N/mm).
 pub const PRESS_MM: PositionMm = PositionMm::from_int(4);
-/// Cycles at full length, without ground, after which it is told and the nose goes down (200 ms).
+/// Cycles at full length, without ground, before it is reported and the nose goes down (200 ms).
 pub const NO_GROUND: u16 = 20;
 
-/// What a leg of a walk is about, as its vertical cylinder shows it.
+/// Task of a leg in a walk, as shown by its vertical cylinder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LegPlan {
     /// Foot on the ground.
@@ -202,20 +202,19 @@ pub enum LegPlan {
     Lift,
     /// Foot on its way to the foothold.
     Reach,
-    /// Foot goes down: fast to this stroke, [`APPROACH_MM`] above where ground is expected, then
-    /// slowly.
+    /// Foot goes down: fast to this stroke, [`APPROACH_MM`] above the expected ground, then slowly.
     Lower(
         /// mm.
         PositionMm,
     ),
 }
 
-/// What a walk is about.
+/// Plan of a walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WalkPlan {
     /// Left and right leg.
     pub legs: [LegPlan; WHEELS],
-    /// The robot is meant to get on.
+    /// The robot should make progress.
     pub driven: bool,
 }
 
@@ -238,14 +237,14 @@ pub enum Landing {
         /// mm.
         PositionMm,
     ),
-    /// The leg has been at its full length for so many cycles, and has found no ground.
+    /// The leg has been at its full length for this many cycles, and has found no ground.
     Nothing(
         /// Cycles.
         u16,
     ),
 }
 
-/// What the behaviours of layer 0 tell the walk.
+/// Reports of layer 0's behaviours to the walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Acts {
     /// Those that may act.
@@ -254,11 +253,11 @@ pub struct Acts {
     pub landing: [Landing; WHEELS],
     /// A standing foot has lost the ground and follows it.
     pub lost: [bool; WHEELS],
-    /// It has followed as far as it may: below is a foothold of its own.
+    /// It has followed as far as it may: the ground below is a separate foothold.
     pub deep: [bool; WHEELS],
-    /// What b6 of a standing leg stands beyond its reference, mm.
+    /// Distance of a standing leg's b6 beyond its reference, mm.
     pub beyond_mm: [PositionMm; WHEELS],
-    /// Axes that pull at their limit, do not move, and are held where they are.
+    /// Axes that pull at their limit, do not move, and are held in place.
     pub overload: [bool; JOINTS],
     /// How often a swinging foot has run against something (wraps): layer 1 may miss a cycle.
     pub bumps: [u8; WHEELS],
@@ -266,7 +265,7 @@ pub struct Acts {
     pub stuck: u8,
     /// Share of the walk's speed at which the wheels go, 0 to 1.
     pub pace: I16F16,
-    /// What the wheels are led back in a cycle, mm: they give way to a nose that they hold up.
+    /// Distance by which the wheels are led back in a cycle, mm: they give way to a nose that they hold up.
     pub back_mm: PositionMm,
 }
 
@@ -302,13 +301,12 @@ pub struct Setpoints {
     pub joints: [Option<JointSetpoint>; JOINTS],
     /// Reference of the wheels; `None` withdraws them.
     pub travel: Option<TravelSetpoint>,
-    /// What a walk is about; `None`: none is under way, and no behaviour acts.
+    /// Plan of the walk; `None`: none is under way, and no behaviour acts.
     pub walk: Option<WalkPlan>,
-    /// Speed and acceleration of the pushes to come, for wheel boards that make
-    /// their own profile; `None` leaves them as they are.
+    /// Speed and acceleration of future pushes, for wheel boards that make their own profile; `None` leaves
+    /// them unchanged.
     pub push: Option<PushProfile>,
-    /// How often the user has frozen all axes (wraps): each time ends what was commanded directly,
-    /// too.
+    /// How often the user has frozen all axes (wraps): each time also ends directly commanded motions.
     pub holds: u8,
     /// Number of the permission to move ([`Feedback::permit`]) for which they were computed; those of
     /// another count as none.
@@ -356,11 +354,11 @@ pub struct Feedback {
     pub travel_um: i64,
     /// Travel of the left and the right wheel since start-up, µm (positive forward).
     pub wheels_um: [i64; WHEELS],
-    /// What the behaviours of layer 0 do.
+    /// State of layer 0's behaviours.
     pub acts: Acts,
-    /// All nodes armed, alive and free of faults: motion may go on.
+    /// All nodes armed, alive and free of faults: motion may continue.
     pub motion_allowed: bool,
-    /// Number of the permission to move (wraps): a stop, a clear or an arming ends one, and with it
-    /// every motion, also of a layer 1 that has seen nothing of it.
+    /// Number of the permission to move (wraps): a stop, a clear or an arming ends one, and with it every
+    /// motion, also of a layer 1 that has not noticed it.
     pub permit: u16,
 }

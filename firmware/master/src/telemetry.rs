@@ -7,8 +7,7 @@ use crate::contact::FootSwitches;
 use crate::event::HoldReason;
 use crate::setpoint::{Acts, Phase, WHEELS, WalkPlan};
 
-/// What is counted, since start-up. Counters wrap, those of the protocol
-/// crate stop at their maximum.
+/// Counts since start-up. Counters wrap; those of the protocol crate stop at their maximum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Cycles in which each node did not answer.
@@ -64,9 +63,9 @@ pub struct Record {
     pub bearing_rad: [Option<f32>; WHEELS],
     /// Mean wheel travel since start-up, µm.
     pub travel_um: i64,
-    /// What a walk was about in this cycle, if one is under way.
+    /// Plan of the walk in this cycle, if one is under way.
     pub walk: Option<WalkPlan>,
-    /// What the behaviours do after it.
+    /// State of the behaviours after it.
     pub acts: Acts,
     /// Counters at the end of the cycle.
     pub counters: Counters,

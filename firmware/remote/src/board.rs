@@ -47,7 +47,7 @@ pub trait Board<'p>: Sized {
     /// Says why the board started, before its first tick.
     fn started_by(&mut self, cause: ResetCause);
 
-    /// Whether the parameters are to be stored.
+    /// Whether the parameters should be stored.
     fn save_is_due(&self) -> bool;
 
     /// Stores the parameters.
@@ -65,8 +65,7 @@ pub trait Board<'p>: Sized {
     /// Preset outputs, effective at the next tick edge.
     fn outputs(&self) -> Outputs;
 
-    /// Inputs as the application saw them last; those that it does not read
-    /// are zero.
+    /// Inputs as the application last read them; those that it does not read are zero.
     fn seen(&self) -> Inputs;
 
     /// Period of the tick timer, µs.

@@ -1,10 +1,9 @@
 //! Frames as a board reads and writes them.
 //!
-//! The format is that of `wheeleg-remote-link`, `COBS(index, postcard(message),
-//! CRC-32C) 0x00`. The simulator's side uses libraries for COBS and checksum.
-//! They hold index checks that can panic, and a second checksum table; an image
-//! may have neither. So the board's side undoes COBS as the bytes come and takes
-//! the bus protocol's checksum; tests hold the two sides together.
+//! The format is that of `wheeleg-remote-link`, `COBS(index, postcard(message), CRC-32C) 0x00`. The
+//! simulator's side uses libraries for COBS and checksum. They have index checks that can panic, and a second
+//! checksum table; an image may have neither. So the board's side decodes COBS byte by byte and uses the bus
+//! protocol's checksum; tests check that the two sides agree.
 
 use serde::{Serialize, de::DeserializeOwned};
 use wheeleg_protocol::frame::checksum;
@@ -14,7 +13,7 @@ use wheeleg_remote_link::frame::MAX_FRAME;
 /// Longest stretch without a zero in one COBS block.
 const BLOCK: u8 = 0xFF;
 
-/// A frame in the making, or as it came in, without COBS.
+/// A frame under construction, or as received, without COBS.
 type Buffer = [u8; MAX_FRAME];
 
 /// Writes the frame of `message` for the board with this index; `scratch` and
@@ -72,7 +71,7 @@ pub struct Deframer {
     length: usize,
     /// Bytes that the present COBS block still owes.
     owed: u8,
-    /// The present block stands for a zero behind it.
+    /// A zero follows the present block.
     zero: bool,
     started: bool,
     overlong: bool,
@@ -98,8 +97,8 @@ impl Deframer {
         }
     }
 
-    /// Takes one byte; gives the index of the board and the message when it
-    /// completes a frame. Empty frames are passed over.
+    /// Takes one byte; returns the index of the board and the message when it completes a frame. Empty frames
+    /// are skipped.
     pub fn push<T: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<(u8, T), FrameError>> {
         if byte == 0 {
             return self.finish();
@@ -218,7 +217,7 @@ mod tests {
 
     #[test]
     fn the_longest_reply_crosses_the_boundary_of_a_block_both_ways() {
-        // Blocks of exactly 254 bytes without a zero are where COBS goes wrong.
+        // Blocks of exactly 254 bytes without a zero are where COBS implementations fail.
         for fill in [0x00, 0x55] {
             let sent = Sent {
                 start_ns: u64::MAX,

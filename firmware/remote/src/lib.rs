@@ -1,9 +1,8 @@
 //! Board applications whose sensors and outputs travel in messages.
 //!
-//! The applications of `wheeleg-node` run here unchanged. What differs from a
-//! board is what stands behind their hardware traits: the inputs of a tick come
-//! with the request that starts it, and the outputs that the tick presets go
-//! back with the reply. Nothing here can reach a pin.
+//! The applications of `wheeleg-node` run here unchanged. The difference to a board is behind their hardware
+//! traits: the inputs of a tick come with the request that starts it, and the outputs that the tick presets
+//! go back with the reply. Nothing here can reach a pin.
 //!
 //! Two kinds of images are built on it: the ones for QEMU, where the messages go
 //! through a pair of pipes, and hardware-in-the-loop images, where they go over a

@@ -1,5 +1,4 @@
-//! What stands in for the peripherals: cells that the session writes before a
-//! tick and reads after it.
+//! Stand-ins for the peripherals: cells that the session writes before a tick and reads after it.
 
 use core::cell::Cell;
 use core::convert::Infallible;

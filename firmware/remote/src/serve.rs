@@ -9,14 +9,14 @@ use crate::session::{Session, Stopwatch};
 
 /// A stream of bytes to the simulator.
 pub trait Stream {
-    /// Waits for bytes and gives how many came; 0 when the simulator has gone.
+    /// Waits for bytes and returns their number; 0 when the simulator has gone.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
 
     /// Sends all bytes; false when the simulator has gone.
     fn write(&mut self, bytes: &[u8]) -> bool;
 }
 
-/// Answers requests until the simulator says goodbye or goes.
+/// Answers requests until the simulator says goodbye or goes away.
 pub fn serve<'p, B: Board<'p>>(
     session: &mut Session<'p, B>,
     stream: &mut impl Stream,

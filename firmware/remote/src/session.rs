@@ -26,7 +26,7 @@ pub trait Stopwatch {
     /// The work of a tick begins.
     fn tick_begins(&mut self);
 
-    /// The work of a tick has ended; gives its duration.
+    /// The work of a tick has ended; returns its duration.
     fn tick_ended(&mut self) -> Micros;
 
     /// The work on received bytes begins.
@@ -55,9 +55,9 @@ pub struct Session<'p, B: Board<'p>> {
     active: Outputs,
     /// The last tick edge that was worked off since the newest start.
     edge_ns: u64,
-    /// First tick edge after the newest start, at which the board's clock stands at 0.
+    /// First tick edge after the newest start, when the board's clock is 0.
     zero_ns: u64,
-    /// The counter stood here, in the simulator's edges, when it was started.
+    /// The counter's value, in the simulator's edges, when it was started.
     count_zero: i32,
     /// Encoder at the newest edge, with or without supply.
     count: i32,
@@ -66,8 +66,8 @@ pub struct Session<'p, B: Board<'p>> {
 }
 
 impl<'p, B: Board<'p>> Session<'p, B> {
-    /// A board without supply. `host` names what it runs on, `clock_hz` is the
-    /// clock of its processor, 0 if unknown.
+    /// A board without supply. `host` names its hardware, `clock_hz` is the clock of its processor, 0 if
+    /// unknown.
     pub fn new(pins: &'p B::Pins, host: &'static str, clock_hz: u32) -> Self {
         Self {
             pins,
@@ -95,7 +95,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
     /// Carries out a request.
     pub fn answer(&mut self, request: &Request, stopwatch: &mut impl Stopwatch) -> Reply {
         let result = match request {
-            // A new simulator, or the old one once more: the board starts afresh.
+            // A new simulator, or the old one again: the board starts afresh.
             Request::Hello { .. } => {
                 self.forget();
                 self.over = false;
@@ -205,7 +205,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         }
         if let Some(inputs) = &run.edge {
             let now = micros(run.until_ns);
-            // What the last tick preset takes effect, then the new tick runs.
+            // The outputs preset by the last tick take effect, then the new tick runs.
             self.active = board.outputs();
             self.edge_ns = run.until_ns;
             stopwatch.tick_begins();
@@ -275,7 +275,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
         Ok(Some(trip(self.zero_ns)))
     }
 
-    /// Adds what can be seen of the board.
+    /// Adds the observable state of the board.
     fn report(&self, ran: Ran) -> Ran {
         match &self.board {
             Some(board) => Ran {
@@ -304,7 +304,7 @@ impl<'p, B: Board<'p>> Session<'p, B> {
     }
 }
 
-/// What the session keeps of the parameters through a power cut of its board.
+/// Parameters that the session keeps through a power cut of its board.
 struct Memory<'m, 'p, B: Board<'p>>(&'m mut B::Parameters, PhantomData<&'p ()>);
 
 impl<'p, B: Board<'p>> ParameterStore for Memory<'_, 'p, B> {
@@ -318,8 +318,8 @@ impl<'p, B: Board<'p>> ParameterStore for Memory<'_, 'p, B> {
     }
 }
 
-/// The board's microsecond counter at an instant; it stood at 0 at `zero_ns`. Both are
-/// whole microseconds of the counter before they are compared, as on the host.
+/// The board's microsecond counter at an instant; it was 0 at `zero_ns`. Both are whole microseconds of the
+/// counter before they are compared, as on the host.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the counter has 32 bits and wraps"
@@ -329,8 +329,7 @@ fn micros_since(zero_ns: u64, ns: u64) -> Micros {
     Micros(micros(ns).wrapping_sub(micros(zero_ns)))
 }
 
-/// Instant at which the board's counter stands at `at`, seen from `now_ns`;
-/// what lies in the past starts now.
+/// Instant at which the board's counter reaches `at`, seen from `now_ns`; an instant in the past becomes now.
 fn start_ns(at: Micros, zero_ns: u64, now_ns: u64) -> u64 {
     let ahead = at.get().wrapping_sub(micros_since(zero_ns, now_ns).get());
     if ahead < 1 << 31 {

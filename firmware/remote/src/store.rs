@@ -1,11 +1,9 @@
 //! Commissioned parameters on their way into a board without flash memory.
 //!
-//! The simulator sends the parameter store as it stands in the flash of a real
-//! board (`firmware/node/src/store`): 64-bit words, little-endian. Word 0
-//! holds a magic number (16 bits), the number of records (16 bits) and a
-//! sequence number; then follow the records: parameter number (16 bits), zero
-//! (16 bits), raw value (32 bits). Checksum and second page are passed over:
-//! the link has a checksum of its own.
+//! The simulator sends the parameter store as it is in the flash of a real board (`firmware/node/src/store`):
+//! 64-bit words, little-endian. Word 0 holds a magic number (16 bits), the number of records (16 bits) and a
+//! sequence number; then follow the records: parameter number (16 bits), zero (16 bits), raw value (32 bits).
+//! Checksum and second page are passed over: the link has a checksum of its own.
 
 /// Low 16 bits of word 0.
 const MAGIC: u16 = 0x5757;

@@ -9,10 +9,9 @@ pub type WireDuty = FixedI16<U14>;
 
 /// Signed duty: I2F30, limited to −1…1, step 9.3e-10.
 ///
-/// The fraction of the PWM period for which the driving valves are to be
-/// open. Positive extends the cylinder (fill A, vent B), negative retracts it
-/// (fill B, vent A), zero shuts all valves. Every constructor limits to ±1,
-/// so a `Duty` outside it cannot exist.
+/// The fraction of the PWM period for which the driving valves should be open. Positive extends the cylinder
+/// (fill A, vent B), negative retracts it (fill B, vent A), zero shuts all valves. Every constructor limits
+/// to ±1, so a `Duty` outside it cannot exist.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 pub struct Duty(FixedI32<U30>);

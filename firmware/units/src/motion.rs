@@ -125,8 +125,8 @@ macro_rules! motion_quantity {
 motion_quantity!(
     /// Position or position difference: millimetres in I16F16, ±32 768 mm, step 15.3 nm.
     ///
-    /// Strokes are 0 at the retracted end. A difference is an error when it is
-    /// `target − measured`, positive when the cylinder has to extend.
+    /// Strokes are 0 at the retracted end. A difference is an error when it is `target − measured`, positive
+    /// when the cylinder must extend.
     PositionMm,
     "millimetres",
     WirePosition,

@@ -2,9 +2,8 @@
 
 /// `value / 2^bits`, rounded to nearest, ties away from zero.
 ///
-/// Odd-symmetric: `f(-v) == -f(v)`. An arithmetic shift alone would round
-/// towards minus infinity and give a controller a bias of half a step.
-/// `bits` of 63 or more gives zero. Never panics.
+/// Odd-symmetric: `f(-v) == -f(v)`. A plain arithmetic shift would round towards minus infinity and give a
+/// controller a bias of half a step. `bits` of 63 or more gives zero. Never panics.
 #[must_use]
 #[inline]
 pub const fn shift_right_round(value: i64, bits: u32) -> i64 {

@@ -2,10 +2,9 @@
 
 /// Wheel position: 24-bit two's complement encoder counts that wrap around.
 ///
-/// As in the HCTL-1100: −8 388 608…8 388 607 quadrature counts. With an
-/// encoder of 500 lines before a reduction of 260:1 that is only ±16 wheel
-/// revolutions, with 100 lines ±80, so positions are compared by [`WheelCount::wrapping_difference`] alone, and there is no
-/// ordering on this type. Positive is forward.
+/// As in the HCTL-1100: −8 388 608…8 388 607 quadrature counts. With an encoder of 500 lines before a
+/// reduction of 260:1 that is only ±16 wheel revolutions, with 100 lines ±80, so positions are compared only
+/// by [`WheelCount::wrapping_difference`], and there is no ordering on this type. Positive is forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(transparent)]
 pub struct WheelCount(i32);

@@ -93,7 +93,7 @@ fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> 
         let how = advice(argument, json, args);
         match argument.kind.admits(value(argument, json, args)) {
             Some(true) => {}
-            // The parameter that is not known is told.
+            // The unknown parameter is reported instead.
             None if argument.kind == ArgumentKind::Raw && parameter(args).is_none() => {}
             Some(false) => wrong.push(format!("`{name}` is {json}; allowed: {range}{how}")),
             None if argument.kind == ArgumentKind::Raw => {
@@ -110,7 +110,7 @@ fn wrong_arguments(info: &CommandInfo, args: &Map<String, Json>) -> Vec<String> 
     wrong
 }
 
-/// How a value is written that was meant as a number, a word or a parameter of a board.
+/// How to write a value that was meant as a number, a word or a parameter of a board.
 fn advice(argument: &Argument, json: &Json, args: &Map<String, Json>) -> String {
     if argument.kind == ArgumentKind::Parameter {
         let table = parameters(args);
@@ -135,8 +135,8 @@ fn advice(argument: &Argument, json: &Json, args: &Map<String, Json>) -> String 
     }
 }
 
-/// What a number with a unit is in the unit of its argument; `None` where that is not known: a
-/// number in another unit would move the robot somewhere else.
+/// Converts a number with a unit to the unit of its argument; `None` if that is not known: a number in
+/// another unit would move the robot somewhere else.
 fn without_unit(kind: ArgumentKind, text: &str) -> Option<String> {
     let is_part = |c: char| c.is_ascii_digit() || "+-.".contains(c);
     let end = text.find(|c| !is_part(c)).unwrap_or(text.len());
@@ -153,8 +153,8 @@ fn without_unit(kind: ArgumentKind, text: &str) -> Option<String> {
     Some(pretty(value * factor))
 }
 
-/// The value of an argument; one of another kind where the JSON is of another kind, or where it is
-/// not known what it would be.
+/// The value of an argument; one of another kind if the JSON is of another kind, or if it cannot be
+/// interpreted.
 fn value(argument: &Argument, json: &Json, args: &Map<String, Json>) -> Value {
     let wrong = match argument.kind {
         ArgumentKind::Flag => Value::Whole(0),

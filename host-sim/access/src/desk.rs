@@ -1,17 +1,17 @@
-//! Who of the clients is in control, or has asked for it. The master knows one operator; which
-//! client that is, stands here. Who is in control may hand it over: then one other client alone may
-//! take it, for a short time.
+//! The client that is in control, or has asked for it. The master knows only one operator; this module knows
+//! which client that is. The holder may hand control over: then only one other client may take it, for a
+//! short time.
 //!
-//! A lease ends at the master, in its time, which stands while the simulation is paused. A holder who
-//! is gone, or whose control was revoked, is at its end here at once: it commands nothing, and keeps
-//! nothing from others but the lease, until the master has ended it.
+//! A lease ends at the master, in its time, which stops while the simulation is paused. A holder that is
+//! gone, or whose control was revoked, ends here at once: it can command nothing, and keeps nothing from
+//! others but the lease, until the master has ended it.
 
 use std::time::{Duration, Instant};
 
 /// Number of a client.
 pub type ClientId = u64;
 
-/// Who holds the control, or has asked for it.
+/// The client that holds control, or has asked for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holder {
     /// Which client.
@@ -60,7 +60,7 @@ pub enum Denied {
 /// Time for which the control is reserved for one client; then it is free.
 pub const RESERVED: Duration = Duration::from_secs(2);
 
-/// Who asks.
+/// The asking client.
 #[derive(Debug, Clone, Copy)]
 pub struct Asker<'a> {
     /// Which client.
@@ -73,7 +73,7 @@ pub struct Asker<'a> {
     pub is_local: bool,
 }
 
-/// For whom the control is reserved.
+/// The clients for which control is reserved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Heir {
     /// For the client to which it was handed over.
@@ -85,7 +85,7 @@ pub enum Heir {
         /// Its session.
         session: String,
     },
-    /// For the clients on the robot's own computer, where it was revoked.
+    /// The clients on the robot's own computer, after a revocation.
     RobotsComputer {
         /// The one that was in control.
         except: ClientId,
@@ -124,11 +124,11 @@ impl Heir {
 struct Reserved {
     heir: Heir,
     lasts: Duration,
-    /// None while somebody's lease is not over.
+    /// None while a lease is not over.
     until: Option<Instant>,
 }
 
-/// The place of the one who drives.
+/// Register of the client that drives.
 #[derive(Debug, Default)]
 pub struct Desk {
     holder: Option<Holder>,
@@ -136,20 +136,20 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Who holds the control, or has asked for it.
+    /// The client that holds control, or has asked for it.
     #[must_use]
     pub fn holder(&self) -> Option<&Holder> {
         self.holder.as_ref()
     }
 
-    /// Name of the client that has the control, or of whoever it is reserved for.
+    /// Name of the client that has control, or of the one it is reserved for.
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         let holder = self.holder.as_ref().map(|holder| &*holder.name);
         holder.or_else(|| Some(self.reserved.as_ref()?.heir.name()))
     }
 
-    /// For whom the control is reserved: for them alone it is free.
+    /// The clients for which control is reserved: only they may take it.
     #[must_use]
     pub fn heir(&self) -> Option<&Heir> {
         let reserved = self.reserved.as_ref().filter(|_| self.holder.is_none());
@@ -170,11 +170,11 @@ impl Desk {
         holder.is_none_or(|h| h.client == client || h.ended.is_some())
     }
 
-    /// A client wants to give a command, or to take the control: then it has asked for it.
+    /// A client wants to give a command, or to take control: then it has asked for it.
     ///
     /// # Errors
-    /// [`Denied`] if another holds it, if it is reserved for another, or if the client does not hold it,
-    /// or no longer.
+    /// [`Denied`] if another holds control, if it is reserved for another, or if the client does not hold it,
+    /// or no longer does.
     pub fn ask(&mut self, asker: Asker<'_>, takes: bool) -> Result<(), Denied> {
         let reserved = self.reserved.as_ref();
         let for_others = reserved.is_some_and(|reserved| !reserved.heir.is(&asker));
@@ -200,8 +200,8 @@ impl Desk {
         }
     }
 
-    /// The master has granted what a client asked for. True if the client is in control with that: it
-    /// was not revoked meanwhile.
+    /// The master has granted a client's request. True if this puts the client in control: it was not revoked
+    /// meanwhile.
     pub fn grant(&mut self, client: ClientId, time_us: u64) -> bool {
         let Some(holder) = self.holder.as_mut().filter(|h| h.client == client) else {
             return false;
@@ -212,7 +212,7 @@ impl Desk {
         holds
     }
 
-    /// What a client asked for was not granted.
+    /// A client's request was not granted.
     pub fn withdraw(&mut self, client: ClientId) {
         self.holder
             .take_if(|h| h.client == client && h.granted_us.is_none());
@@ -238,9 +238,9 @@ impl Desk {
         });
     }
 
-    /// Who holds the control, or has asked for it, does so no longer, and is returned. Its lease ends
-    /// without it; from then on the clients on the robot's own computer have so much time to take the
-    /// control. A command line ends with each of its commands, so it is not reserved for one of them.
+    /// Takes control away from its holder, or from the client that has asked for it, and returns that client.
+    /// Its lease then runs out; from that moment the clients on the robot's own computer have `lasts` to take
+    /// control. It is not reserved for one client: a command line ends with each of its commands.
     pub fn revoke(&mut self, lasts: Duration) -> Option<&Holder> {
         let holder = self.holder.as_mut()?;
         holder.ended = Some(Ended::Revoked);
@@ -254,7 +254,7 @@ impl Desk {
         Some(&*holder)
     }
 
-    /// It is `now`: what was reserved for too long is free.
+    /// Updates the time: a reservation that has lasted too long ends.
     pub fn free(&mut self, now: Instant) {
         if let (Some(reserved), None) = (&mut self.reserved, &self.holder) {
             reserved.until.get_or_insert(now + reserved.lasts);
@@ -270,8 +270,8 @@ impl Desk {
         until.map_or(Duration::ZERO, |until| until.saturating_duration_since(now))
     }
 
-    /// A client is gone: nothing is reserved for it, and it commands nothing. Its lease ends with its
-    /// beats, at the master.
+    /// A client is gone: nothing is reserved for it, and it can command nothing. Without its beats the master
+    /// ends its lease.
     pub fn leave(&mut self, client: ClientId) {
         self.reserved.take_if(
             |reserved| matches!(reserved.heir, Heir::Client { client: heir, .. } if heir == client),
@@ -281,7 +281,7 @@ impl Desk {
         }
     }
 
-    /// The master knows best whether anybody is in control: how it is at `now_us`.
+    /// Takes the master's state at `now_us`: the master knows best whether anybody is in control.
     pub fn look(&mut self, now_us: u64, held: bool) {
         self.holder
             .take_if(|h| !held && h.granted_us.is_some_and(|us| now_us > us));
@@ -348,7 +348,7 @@ mod tests {
         for other in [1, 3] {
             assert_eq!(desk.ask(client(other), true), Err(Denied::Held));
         }
-        // It is nobody's yet, the heir's neither.
+        // Nobody has it yet, not even the heir.
         assert_eq!(desk.ask(client(2), false), Err(Denied::NotInControl));
         assert_eq!(desk.ask(client(2), true), Ok(()));
         // The master may refuse it; it stays reserved.
@@ -377,8 +377,8 @@ mod tests {
         assert_eq!(desk.ask(client(3), true), Ok(()));
     }
 
-    /// Its lease ends in the master's time, which may stand. Until then nobody takes the control, and
-    /// nobody is kept from the simulation.
+    /// Its lease ends in the master's time, which may stop. Until then nobody can take control, but everybody
+    /// can command the simulation.
     #[test]
     fn who_is_gone_keeps_the_lease_and_nothing_else() {
         let mut desk = Desk::default();
@@ -409,7 +409,7 @@ mod tests {
             assert_eq!(desk.ask(client(1), takes), Err(Denied::Revoked));
         }
         assert!(desk.may_command_host(2) && !desk.holds(1));
-        // However long the clock stands, the time begins with the end of the lease.
+        // However long the clock stands, the time begins when the lease ends.
         desk.free(now + 100 * lasts);
         assert_eq!(desk.ask(client(3), true), Err(Denied::Held));
         assert!(desk.heir().is_none(), "it is not free yet, for nobody");
@@ -420,13 +420,13 @@ mod tests {
         for remote in [1, 2] {
             assert_eq!(desk.ask(client(remote), true), Err(Denied::Held));
         }
-        // Whoever revoked may be gone: another client there takes it.
+        // The client that revoked control may be gone: another one there takes it.
         desk.leave(3);
         assert_eq!(desk.ask(client(4), true), Ok(()));
         desk.grant(4, 20);
         desk.release(4);
         assert_eq!(desk.ask(client(1), true), Ok(()), "reserved once");
-        // Nor does who was in control take it back, being there.
+        // Nor can the former holder take it back by being there.
         desk.release(1);
         assert_eq!(desk.ask(client(4), true), Ok(()));
         desk.grant(4, 25);
@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(desk.ask(client(3), true), Ok(()));
         desk.grant(3, 27);
         desk.release(3);
-        // Where nobody there takes it, it is free for everybody.
+        // If nobody there takes it, everybody may.
         assert_eq!(desk.ask(client(1), true), Ok(()));
         desk.grant(1, 30);
         desk.revoke(lasts);
@@ -447,7 +447,7 @@ mod tests {
         assert_eq!(desk.ask(client(2), true), Ok(()));
     }
 
-    /// The master grants it all the same; nobody beats for it, and it ends.
+    /// The master still grants it; nobody sends beats for it, and it ends.
     #[test]
     fn what_is_only_asked_for_is_revoked_as_well() {
         let mut desk = Desk::default();

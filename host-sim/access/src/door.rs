@@ -6,7 +6,7 @@ use crate::mac::Key;
 use crate::rate::Bucket;
 use crate::request::{Body, parse};
 
-/// Lets in the frames of one session.
+/// Checks and admits the frames of one session.
 #[derive(Debug, Clone)]
 pub struct Door {
     key: Key,
@@ -15,12 +15,12 @@ pub struct Door {
     bucket: Bucket,
 }
 
-/// A frame that was let in.
+/// An admitted frame.
 #[derive(Debug)]
 pub struct Entered {
     /// Its number.
     pub n: u64,
-    /// What it asks.
+    /// Its request.
     pub body: Body,
     /// Its client asks too often.
     pub limited: bool,
@@ -37,8 +37,8 @@ impl Door {
         }
     }
 
-    /// What a frame asks; `None`: it is not authentic, not the next, or malformed, and the session
-    /// is over.
+    /// The request of a frame; `None`: it is not authentic, not the next, or malformed, and the session is
+    /// over.
     pub fn open(&mut self, frame: &[u8], now: Instant) -> Option<Entered> {
         let json = self.key.open(frame)?;
         let frame = parse(json).ok()?;

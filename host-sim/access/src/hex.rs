@@ -12,7 +12,7 @@ pub fn encode(bytes: &[u8]) -> String {
     out
 }
 
-/// The `N` bytes that the digits mean; `None` if they are not exactly so many digits.
+/// The `N` bytes of the digits; `None` if their number is not exact.
 #[must_use]
 pub fn decode<const N: usize>(text: &str) -> Option<[u8; N]> {
     let text = text.as_bytes();

@@ -1,5 +1,4 @@
-//! Commands of the host: they act on the simulation or on who is in control, and do not move the
-//! robot.
+//! Commands of the host: they act on the simulation or on who is in control, and do not move the robot.
 
 /// An argument of a command of the host.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +20,7 @@ pub struct HostArgument {
 pub enum HostCode {
     /// Stops the clock.
     Pause = 0x0301,
-    /// Lets it go on.
+    /// Resumes it.
     Resume = 0x0302,
     /// Some bus cycles of a paused robot.
     Step = 0x0303,
@@ -50,7 +49,7 @@ pub struct HostInfo {
     pub name: &'static str,
     /// Arguments.
     pub arguments: &'static [HostArgument],
-    /// What it does.
+    /// Its effect.
     pub effect: &'static str,
 }
 
@@ -60,7 +59,7 @@ pub const STEP_MAX: u32 = 1_000;
 pub const HOLD_S: (u32, u32) = (2, 600);
 /// Slowest and fastest pace.
 pub const SPEED: (f64, f64) = (0.1, 10.0);
-/// Fastest pace at which somebody may be in control.
+/// Fastest pace at which a client may be in control.
 pub const SPEED_OF_CONTROL: f64 = 2.0;
 
 const FAULT: HostArgument = HostArgument {

@@ -1,6 +1,6 @@
-//! Who may command a live robot, and what a client can ask: keys, frames, and the register of the
-//! client in control. It opens no socket; the console serves it over the network, and the fault matrix
-//! drives it in simulated time. The contract with clients is `host-sim/console/PROTOCOL.md`.
+//! Permission to command a live robot, and the requests of clients: keys, frames, and the register of the
+//! client in control. It opens no socket; the console serves it over the network, and the fault matrix drives
+//! it in simulated time. `host-sim/console/PROTOCOL.md` is the contract with clients.
 //!
 //! # Glossary
 //!

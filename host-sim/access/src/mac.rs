@@ -22,7 +22,7 @@ impl fmt::Debug for Key {
 }
 
 impl Key {
-    /// A key of these bytes.
+    /// A key with these bytes.
     #[must_use]
     pub fn new(bytes: [u8; 32]) -> Self {
         Self(bytes)
@@ -34,7 +34,7 @@ impl Key {
         hex::encode(&self.0)
     }
 
-    /// Whether `bytes` are this key, in a time that does not tell where they differ.
+    /// Whether `bytes` are this key, in a time that does not reveal where they differ.
     pub fn is(&self, bytes: &[u8; 32]) -> bool {
         self.0.ct_eq(bytes).into()
     }
@@ -73,14 +73,14 @@ impl Key {
     }
 }
 
-/// What both sides of a handshake must have seen alike.
+/// Data of a handshake that both sides must agree on.
 #[derive(Debug, Clone, Copy)]
 pub struct Transcript<'a> {
     /// Nonce of the server.
     pub nonce_s: &'a [u8; 32],
     /// Nonce of the client.
     pub nonce_c: &'a [u8; 32],
-    /// Role that is asked for.
+    /// Requested role.
     pub role: &'a str,
     /// Name of the client.
     pub name: &'a str,

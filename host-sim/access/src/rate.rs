@@ -31,7 +31,7 @@ impl Bucket {
         self.take_for(0, now)
     }
 
-    /// Takes what a message of so many bytes costs, if there is so much: a token, and one for each KiB.
+    /// Takes what a message of `bytes` costs, if that many tokens are left: one, and one for each KiB.
     pub fn take_for(&mut self, bytes: usize, now: Instant) -> bool {
         let cost = 1.0 + bytes as f64 / BYTES;
         let passed = now.saturating_duration_since(self.filled).as_secs_f64();
@@ -66,7 +66,7 @@ mod tests {
         let mut bucket = Bucket::new(start);
         let taken = (0..1_000).filter(|_| bucket.take_for(31 * 1_024, start));
         assert_eq!(taken.count(), 6);
-        // What is left is enough for short ones.
+        // The rest is enough for short ones.
         let taken = (0..1_000).filter(|_| bucket.take(start));
         assert_eq!(taken.count(), 8);
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why a request is refused. Names stay the same; texts for people stand beside them.
+/// Why a request is refused. Names are stable; texts for people go with them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
     /// The sender does not hold the control.
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The table of the contract has all reasons of the server, and names none that it has not.
+    /// The table in the contract has all reasons of the server, and no others.
     #[test]
     fn the_contract_lists_the_reasons() {
         let contract = include_str!("../../console/PROTOCOL.md");

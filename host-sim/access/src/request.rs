@@ -1,5 +1,5 @@
-//! Frames of a client as typed requests. What is read here came over the network: every answer is
-//! a value, nothing panics, and nothing grows beyond the frame.
+//! Frames of a client as typed requests. They come over the network: every answer is a value, nothing panics,
+//! and nothing grows beyond the frame.
 
 use std::time::Duration;
 
@@ -27,11 +27,11 @@ const PARAMETER_VALID_MAX_MS: u64 = 5_000;
 pub struct Frame {
     /// Its number.
     pub n: u64,
-    /// What it asks.
+    /// Its request.
     pub body: Body,
 }
 
-/// What a frame asks.
+/// The request of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// The operator has seen the robot.
@@ -59,16 +59,16 @@ pub enum Body {
         order: Order,
         /// The same as its sender wrote it.
         spoken: Spoken,
-        /// Newest master time that was shown, µs.
+        /// Newest master time shown, µs.
         seen_us: u64,
         /// How long after it the command may begin, µs.
         valid_us: u64,
     },
-    /// Sound in form, and cannot be done.
+    /// Well-formed, but impossible.
     Refused(BadRequest),
 }
 
-/// A command as its sender wrote it: what a recording repeats.
+/// A command as its sender wrote it, for repetition from a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spoken {
@@ -79,25 +79,25 @@ pub struct Spoken {
 }
 
 impl Spoken {
-    /// The command that is meant.
+    /// The command.
     ///
     /// # Errors
-    /// [`BadRequest`] if there is none of this name with these arguments.
+    /// [`BadRequest`] if there is no command with this name and these arguments.
     pub fn order(&self) -> Result<Order, BadRequest> {
         order(&self.cmd, &self.args)
     }
 }
 
-/// What a command acts on.
+/// Target of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
     /// The robot, by its master.
     Robot(Command),
     /// The simulation, or who is in control.
     Host(HostCommand),
-    /// Who is in control, and is followed by the client of this session.
+    /// Control passes from the holder to the client of this session.
     HandOver(String),
-    /// Who is in control, and is to be no longer.
+    /// Control is taken away from the holder.
     Revoke {
         /// Time for which the control is then reserved for the robot's own computer.
         hold: Duration,
@@ -109,7 +109,7 @@ pub enum Order {
 pub enum HostCommand {
     /// Stops the clock.
     Pause,
-    /// Lets it go on.
+    /// Resumes it.
     Resume,
     /// Some bus cycles.
     Step(u32),
@@ -125,7 +125,7 @@ pub enum HostCommand {
     RecordStop,
 }
 
-/// Why a frame that is sound in form cannot be done.
+/// Why a well-formed frame is impossible.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BadRequest {
     /// Name that stays the same.
@@ -571,7 +571,7 @@ mod tests {
             let (_, text) = refused(cmd, args, 500);
             assert!(text.contains(advice), "{cmd} {args}: {text}");
         }
-        // What is in no unit of a length would be a wrong length.
+        // A value without a unit of length would be a wrong length.
         let (_, text) = refused("JointReference", r#"{"joint":1,"stroke":"4in"}"#, 500);
         assert!(
             text.contains("0 to 180 mm") && !text.contains("without a unit"),
@@ -583,7 +583,7 @@ mod tests {
         }
     }
 
-    /// Every argument that is wrong is told, with what was written and what is allowed.
+    /// Every wrong argument is reported, with its value and the allowed range.
     #[test]
     fn all_that_is_wrong_is_told_with_value_and_range() {
         for (cmd, args, parts) in [
@@ -721,7 +721,7 @@ mod tests {
                 Err(_) => refused += 1,
             }
         }
-        // Both happen often, or the frames are not what they are meant to be.
+        // Both happen often, or the test frames are not as intended.
         assert!(read > 1_000 && refused > 1_000, "{read} {refused}");
     }
 

@@ -22,7 +22,7 @@ use super::relations::{self, Advised, Moved, Tried};
 use super::suggest::closest;
 
 params! {
-    /// What moves with the rod.
+    /// Load that moves with the rod.
     MovingSection {
         /// Mass of rod, carriage and payload.
         mass: f64, "mass", Mass, MASS[0], MASS[1];
@@ -90,10 +90,10 @@ pub struct AxisConfig {
     pub source: builtin::Source,
 }
 
-/// Fields of a sound file that cannot be what somebody asks of them.
+/// Fields of a sound file that do not allow a requested use.
 #[derive(Debug, Clone)]
 pub struct Unfit {
-    /// Paths of the fields; the first is the one that is pointed at.
+    /// Paths of the fields; the message points at the first.
     pub fields: Vec<&'static str>,
     /// Why, with figures.
     pub why: String,
@@ -110,7 +110,7 @@ pub struct Change {
     pub values: Vec<f64>,
     /// Unit.
     pub unit: String,
-    /// Where the value is from.
+    /// Source of the value.
     pub source: String,
 }
 
@@ -141,8 +141,8 @@ impl AxisConfig {
         Self::load(&path.to_string_lossy())
     }
 
-    /// The text of an axis file with other values in it, each of which is checked as the file's
-    /// own are when the text is read again.
+    /// The text of an axis file with other values in it, which are checked like the file's own when the text
+    /// is read again.
     ///
     /// # Errors
     /// [`ConfigError`] if the file is wrong as it is, or has no such parameter.
@@ -183,8 +183,8 @@ impl AxisConfig {
         }
     }
 
-    /// The answer to one who asks more of the axis than it can: `what` cannot be done, and each
-    /// reason with file, line, fields and what is allowed.
+    /// The error for a request that the axis cannot meet: `what` cannot be done, and each reason with file,
+    /// line, fields and allowed values.
     #[must_use]
     pub fn unfit(&self, what: &str, reasons: &[Unfit]) -> ConfigError {
         let builtin::Source { file, text } = &self.source;
@@ -216,8 +216,8 @@ impl AxisConfig {
         Self::parse_as(&format!("the axis file {file} is not usable"), file, text)
     }
 
-    /// The same axis with other values, which are judged as the file's own are; `what` says what cannot
-    /// be done where one of them is wrong.
+    /// The same axis with other values, which are checked like the file's own; if one of them is wrong,
+    /// `what` says what cannot be done.
     ///
     /// # Errors
     /// [`ConfigError`] with every field that is out of its range or does not fit the others.
@@ -259,10 +259,10 @@ impl AxisConfig {
     }
 }
 
-/// Names at the top of an axis file besides those of [`pneumatics`].
+/// Names at the top of an axis file in addition to those of [`pneumatics`].
 const OWN: [&str; 5] = ["name", "description", "chamber", "moving", "start"];
 
-/// What an axis file is made of, as far as it could be read.
+/// Parts of an axis file, as far as they could be read.
 struct Parts {
     name: Option<String>,
     description: Option<String>,
@@ -291,7 +291,7 @@ fn facts(axis: Option<&AxisParams>) -> relations::Read<'_> {
     }
 }
 
-/// What the file would be refused for with other values in it.
+/// Tries the file with other values, and returns its errors.
 fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
     let mut r = Reader::with(file, text, values)?;
     let axis = Parts::read(&mut r).axis;
@@ -307,7 +307,7 @@ fn read(r: &mut Reader) -> Option<AxisParams> {
     let chamber = r.section::<ChamberSection>("chamber");
     let moving = r.section::<MovingSection>("moving");
     let start = r.section::<AxisStartSection>("start");
-    // On a bench the noise is stated as a bound: uniform within ± so many LSB.
+    // On a bench the noise is stated as a bound: uniform within ± that many LSB.
     let sensing = Sensing::read(r, |half_width_lsb| AdcNoise::Uniform { half_width_lsb });
 
     let (chamber, moving, start) = (chamber?, moving?, start?);

@@ -7,7 +7,7 @@ use super::reader::{Entry, Reader};
 
 macro_rules! measures {
     ($($(#[doc = $doc:literal])* $name:ident = $key:literal, $dimension:ident, $unit:literal;)*) => {
-        /// What is measured of the whole robot.
+        /// A quantity measured of the whole robot.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Measure {
             $($(#[doc = $doc])* $name,)*
@@ -29,7 +29,7 @@ macro_rules! measures {
                 match self { $(Self::$name => $unit,)* }
             }
 
-            /// What it is.
+            /// Its meaning.
             #[must_use]
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$name => concat!($($doc),*).trim_ascii(),)* }
@@ -93,10 +93,10 @@ impl Measure {
     }
 }
 
-/// A measure and the band in which it is to be, SI; one that is required has an end at least.
+/// A measure and its allowed band, SI; a required one has at least one end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
-    /// What is measured.
+    /// The measure.
     pub measure: Measure,
     /// Smallest allowed.
     pub min: Option<f64>,

@@ -1,10 +1,10 @@
-//! A value of a board's parameter: in the parameter's unit, and as the raw number of the bus.
+//! A value of a board's parameter: in the parameter's unit, and as the raw number on the bus.
 
 use wheeleg_protocol::param::{Format, ParamInfo};
 
 use super::reader::range;
 
-/// Most decimals that tell two raw numbers apart: the finest format counts in 2^-30.
+/// Decimals that distinguish any two raw numbers: the finest format counts in 2^-30.
 const DECIMALS: i32 = 10;
 
 /// The raw number nearest to a value in the parameter's unit. It saturates.
@@ -13,22 +13,22 @@ pub fn raw_of(info: &ParamInfo, value: f64) -> i32 {
     (value * scale(info.format)).round() as i32
 }
 
-/// The raw number of a value that the parameter may have: within its limits, and whole where its
-/// format counts whole numbers.
+/// The raw number of an allowed value: within the parameter's limits, and whole if its format counts whole
+/// numbers.
 #[must_use]
 pub fn allowed_raw(info: &ParamInfo, value: f64) -> Option<i32> {
     let whole = scale(info.format) != 1.0 || value.fract() == 0.0;
     raw_within(info, value).filter(|_| whole)
 }
 
-/// The raw number nearest to a value, where the limits admit it.
+/// The raw number nearest to a value, if the limits allow it.
 pub(super) fn raw_within(info: &ParamInfo, value: f64) -> Option<i32> {
     let raw = (value * scale(info.format)).round();
     let limits = f64::from(info.min)..=f64::from(info.max);
     limits.contains(&raw).then_some(raw as i32)
 }
 
-/// A raw number in the parameter's unit: the shortest decimal number that means it.
+/// A raw number in the parameter's unit: the shortest decimal number that gives it back.
 #[must_use]
 pub fn in_unit(info: &ParamInfo, raw: i32) -> f64 {
     let exact = f64::from(raw) / scale(info.format);
@@ -53,7 +53,7 @@ pub fn allowed_values(info: &ParamInfo) -> String {
     format!("{whole}{}", range(min, max, info.unit))
 }
 
-/// Raw numbers in a unit.
+/// Raw numbers per unit.
 pub(super) fn scale(format: Format) -> f64 {
     f64::from(format.fraction_bits()).exp2()
 }

@@ -91,11 +91,11 @@ pub fn robot(name_or_path: &str) -> Result<RobotConfig, ConfigError> {
     RobotConfig::parse(&file, &text)
 }
 
-/// The robot that a scenario names, which has this name or path itself. A relative path counts from the
-/// folder of the scenario's file, so that the two can be kept together.
+/// The robot named by a scenario, which itself has this name or path. A relative path counts from the folder
+/// of the scenario's file, so that the two can be kept together.
 ///
 /// # Errors
-/// As [`robot`]; one that is not there is told at its place in the scenario.
+/// As [`robot`]; a missing one is reported at its place in the scenario.
 pub fn robot_of(scenario: &Scenario, name_or_path: &str) -> Result<RobotConfig, ConfigError> {
     let named = named_by(&scenario.robot, name_or_path);
     robot(&named).map_err(|error| match find("robot", &named, ROBOTS) {
@@ -104,7 +104,7 @@ pub fn robot_of(scenario: &Scenario, name_or_path: &str) -> Result<RobotConfig, 
     })
 }
 
-/// Name or path of the robot that a scenario names.
+/// Name or path of the robot named by a scenario.
 pub(crate) fn named_by(robot: &str, scenario: &str) -> String {
     let built_in = |list: &[(&str, &str, &str)], name: &str| list.iter().any(|(n, ..)| *n == name);
     if built_in(ROBOTS, robot) || built_in(SCENARIOS, scenario) || !is_path(robot) {
@@ -126,8 +126,7 @@ pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
     Scenario::parse(&file, &text)
 }
 
-/// A built-in scenario on other ground: `seed` takes the place of the seed of each of its fields
-/// of rocks.
+/// A built-in scenario on other ground: `seed` replaces the seed of each of its fields of rocks.
 ///
 /// # Errors
 /// As [`scenario`].
@@ -137,7 +136,7 @@ pub fn scenario_on_ground(name: &str, seed: u64) -> Result<Scenario, ConfigError
     parse_built_in(&file, &text)
 }
 
-/// Where the data files of a scenario are, by its name or path and the name of its file.
+/// The data files of a scenario, by its name or path and the name of its file.
 pub(crate) fn files_of(name_or_path: &str, file: &str) -> Files<'static> {
     match SCENARIOS.iter().any(|(name, ..)| *name == name_or_path) {
         true => Files::BuiltIn(DATA),
@@ -158,7 +157,7 @@ fn with_ground_seed(text: &str, seed: u64) -> Option<String> {
         .and_then(Item::as_array_of_tables_mut);
     for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
         if let Some(value) = part.get_mut("seed") {
-            // TOML has no whole number above 2^63: such a seed stands in quotes.
+            // TOML has no whole number above 2^63: such a seed is quoted.
             *value = match i64::try_from(seed) {
                 Ok(number) => toml_edit::value(number),
                 Err(_) => toml_edit::value(seed.to_string()),
@@ -182,13 +181,12 @@ const LARGEST: u64 = 64 << 20;
 /// The text of a file, in UTF-8.
 ///
 /// # Errors
-/// What the operating system says, [`ErrorKind::FileTooLarge`] of a file that has more than
-/// 64 MiB: some, such as devices, have no end; or [`ErrorKind::InvalidData`] with the line that is
-/// not UTF-8.
+/// The operating system's error, [`ErrorKind::FileTooLarge`] for a file of more than 64 MiB: some, such as
+/// devices, have no end; or [`ErrorKind::InvalidData`] with the line that is not UTF-8.
 pub fn text_of(path: &Path) -> std::io::Result<String> {
     let file = std::fs::File::open(path)?;
     let mut bytes = Vec::new();
-    // One byte more tells a file that is too large.
+    // One byte more shows that a file is too large.
     let mut part = file.take(LARGEST + 1);
     let read = part.read_to_end(&mut bytes);
     if part.limit() == 0 {
@@ -203,10 +201,10 @@ pub fn text_of(path: &Path) -> std::io::Result<String> {
     })
 }
 
-/// Longest path that is quoted whole, bytes: no file system has a longer one.
+/// Longest path that is quoted in full, bytes: no file system has a longer one.
 const LONGEST_PATH: usize = 4096;
 
-/// A path for a message; one that no file can have is not told whole.
+/// A path for a message; one that is too long for any file is shortened.
 fn file(path: &str) -> Cow<'_, str> {
     match path.len() {
         0..=LONGEST_PATH => path.into(),
@@ -214,8 +212,8 @@ fn file(path: &str) -> Cow<'_, str> {
     }
 }
 
-/// Finds the text for a built-in name or a path. Whatever ends in `.toml` or
-/// holds a path separator is a path.
+/// Finds the text for a built-in name or a path. Any name that ends in `.toml` or holds a path separator is a
+/// path.
 pub(super) fn find(
     kind: &str,
     name_or_path: &str,

@@ -1,5 +1,5 @@
-//! User commands in scenario files, read by the master's table: names, units and ranges of
-//! their arguments stand there and nowhere else.
+//! User commands in scenario files, read by the master's table: names, units and ranges of their arguments
+//! are defined only there.
 
 use fixed::types::I16F16;
 use wheeleg_master::argument::{Argument, ArgumentKind, Limits, Value};
@@ -11,7 +11,7 @@ use super::params::FieldSpec;
 use super::quantity::Dimension;
 use super::reader::{Entry, Reader};
 
-/// Fields of an event that are no arguments of its command.
+/// Fields of an event that are not arguments of its command.
 const OF_THE_EVENT: [&str; 3] = ["at", "action", "command"];
 
 /// Reads the command of an event; `top` are the fields at the top of the file.
@@ -34,7 +34,7 @@ pub fn command(text: &str) -> Result<Command, ConfigError> {
     r.finish(what, command).map(|(command, _)| command)
 }
 
-/// Reads the arguments of a command that stand in `entry`.
+/// Reads the arguments of a command from `entry`.
 pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Option<Command> {
     let row = code.info();
     let missing = row
@@ -58,7 +58,7 @@ pub(super) fn arguments(r: &mut Reader, entry: &Entry, code: CommandCode) -> Opt
             )),
         );
     }
-    // All are read, so that all mistakes are told.
+    // Read all of them, so that every mistake is reported.
     let given: Vec<Option<Given>> = row
         .arguments
         .iter()
@@ -125,7 +125,7 @@ fn reject_others(r: &mut Reader, entry: &Entry, row: &CommandInfo, top: &[&str])
     }
 }
 
-/// How an argument is written, and what is allowed.
+/// How to write an argument, and its allowed range.
 fn example(argument: &Argument) -> String {
     let name = argument.name;
     let range = argument.range();
@@ -225,8 +225,7 @@ pub(super) const fn bounds(argument: &Argument) -> [f64; 2] {
     }
 }
 
-/// The decimal number that a fixed-point limit was written as: five decimals tell its steps
-/// of 1/65 536 apart.
+/// The decimal number behind a fixed-point limit: five decimals distinguish its steps of 1/65 536.
 const fn decimal(value: I16F16) -> f64 {
     let scaled = value.to_bits() as i64 * 100_000 + 32_768;
     scaled.div_euclid(65_536) as f64 / 1e5

@@ -1,4 +1,4 @@
-//! The boards that were commissioned, by address: `[commissioned]` of a robot file.
+//! The commissioned boards, by address: `[commissioned]` of a robot file.
 
 use wheeleg_master::config::UniqueId;
 
@@ -18,7 +18,7 @@ fn parse(text: &str) -> Option<UniqueId> {
     sound.then_some(id)
 }
 
-/// Reads `[commissioned]`. A board that is not listed may be any.
+/// Reads `[commissioned]`. A board that is not listed may be any board.
 pub(super) fn read(r: &mut Reader) -> [Option<UniqueId>; 8] {
     let mut ids = [None; 8];
     let Some(table) = r.optional_table("commissioned", &NODE_NAMES) else {

@@ -1,8 +1,8 @@
-//! Parameters of a joint board that follow from its axis file: each with the fields of the file
-//! from which it is computed.
+//! Parameters of a joint board that follow from its axis file, each with the fields from which it is
+//! computed.
 //!
-//! The limits are those of the protocol's table. A quantity that is one field of the file has them
-//! as the range of that field; one that is made of several is a relation between these.
+//! The limits are those of the protocol's table. If a quantity is a single field of the file, they are the
+//! range of that field; if it is computed from several, they are a relation between these.
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::flow::Iso6358;
@@ -10,7 +10,7 @@ use wheeleg_protocol::param::JointParam;
 
 use super::board_value::raw_within;
 
-/// Steps of the converter that a joint's band of rest has at least: below it, rest is noise.
+/// Smallest band of rest of a joint, in steps of the converter: below it, rest is noise.
 pub const STEPS_AT_REST: f64 = 2.5;
 
 /// One quantity.
@@ -37,7 +37,7 @@ impl Derived {
     }
 }
 
-/// The quantity of a parameter, in its unit; `None` if it is not of the axis.
+/// The quantity of a parameter, in its unit; `None` if it does not follow from the axis.
 #[must_use]
 pub fn derived(axis: &AxisParams, parameter: JointParam) -> Option<f64> {
     let row = DERIVED.iter().find(|row| row.parameter == parameter);
@@ -72,7 +72,7 @@ pub const DERIVED: &[Derived] = &[
         |a| (STEPS_AT_REST * lsb_m(a) * 1e3).max(LEAST_BAND_MM)),
 ];
 
-/// A band of rest is never smaller \[mm\]: that of the parameter.
+/// Smallest band of rest \[mm\]: that of the parameter.
 const LEAST_BAND_MM: f64 = limits(JointParam::RestBand)[0];
 
 const fn from_fields(
@@ -87,7 +87,7 @@ const fn from_fields(
     }
 }
 
-/// The longer time of fill and vent valve \[µs\]: a board knows one of both.
+/// The longer time of fill and vent valve \[µs\]: a board has one parameter for both.
 fn longer(axis: &AxisParams, time_s: fn(&wheeleg_plant::valve::ValveParams) -> f64) -> f64 {
     let c = &axis.cylinder;
     time_s(&c.fill_valve).max(time_s(&c.vent_valve)) * 1e6
@@ -107,7 +107,7 @@ fn lsb_m(axis: &AxisParams) -> f64 {
     axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits)
 }
 
-/// Limits of a board's parameter, in its unit, as its table says them: with at most three decimals.
+/// Limits of a board's parameter, in its unit, as in its table: with at most three decimals.
 #[must_use]
 pub const fn limits(parameter: JointParam) -> [f64; 2] {
     let row = parameter.info();
@@ -115,15 +115,15 @@ pub const fn limits(parameter: JointParam) -> [f64; 2] {
     [thousandths(row.min, bits), thousandths(row.max, bits)]
 }
 
-/// A raw number with so many fractional bits, to the nearest thousandth.
+/// A raw number with `bits` fractional bits, to the nearest thousandth.
 const fn thousandths(raw: i32, bits: u32) -> f64 {
     let half = if raw < 0 { -0.5 } else { 0.5 };
     let thousandths = raw as f64 / (1_u64 << bits) as f64 * 1000.0 + half;
     thousandths as i64 as f64 / 1000.0
 }
 
-/// The same in SI, of which so many units of the parameter make one: a division of these is exact
-/// to the last digit.
+/// The same in SI, where `per_si` units of the parameter make one: dividing by these is exact to the last
+/// digit.
 pub(crate) const fn limits_si(parameter: JointParam, per_si: f64) -> [f64; 2] {
     let [low, high] = limits(parameter);
     [low / per_si, high / per_si]
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use crate::board_value::scale;
 
-    /// Three decimals are all that the limits of these rows have.
+    /// Three decimals are enough for the limits of these rows.
     #[test]
     fn limits_are_those_of_the_table_to_the_raw_number() {
         for derived in DERIVED {

@@ -1,4 +1,4 @@
-//! The sizes by which the robot is drawn to scale, in reports and on the console's page.
+//! The robot's sizes for drawings to scale, in reports and on the console's page.
 
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// Those of a robot.
+    /// The sizes of a robot.
     #[must_use]
     pub fn of(robot: &RobotConfig) -> Self {
         let (plant, body) = (&robot.plant, &robot.plant.body);

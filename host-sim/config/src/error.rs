@@ -1,4 +1,4 @@
-//! What is wrong with a configuration file, and where.
+//! Errors in a configuration file, with their places.
 
 use std::fmt;
 use std::ops::Range;
@@ -10,17 +10,17 @@ use miette::{
 
 use crate::relations::Advised;
 
-/// Problems of a file that are printed; of more there is the number.
+/// Most problems of a file that are printed; the others are only counted.
 const SHOWN: usize = 20;
 /// Longest line of a file that is shown, bytes.
 const LONGEST_LINE: usize = 2000;
-/// Longest message, characters: values are quoted as they stand in the file.
+/// Longest message, characters: values are quoted as written in the file.
 const LONGEST_MESSAGE: usize = 1500;
 
-/// Width of an error that is no terminal's, columns.
+/// Width of an error outside a terminal, columns.
 const PLAIN_WIDTH: usize = 100;
 
-/// What the program prints of an error, without colours: for other programs' messages.
+/// The text of an error as the program prints it, without colours: for other programs' messages.
 #[must_use]
 pub fn plain_text(error: &dyn Diagnostic) -> String {
     let mut text = String::new();
@@ -32,10 +32,10 @@ pub fn plain_text(error: &dyn Diagnostic) -> String {
     }
 }
 
-/// Most digits of a number that are shown as they stand.
+/// Most digits of a number that are shown in full.
 const DIGITS: usize = 40;
 
-/// Whatever a file says, for a message: of a number with very many digits the first and their count.
+/// A file's text, for a message: a number with very many digits is cut to its first ones and their count.
 fn shown(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
@@ -58,7 +58,7 @@ fn shown(text: &str) -> String {
 /// Longest word of a command line that is quoted, characters.
 const LONGEST_WORD: usize = 80;
 
-/// A word of a command line, for a message: of one that is longer than any name the beginning.
+/// A word of a command line, for a message: one longer than any name is cut to its beginning.
 #[must_use]
 pub fn word(text: &str) -> std::borrow::Cow<'_, str> {
     match text.char_indices().nth(LONGEST_WORD) {
@@ -67,7 +67,7 @@ pub fn word(text: &str) -> std::borrow::Cow<'_, str> {
     }
 }
 
-/// A message without the middle that is too much.
+/// A message without its middle if it is too long.
 fn shortened(message: String) -> String {
     let message = shown(&message);
     let count = message.chars().count();
@@ -80,7 +80,7 @@ fn shortened(message: String) -> String {
     format!("{begin} … {end}")
 }
 
-/// Where the lines of a file begin.
+/// Positions at which the lines of a file begin.
 pub(crate) struct Lines(Vec<usize>);
 
 impl Lines {
@@ -95,7 +95,7 @@ impl Lines {
     }
 }
 
-/// One thing that is wrong at one place of a file.
+/// One error at one place of a file.
 #[derive(Debug, Clone)]
 pub struct Problem {
     source: Option<NamedSource<Arc<str>>>,
@@ -118,7 +118,7 @@ impl Problem {
         label: impl Into<String>,
         help: Option<String>,
     ) -> Self {
-        // Of a line that nobody wrote by hand the number is enough.
+        // For a line that nobody wrote by hand its number is enough.
         let begin = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
         let length = text[begin..].find('\n').unwrap_or(text.len() - begin);
         let shown = length <= LONGEST_LINE;
@@ -150,7 +150,7 @@ impl Problem {
         }
     }
 
-    /// One line: file, line, what is wrong.
+    /// One line: file, line, error.
     #[must_use]
     pub fn summary(&self) -> String {
         match self.line {
@@ -165,13 +165,13 @@ impl Problem {
         self.help.as_deref()
     }
 
-    /// Sets of values that the help names, each of which mends this without another contradiction.
+    /// Sets of values named in the help, each of which mends this without another contradiction.
     #[must_use]
     pub fn advice(&self) -> &[Vec<Advised>] {
         &self.advice
     }
 
-    /// Name of the relation that does not hold ([`RELATIONS`](crate::RELATIONS)), if it is one.
+    /// Name of the broken relation ([`RELATIONS`](crate::RELATIONS)), if it is one.
     #[must_use]
     pub fn relation(&self) -> Option<&'static str> {
         self.relation
@@ -190,7 +190,7 @@ impl Problem {
     }
 }
 
-/// What is wrong; where, say the [`ConfigError`] around it and the lines of the file below it.
+/// The error; the [`ConfigError`] around it and the lines of the file below it give its place.
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
@@ -217,8 +217,8 @@ impl Diagnostic for Problem {
     }
 }
 
-/// A robot or scenario file was rejected; holds every problem found in it, so
-/// that they can be mended in one go.
+/// A robot or scenario file was rejected; holds every problem found in it, so that they can be mended all at
+/// once.
 #[derive(Debug, Clone)]
 pub struct ConfigError {
     what: String,

@@ -8,7 +8,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 use super::command::bounds;
 use super::params::params;
 
-// Ranges of the gait are those of the master, SI.
+// The gait has the master's ranges, SI.
 const STEPS: [f64; 2] = bounds(&argument::STEPS);
 const PERIOD: [f64; 2] = bounds(&argument::PERIOD);
 const INSTANT: [f64; 2] = bounds(&argument::PUSH);

@@ -1,11 +1,11 @@
-//! Keys of scenario files: what the reader accepts, and what the reference says about it. One table.
+//! Keys of scenario files, in one table for the reader and for the reference.
 
 /// A key.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
-    /// As in the file.
+    /// As written in the file.
     pub key: &'static str,
-    /// What may be written.
+    /// Allowed values.
     pub value: &'static str,
     /// Meaning.
     pub what: &'static str,
@@ -15,7 +15,7 @@ const fn key(key: &'static str, value: &'static str, what: &'static str) -> Key 
     Key { key, value, what }
 }
 
-/// The names alone, for the reader.
+/// Only the names, for the reader.
 pub(crate) const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] {
     let mut names = [""; N];
     let mut i = 0;
@@ -26,7 +26,7 @@ pub(crate) const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] 
     names
 }
 
-/// Before the first section, and the names of the sections.
+/// Keys before the first section, and the names of the sections.
 pub const TOP: [Key; 12] = [
     key(
         "name",
@@ -130,7 +130,7 @@ pub const BEHAVIOURS: [Key; 1] = [key(
     "behaviours that may not act",
 )];
 
-/// `[[events]]`, beside the arguments of a command.
+/// `[[events]]`, without the arguments of a command.
 pub const EVENT: [Key; 3] = [
     key(
         "at",

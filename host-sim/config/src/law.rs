@@ -1,4 +1,4 @@
-//! Control laws of a joint by name, and another law for a robot than its file's.
+//! Control laws of a joint by name, and replacing the law of a robot's file.
 
 use std::fmt;
 use std::str::FromStr;
@@ -111,8 +111,8 @@ mod tests {
         assert!(paper.has_papers_law());
     }
 
-    /// The two robots are one machine: what differs is what their boards are told, who leads the
-    /// wheels, and how fast a foot comes down.
+    /// The two robots are one machine: they differ only in the settings of their boards, in who leads the
+    /// wheels, and in how fast a foot comes down.
     #[test]
     fn the_robots_differ_in_what_their_boards_are_told_alone() {
         const LED: [&str; 2] = ["gait.stream_wheels", "gait.touchdown_speed"];

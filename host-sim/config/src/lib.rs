@@ -7,12 +7,12 @@
 //! * **axis**: a file with every parameter of one cylinder on a test bench
 //! * **scenario**: a file that defines a run: robot, motion, terrain, events, faults, and the targets and
 //!   limits that judge it
-//! * **terrain**: the ground of a scenario, in parts; each has a kind and a material
-//! * **source**: where a value is from: PAPER, DATASHEET, DERIVED, ASSUMED, IDENTIFIED
-//! * **plan**: a file of a campaign: a scenario, and what differs from case to case
+//! * **terrain**: the ground of a scenario, in parts, each with a kind and a material
+//! * **source**: origin of a value: PAPER, DATASHEET, DERIVED, ASSUMED, IDENTIFIED
+//! * **plan**: a file of a campaign: a scenario, and the differences from case to case
 //! * **factor**: one of these differences: a list of values, or a distribution
-//! * **fingerprint**: hash of names, values and units of a robot; equal files of other layout
-//!   have the same
+//! * **fingerprint**: hash of names, values and units of a robot; files that differ only in layout have the
+//!   same
 
 pub mod axis;
 mod bars;

@@ -1,4 +1,4 @@
-//! Board parameters set by a robot file, by the names of the protocol's tables.
+//! Board parameters in a robot file, by the names of the protocol's tables.
 
 use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Node;
@@ -37,8 +37,8 @@ const JOINT_SECTIONS: [(&str, &[usize]); 4] = [
     ("vertical", &[2, 5]),
 ];
 
-/// Reads `[node.joint]`, `[node.yaw]`, `[node.horizontal]`, `[node.vertical]`
-/// and `[node.wheel]`. What is not set keeps the board's default.
+/// Reads `[node.joint]`, `[node.yaw]`, `[node.horizontal]`, `[node.vertical]` and `[node.wheel]`. Parameters
+/// that are not set keep the board's default.
 pub(super) fn read(r: &mut Reader) -> NodeParams {
     let mut params = NodeParams::default();
     let sections = ["joint", "yaw", "horizontal", "vertical", "wheel"];
@@ -64,11 +64,11 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
     params
 }
 
-/// What a board refuses though every value is within its own limits. Named is each parameter
-/// without which, left at its default, the board takes the rest.
+/// Values that a board refuses together though each is within its own limits. The error names each parameter
+/// that, left at its default, makes the board accept the others.
 fn contradictions(r: &mut Reader, params: &NodeParams) {
     let stored = params.joints.iter().chain(&params.wheels);
-    // One board is enough: what its section sets, others have as well.
+    // One board is enough: others get the same from its section.
     let mut refused =
         (Node::ALL.into_iter().zip(stored)).filter(|(to, stored)| !accepts(to.address(), stored));
     let Some((node, stored)) = refused.next() else {
@@ -104,9 +104,9 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
         let shown = |raw: i32| format!("{}{}", pretty(in_unit(info, raw)), suffix(info.unit));
         let side = if *raw > info.default { "up to" } else { "from" };
         let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
-        // Far from it no other value alone may be enough.
+        // Far from it no single other value may be enough.
         let just_refused = limit + (*raw - limit).signum();
-        // What is printed has fewer digits than a fine format: a thousandth inwards.
+        // The printed number has fewer digits than a fine format: go a thousandth inwards.
         let limit = match scale(info.format) == 1.0 {
             true => limit,
             false => limit + (info.default - limit) / 1000,
@@ -170,7 +170,7 @@ fn contradictions(r: &mut Reader, params: &NodeParams) {
     }
 }
 
-/// Of the values between one that is refused and one that is accepted the last that is accepted.
+/// Searches between a refused and an accepted value for the last accepted one.
 fn last_accepted(mut refused: i32, mut accepted: i32, is_accepted: impl Fn(i32) -> bool) -> i32 {
     while refused.abs_diff(accepted) > 1 {
         let middle = refused.midpoint(accepted);
@@ -182,14 +182,14 @@ fn last_accepted(mut refused: i32, mut accepted: i32, is_accepted: impl Fn(i32) 
     accepted
 }
 
-/// The board that an event names, if there is one of this number.
+/// The board named by an event, if there is one with this number.
 fn board(entry: &Entry) -> Option<u8> {
     let number = entry.get("board")?.1.as_integer()?;
     Node::new(u8::try_from(number).ok()?).map(Node::number)
 }
 
-/// Reads `parameter`, by its name in the table of the entry's `board`; nothing where there is
-/// no such board, which is a problem of its own.
+/// Reads `parameter`, by its name in the table of the entry's `board`; nothing if there is no such board,
+/// which is a problem of its own.
 pub(super) fn parameter(r: &mut Reader, entry: &Entry) -> Option<&'static ParamInfo> {
     let table = params_at(board(entry)?).iter();
     let names: Vec<(&str, &'static ParamInfo)> = table.map(|p| (p.name, p)).collect();
@@ -229,8 +229,7 @@ pub(super) fn value(r: &mut Reader, entry: &Entry) -> Option<i32> {
     raw
 }
 
-/// Lists what the file leaves at the board's default, so that a listing of the
-/// robot is complete.
+/// Lists parameters that the file leaves at the board's default, so that a listing of the robot is complete.
 fn list_defaults(r: &mut Reader, path: &str, table: &'static [ParamInfo]) {
     let entry = r.table(path);
     let unset = table

@@ -1,12 +1,12 @@
-//! Files that may be anybody's.
+//! Opens files from untrusted sources.
 
 use std::fs::{self, File};
 use std::path::Path;
 
-/// Opens a file to read it, and nothing else: a pipe may have no writer, a device no end.
+/// Opens a regular file to read it: a pipe may have no writer, a device no end.
 ///
 /// # Errors
-/// What the operating system says, or that it is not a file.
+/// The operating system's error, or that it is not a file.
 pub fn open_file(path: &Path) -> std::io::Result<File> {
     if fs::metadata(path)?.is_file() {
         return File::open(path);

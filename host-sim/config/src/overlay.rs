@@ -1,11 +1,11 @@
-//! Another value in the text of a file: the file's own reader checks it then.
+//! Writes another value into the text of a file, which the file's own reader then checks.
 
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 use crate::params::ParameterInfo;
 use crate::quantity::Dimension;
 
-/// One part of a path: a key, and a place in the list that stands there.
+/// Splits a path into keys, each with its index if the key holds a list.
 fn parts(path: &str) -> Vec<(&str, Option<usize>)> {
     path.split('.')
         .map(|part| match split_index(part) {
@@ -21,7 +21,7 @@ pub(crate) fn split_index(part: &str) -> Option<(&str, usize)> {
     Some((key, index.parse().ok()?))
 }
 
-/// The table that holds the last part of a path, made where there is none.
+/// The table that holds the last part of a path, created if missing.
 fn holder<'a>(document: &'a mut DocumentMut, path: &str) -> Option<&'a mut Item> {
     let mut item = document.as_item_mut();
     let parts = parts(path);
@@ -50,7 +50,7 @@ fn last(path: &str) -> &str {
     path.rsplit('.').next().unwrap_or(path)
 }
 
-/// Writes a quantity; false where the path leads nowhere.
+/// Writes a quantity; false if the path leads nowhere.
 pub(crate) fn set_quantity(
     document: &mut DocumentMut,
     info: &ParameterInfo,
@@ -76,7 +76,7 @@ pub(crate) fn set_quantity(
     set_stated(document, &info.path, value, unit, source)
 }
 
-/// Writes a value with its unit and source; false where the path leads nowhere.
+/// Writes a value with its unit and source; false if the path leads nowhere.
 pub(crate) fn set_stated(
     document: &mut DocumentMut,
     path: &str,
@@ -93,7 +93,7 @@ pub(crate) fn set_stated(
     set(document, path, Value::InlineTable(table))
 }
 
-/// Writes a plain value; false where the path leads nowhere.
+/// Writes a plain value; false if the path leads nowhere.
 pub(crate) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool {
     let Some(table) = holder(document, path).and_then(Item::as_table_like_mut) else {
         return false;
@@ -102,7 +102,7 @@ pub(crate) fn set(document: &mut DocumentMut, path: &str, value: Value) -> bool 
     true
 }
 
-/// The text that a file has at a path, if it has one.
+/// The text at a path of a file, if there is one.
 pub(crate) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str> {
     let mut item = document.as_item();
     for (key, index) in parts(path) {
@@ -114,9 +114,9 @@ pub(crate) fn text<'a>(document: &'a DocumentMut, path: &str) -> Option<&'a str>
     item.as_str()
 }
 
-/// Puts bars in place of those of a scenario.
+/// Replaces the bars of a scenario.
 pub(crate) fn set_bars(document: &mut DocumentMut, bars: &ArrayOfTables) {
-    // Tables remember where they stood, and among those of another file would come between.
+    // Tables remember their position, and would land among those of the other file.
     let mut bars = bars.clone();
     for table in bars.iter_mut() {
         table.set_position(None);

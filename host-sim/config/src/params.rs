@@ -6,7 +6,7 @@
 
 use super::quantity::Dimension;
 
-/// What one parameter may be.
+/// Allowed values of one parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct FieldSpec {
     /// Key in the TOML section.
@@ -114,9 +114,9 @@ pub struct ParameterInfo {
     pub min: f64,
     /// Largest allowed value in that unit.
     pub max: f64,
-    /// Where the value comes from.
+    /// Source of the value.
     pub source: String,
-    /// Physical dimension; `None` of a board's parameter, which has one unit.
+    /// Physical dimension; `None` for a board's parameter, which has one unit.
     pub dimension: Option<Dimension>,
     /// Whether only whole numbers are allowed.
     pub whole: bool,

@@ -22,7 +22,7 @@ use self::sections::{
 use super::reader::Reader;
 use super::relations::Moved;
 
-/// Names of the plant's sections besides those of one cylinder.
+/// Names of the plant's sections without those of one cylinder.
 pub(super) const SECTIONS: [&str; 9] = [
     "start",
     "motor",
@@ -35,7 +35,7 @@ pub(super) const SECTIONS: [&str; 9] = [
     "soft_ground",
 ];
 
-/// Force of soil that closes a switch of a robot that does not say, N.
+/// Default force of soil that closes a switch, N.
 const PLAIN_SWITCH_N: f64 = 0.25;
 
 /// The six bodies of a leg, in the order of the chain.
@@ -48,7 +48,7 @@ const LINKS: [&str; 6] = [
     "vertical_rod",
 ];
 
-/// Reads all sections of the plant; what only its drawing needs comes beside it.
+/// Reads all sections of the plant, and separately the sizes that only its drawing needs.
 pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
     let pneumatics = Pneumatics::read(r);
     if let Some(start) = r.table("start") {
@@ -106,7 +106,7 @@ pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
             track_m: spatial.track_m,
         },
         contacts,
-        // The ground is the scenario's.
+        // The scenario gives the ground.
         terrain: Terrain::default(),
         motors: [motor_params(&motor); 2],
         potentiometers: [sensing.potentiometer; 6],
@@ -116,7 +116,7 @@ pub(super) fn read(r: &mut Reader) -> Option<(PlantParams, SpatialParams)> {
     Some((plant, spatial))
 }
 
-/// The cylinder that moves the least, the vertical one, with its rod.
+/// The cylinder that moves the smallest mass, the vertical one, with its rod.
 pub(super) fn moved(plant: &PlantParams) -> Moved<'_> {
     Moved {
         cylinder: &plant.cylinders[2],

@@ -17,7 +17,7 @@ pub enum Dimension {
     Area,
     /// Volume.
     Volume,
-    /// Volume for each length of way.
+    /// Volume per travelled length.
     VolumePerLength,
     /// Time.
     Time,
@@ -70,8 +70,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Accepted units and the factor from each to SI; the first is the one
-    /// that help texts name first.
+    /// Accepted units and the factor from each to SI; help texts name the first one first.
     #[must_use]
     pub const fn units(self) -> &'static [(&'static str, f64)] {
         use std::f64::consts::PI;
@@ -132,7 +131,7 @@ impl Dimension {
     }
 }
 
-/// A unit behind a number, for messages; nothing where the number is a pure one.
+/// A unit behind a number, for messages; empty for a pure number.
 #[must_use]
 pub(crate) fn suffix(unit: &str) -> String {
     match unit {
@@ -141,12 +140,12 @@ pub(crate) fn suffix(unit: &str) -> String {
     }
 }
 
-/// A number to four digits, for messages about what was worked out.
+/// A number to four digits, for messages with computed values.
 pub fn brief(value: f64) -> String {
     pretty(format!("{value:.3e}").parse().unwrap_or(value))
 }
 
-/// A number for people: up to `digits` significant digits, no float noise.
+/// A number for people: up to `digits` significant digits, without float noise.
 #[must_use]
 pub fn pretty(value: f64) -> String {
     if value == 0.0 {

@@ -1,4 +1,4 @@
-//! The ground around the start as heights on a grid, for drawings that need no more.
+//! The ground around the start as heights on a grid, for simple drawings.
 
 use serde::Serialize;
 use wheeleg_plant::terrain::{Index, Surface as _, Terrain};
@@ -11,18 +11,18 @@ const EXTENT_M: [[f64; 2]; 2] = [[-1.5, 8.5], [-1.5, 1.5]];
 /// Heights on a grid.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Relief {
-    /// Where the grid begins: x, y \[mm\].
+    /// Start of the grid: x, y \[mm\].
     from_mm: [f64; 2],
     /// Distance between heights \[mm\].
     step_mm: f64,
     /// Heights in a row along x.
     columns: usize,
-    /// Heights \[mm\], row by row from the smallest y; `null` where there is no ground.
+    /// Heights \[mm\], row by row from the smallest y; `null` without ground.
     heights_mm: Vec<Option<i32>>,
 }
 
 impl Relief {
-    /// That of a terrain.
+    /// The relief of a terrain.
     #[must_use]
     pub fn of(terrain: &Terrain) -> Self {
         let [[x0, x1], [y0, y1]] = EXTENT_M;

@@ -1,4 +1,4 @@
-//! A robot: everything about the machine that a run needs, in SI units.
+//! A robot: all data of the machine that a run needs, in SI units.
 
 use wheeleg_master::config::UniqueId;
 use wheeleg_master::layer1::walk::WalkGeometry;
@@ -79,7 +79,7 @@ params! {
 /// A robot file, checked and converted to SI.
 #[derive(Debug, Clone)]
 pub struct RobotConfig {
-    /// Its file, as messages name it.
+    /// Its file, as named in messages.
     pub file: String,
     /// Name of the robot.
     pub name: String,
@@ -163,8 +163,8 @@ impl RobotConfig {
         self.plant.floating()
     }
 
-    /// Dimensions as the master is told them. It cannot be told strokes: its commands are limited to
-    /// those of the paper's leg.
+    /// Dimensions as the master is configured with them. It has no setting for strokes: its commands are
+    /// limited to those of the paper's leg.
     #[must_use]
     pub fn walk_geometry(&self) -> WalkGeometry {
         let single = |m: f64| m as f32;
@@ -198,7 +198,7 @@ impl RobotConfig {
     }
 }
 
-/// What a robot file is made of, as far as it could be read.
+/// Parts of a robot file, as far as they could be read.
 struct Parts {
     name: Option<String>,
     description: Option<String>,
@@ -254,7 +254,7 @@ fn facts(robot: Option<&PlantParams>) -> relations::Read<'_> {
     }
 }
 
-/// What the file would be refused for with other values in it.
+/// Tries the file with other values, and returns its errors.
 fn tried(file: &str, text: &str, values: &[Advised]) -> Option<Tried> {
     let mut r = Reader::with(file, text, values)?;
     let plant = Parts::read(&mut r).plant.map(|(plant, _)| plant);

@@ -1,4 +1,4 @@
-//! A scenario: which robot does what, for how long, and what happens to it.
+//! A scenario: a robot, its task, its duration, and events during it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub enum LegChoice {
     Right,
 }
 
-/// What the robot is told to do once it stands at its start pose.
+/// Commands for the robot once it stands at its start pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// Stand still.
@@ -54,7 +54,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// The leg that moves; the left one where it does not say.
+    /// The leg that moves; the left one by default.
     #[must_use]
     pub const fn stepping_leg(&self) -> LegChoice {
         match self {
@@ -64,7 +64,7 @@ impl Motion {
     }
 }
 
-/// What happens at a stated time.
+/// An event at a stated time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EventAction {
     /// The master stops sending, in mid-cycle, and never comes back.
@@ -77,7 +77,7 @@ pub enum EventAction {
     Command(Command),
 }
 
-/// Where something is from; two things that differ in it alone are equal.
+/// Origin of a value; two values that differ only in it are equal.
 #[derive(Debug, Clone, Default)]
 pub struct Origin<T>(pub T);
 
@@ -92,13 +92,13 @@ impl<T> PartialEq for Origin<T> {
 pub struct ScenarioEvent {
     /// When, in s of scenario time.
     pub at_s: f64,
-    /// What.
+    /// The action.
     pub action: EventAction,
-    /// Its place among the events of its file; `None`: it is from no file.
+    /// Its place among the events of its file; `None`: it does not come from a file.
     pub place: Origin<Option<usize>>,
 }
 
-/// Which of the paper's and the project's targets a run is held against.
+/// The set of the paper's and the project's targets that judges a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetSet {
     /// Figs. 12–16: A19–A23, A25–A27.
@@ -133,21 +133,21 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Seed of all noise; `--seed` replaces it.
     pub seed: u64,
-    /// What the robot does.
+    /// Motion of the robot.
     pub motion: Motion,
     /// Behaviours of a walk that may act.
     pub behaviours: Behaviours,
-    /// What happens to it, in order of time.
+    /// Events, in order of time.
     pub events: Vec<ScenarioEvent>,
-    /// What it stands on.
+    /// Ground below it.
     pub ground: Ground,
-    /// Faults that are injected; those of the command line are added.
+    /// Injected faults; those of the command line are added.
     pub faults: Vec<FaultSpec>,
-    /// What it is held against.
+    /// Targets that judge it.
     pub targets: TargetSet,
-    /// What its way over the ground is held against, beside the targets.
+    /// Bars that judge its travel over the ground, in addition to the targets.
     pub bars: Vec<Bar>,
-    /// The file that it was read from.
+    /// Its file.
     pub source: Origin<Arc<Source>>,
 }
 
@@ -169,12 +169,12 @@ pub const TARGETS: [(&str, TargetSet); 10] = [
 
 const LEGS: [(&str, LegChoice); 2] = [("left", LegChoice::Left), ("right", LegChoice::Right)];
 
-/// Longest run, s: 104 days. Beyond it a time in seconds no longer tells nanoseconds apart (its
-/// 53 bits end at 9.007e15 ns).
+/// Longest run, s: 104 days. Beyond it a time in seconds no longer distinguishes nanoseconds (its 53 bits end
+/// at 9.007e15 ns).
 pub(crate) const MAX_DURATION_S: f64 = 9.0e6;
 
 impl Scenario {
-    /// The files that it was read from: its own, and those that its ground is made of.
+    /// All its files: its own, and those of its ground.
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
         let own = Path::new(&self.source.0.file);
@@ -183,14 +183,14 @@ impl Scenario {
         std::iter::once(own.to_owned()).chain(beside).collect()
     }
 
-    /// A reader of its text, for a refusal of something in it, and the head of that.
+    /// A reader of its text, to refuse a part of it, and the head of that message.
     fn reader(&self) -> Result<(Reader, String), ConfigError> {
         let Source { file, text } = &*self.source.0;
         let what = format!("the scenario file {file} is not usable");
         Ok((Reader::parse(&what, file, text, false)?, what))
     }
 
-    /// A refusal of the section `[[terrain]]` of this number, from 0, with what would do.
+    /// A refusal of the section `[[terrain]]` of this number, from 0, with a remedy.
     #[must_use]
     pub fn refuse_ground(&self, section: usize, why: &str, allowed: &str) -> ConfigError {
         let (mut r, what) = match self.reader() {
@@ -208,8 +208,7 @@ impl Scenario {
         r.refusal(&what)
     }
 
-    /// A refusal of the fault of this number, from 0, with what would do; `None` if the file has no such
-    /// fault.
+    /// A refusal of the fault of this number, from 0, with a remedy; `None` if the file has no such fault.
     #[must_use]
     pub fn refuse_fault(&self, number: usize, why: &str, help: &str) -> Option<ConfigError> {
         let (mut r, what) = self.reader().ok()?;
@@ -221,7 +220,7 @@ impl Scenario {
         Some(r.refusal(&what))
     }
 
-    /// A refusal of the robot that it names, which is not there; `None` if the file names none.
+    /// A refusal of the named robot, which is missing; `None` if the file names none.
     pub(crate) fn refuse_robot(&self, missing: &ConfigError) -> Option<ConfigError> {
         let (mut r, what) = self.reader().ok()?;
         let top = r.table("")?;
@@ -338,7 +337,7 @@ fn read(r: &mut Reader, files: &Files<'_>, source: Origin<Arc<Source>>) -> Optio
     })
 }
 
-/// Those that are not switched off in the section `[behaviours]`.
+/// The behaviours that the section `[behaviours]` does not switch off.
 fn behaviours(r: &mut Reader) -> Behaviours {
     let keys = keys::names(&keys::BEHAVIOURS);
     let Some(entry) = r.optional_table("behaviours", &keys) else {
@@ -401,7 +400,7 @@ fn motion(r: &mut Reader) -> Option<Motion> {
         MotionKind::Sinusoid => {
             r.reject_misplaced(&entry, &keys::names(&keys::SINUSOID), &TOP);
             let leg = r.choice(&entry, "leg", &LEGS);
-            // The master's own ranges, under the names of this section.
+            // The master's own ranges, with the names of this section.
             let length = FieldSpec {
                 key: "length",
                 ..command::spec(&argument::FORWARD)
@@ -430,7 +429,7 @@ enum ActionKind {
 }
 
 fn event(r: &mut Reader, entry: &Entry, duration_s: Option<f64>) -> Option<(f64, EventAction)> {
-    // Its range is the scenario's, without the end itself: see below.
+    // Its range is the scenario's, without its end: see below.
     let at = FieldSpec::scalar(
         "at",
         Dimension::Time,

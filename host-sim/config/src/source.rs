@@ -5,6 +5,6 @@
 pub struct Source {
     /// Name of the file.
     pub file: String,
-    /// What stands in it.
+    /// Its contents.
     pub text: String,
 }

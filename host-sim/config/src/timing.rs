@@ -1,9 +1,8 @@
-//! Times of the boards that files and the simulation both need.
+//! Times of the boards that both files and the simulation need.
 
 /// Tick of a joint board, ns.
 pub const JOINT_TICK_NS: u64 = 1_000_000;
-/// After how long without a sign of life a board's watchdog starts it anew, ns.
+/// Time without a sign of life after which a board's watchdog restarts it, ns.
 pub const WATCHDOG_NS: u64 = 50_000_000;
-/// How long the service tool of the fault `invalid-parameter` takes at most, ns: seven requests
-/// of 20 ms.
+/// Longest time of the service tool in the fault `invalid-parameter`, ns: seven requests of 20 ms.
 pub const SERVICE_NS: u64 = 140_000_000;

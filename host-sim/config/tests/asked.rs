@@ -1,5 +1,5 @@
-//! What the motion and the commands of a scenario bring into a run is judged with the robot that carries
-//! them out, as if its file said so.
+//! The motion and the commands of a scenario are judged with the robot that carries them out, as if their
+//! values were in its file.
 
 mod common;
 #[path = "common/values.rs"]
@@ -11,7 +11,7 @@ use wheeleg_config::{Advised, ConfigError, Problem, RobotConfig, Scenario, built
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 
-/// Paths, values as they are written, and units.
+/// Paths, values as written, and units.
 type Changes<'a> = &'a [(&'a str, &'a str, &'a str)];
 
 fn robot(changes: Changes<'_>) -> RobotConfig {
@@ -74,7 +74,7 @@ fn assert_accepted(text: &str, robot: &RobotConfig) {
     }
 }
 
-/// One problem with these words; what it advises, put into the file, is accepted.
+/// One problem with these words; its advice, put into the file, is accepted.
 fn assert_refused(text: &str, robot: &RobotConfig, parts: &[&str]) -> Problem {
     let error = judged(text, robot).expect_err("must be refused");
     let said = report(&error);
@@ -125,12 +125,12 @@ fn a_gait_is_judged_with_the_cylinders_that_carry_it_out() {
         let problem = assert_refused(&text, &short, &[&told, &allowed]);
         assert_eq!(problem.relation(), Some(relation));
         assert_eq!(problem.advice().len(), 1, "of {key}");
-        // In the file's own unit, and just as much as there is.
+        // In the file's own unit, and exactly the available stroke.
         assert_accepted(&of(&[(key, "\"0.09 m\"")]), &short);
     }
 }
 
-/// With its mass as far to the rear as it stands with: a leg that is drawn back tips it over.
+/// With its mass as far to the rear as it can stand with: drawing back a leg tips it over.
 #[test]
 fn a_pose_in_which_the_robot_does_not_stand_is_refused() {
     let robot = robot(&[("body.chassis_com", "[-0.265, 0.02]", "m")]);
@@ -193,7 +193,7 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
         ],
     );
     assert_eq!(problem.relation(), Some("measured stroke"));
-    // What is written before the board is armed counts, not what stood there in between.
+    // The values when the board is armed count, not those in between.
     let back = write(3, "sensor_full_scale", "200.0");
     assert_accepted(
         &scenario(STAND, &(disarm.clone() + &full_scale(2) + &back)),
@@ -203,7 +203,7 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
     let late = write(4, "sensor_full_scale", "200.0");
     let all = disarm + &full_scale(2) + &arm + &late;
     assert!(judged(&scenario(STAND, &all), &robot).is_err());
-    // What no board takes is refused when it is read.
+    // A value that no board accepts is refused when it is read.
     let beyond = scenario(STAND, &write(1, "settle_band", "1000"));
     let error = Scenario::parse("my.toml", &beyond).expect_err("must be refused");
     assert_all(
@@ -215,7 +215,7 @@ fn a_parameter_that_an_event_writes_is_judged_with_the_sensor() {
     );
 }
 
-/// A board that stays as wrong as it was is told of once; one that is made wrong in another way, again.
+/// A board that stays as wrong as it was is reported once; one that is made wrong in another way, again.
 #[test]
 fn a_wrong_parameter_of_a_board_is_told_once_whatever_is_written_after_it() {
     let robot = robot(&[]);
@@ -294,7 +294,7 @@ fn references_and_paths_stay_within_the_cylinders() {
             "`motion.height` is allowed up to 90 mm",
         ],
     );
-    // The pose from which it starts is that of the gait in use.
+    // It starts in the pose of the gait in use.
     let paper = robot(&[]);
     assert_accepted(&foot("120 mm"), &paper);
     let lower = gait(&[("held_leg_s6", "\"180 mm\""), ("stroke", "\"100 mm\"")]);
@@ -342,7 +342,7 @@ fn a_walk_needs_the_strokes_that_it_is_planned_with() {
     );
 }
 
-/// The built-in scenarios ask nothing that their robots cannot do.
+/// The built-in scenarios ask for nothing that their robots cannot do.
 #[test]
 fn built_in_scenarios_fit_their_robots() {
     for (name, ..) in builtin::SCENARIOS {
@@ -354,7 +354,7 @@ fn built_in_scenarios_fit_their_robots() {
     }
 }
 
-/// A thousand wrong commands are told in a moment, each once.
+/// A thousand wrong commands are reported quickly, each once.
 #[test]
 fn a_thousand_wrong_commands_are_judged_in_a_moment() {
     let short = robot(SHORT);

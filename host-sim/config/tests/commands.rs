@@ -28,7 +28,7 @@ fn read(event: &str) -> Result<Command, ConfigError> {
     }
 }
 
-/// What is said of a wrong event: one problem, with these words.
+/// A wrong event gives one problem, with these words.
 fn assert_told(event: &str, parts: &[&str]) {
     let error = read(event).expect_err("must be rejected");
     let text = report(&error);
@@ -36,7 +36,7 @@ fn assert_told(event: &str, parts: &[&str]) {
     assert_all(&text, parts);
 }
 
-/// The gait of the paper and else the largest values: what a command takes.
+/// The paper's gait and otherwise the largest values: accepted arguments.
 fn usual(argument: &Argument) -> String {
     let instants = [
         ("period", "3.333333 s"),
@@ -80,7 +80,7 @@ fn event(row: &CommandInfo, but: Option<(&str, &str)>) -> String {
     format!("command = \"{}\"\n{}", row.name, lines.collect::<String>())
 }
 
-/// Both limits as a file writes them, and one step of the master beyond each.
+/// Both limits as written in a file, and one step of the master beyond each.
 fn edges(argument: &Argument) -> Option<[[String; 2]; 2]> {
     let kind = argument.kind;
     let step = 1.0 / 65_536.0;
@@ -93,7 +93,7 @@ fn edges(argument: &Argument) -> Option<[[String; 2]; 2]> {
         | ArgumentKind::Velocity(Limits { min, max })
         | ArgumentKind::Acceleration(Limits { min, max })
         | ArgumentKind::Rate(Limits { min, max }) => {
-            // As the documents write them.
+            // As written in the documents.
             let numbers = [min, max].map(|v| v.to_string().parse::<f64>().unwrap());
             let [low, high] = numbers;
             let text = |v: f64| format!("{{ value = {v:.9}, unit = \"{}\" }}", kind.unit());
@@ -116,8 +116,8 @@ fn edges(argument: &Argument) -> Option<[[String; 2]; 2]> {
     })
 }
 
-/// With the test of the same name for the layers in the master's suite: what a file may say is
-/// what the table says, and what the master takes.
+/// Together with the test of the same name for the layers in the master's suite: a file accepts exactly what
+/// the table says, and what the master accepts.
 #[test]
 fn every_argument_of_every_command_is_read_up_to_its_limits_and_no_step_beyond() {
     let mut arguments = 0;
@@ -260,7 +260,7 @@ fn gait_parameters_that_contradict_each_other_are_refused_on_reading() {
     );
 }
 
-/// As text, with any unit of its kind, as much as a table; a number alone has no unit.
+/// As text, with any unit of its kind, it is the same as a table; a number alone has no unit.
 #[test]
 fn quantities_may_be_written_as_text() {
     let stroke = |stroke: &str| {
@@ -324,7 +324,7 @@ fn quantities_may_be_written_as_text() {
     assert!(text.contains("or `stroke = \"… m\"`"), "{text}");
 }
 
-/// What the master refuses of a foot's path is refused of the motion as well.
+/// A foot's path that the master refuses is refused in the motion as well.
 #[test]
 fn a_sinusoid_beyond_the_stroke_is_refused_on_reading() {
     let sinusoid = |length: &str, height: &str, rate: &str| {
@@ -395,7 +395,7 @@ fn arguments_arrive_in_the_units_of_the_master() {
         raw: 1 << 23,
     };
     assert_eq!(read(write).ok(), Some(wanted));
-    // What the board would refuse is refused before the run.
+    // A value that the board would refuse is refused before the run.
     for (parameter, value, allowed) in [
         ("proportional", "2100000", "allowed 0 to 4 1/mm"),
         ("law", "9", "allowed whole numbers from 0 to "),
@@ -415,7 +415,7 @@ fn arguments_arrive_in_the_units_of_the_master() {
     }
 }
 
-/// What would do nothing, and numbers as other countries write them.
+/// Values without effect, and numbers in other countries' style.
 #[test]
 fn an_event_at_the_end_and_a_decimal_comma_are_refused() {
     let head =

@@ -1,4 +1,4 @@
-//! Robot and scenario files: what is wrong with them is said where it is wrong.
+//! Robot and scenario files: errors in them are reported at their place.
 
 mod common;
 
@@ -48,7 +48,7 @@ fn every_built_in_file_is_accepted() {
     }
 }
 
-/// The field robot is that of `wheeleg.toml` but for its wheels and feet.
+/// The field robot is that of `wheeleg.toml` except for its wheels and feet.
 #[test]
 fn the_field_robot_differs_in_wheels_and_feet_alone() {
     let values = |name: &str| -> std::collections::BTreeMap<String, (Vec<f64>, String)> {
@@ -117,7 +117,7 @@ fn every_parameter_is_listed_with_unit_source_and_range() {
         .iter()
         .filter(|p| !p.source.starts_with("default of the board"));
     assert_eq!(entries.count(), written.count());
-    // What the file leaves out is listed too: the boards' whole tables.
+    // Parameters missing in the file are listed too: the boards' whole tables.
     let listed = |section: &str| {
         let names = robot.parameters.iter().map(|p| p.path.as_str());
         names.filter(|path| path.starts_with(section)).count()
@@ -178,8 +178,8 @@ fn out_of_range() {
 #[test]
 fn limits_themselves_are_allowed() {
     const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
-    // With the thickest rod that the bore allows, and an end stop and dead volumes that hold
-    // so large a piston.
+    // With the thickest rod that the bore allows, and an end stop and dead volumes that suit such a large
+    // piston.
     for (bore, rod) in [("4.0", "3.6"), ("100.0", "90.0")] {
         let mut text = AXIS.to_owned();
         for (from, to) in [
@@ -268,8 +268,8 @@ fn board_parameters_become_raw_numbers_of_the_wire() {
     assert_eq!(gain(5), Some(1 << 22));
 }
 
-/// The boards' reply slots are built for one rate and one cycle; a robot file
-/// that says otherwise would be simulated wrongly, so it is refused.
+/// The boards' reply slots are built for one rate and one cycle; a robot file with other values would be
+/// simulated wrongly, so it is refused.
 #[test]
 fn bus_is_that_of_the_boards() {
     let text = robot_with(
@@ -327,7 +327,7 @@ fn unknown_missing_and_mistyped_fields() {
     );
 }
 
-/// The unit of a pure number is written in a file, and says nothing in a sentence.
+/// The unit of a pure number is written in a file, but means nothing in a sentence.
 #[test]
 fn a_pure_number_is_told_without_a_unit() {
     let ratio = "heat_capacity_ratio   = { value = 1.4, unit = \"1\"";
@@ -340,7 +340,7 @@ fn a_pure_number_is_told_without_a_unit() {
     assert_all(&text, &["[gas] lacks heat_capacity_ratio | "]);
 }
 
-/// The robot with this in the place of its `[source_switch]`, at the top of the file.
+/// The robot with this in place of its `[source_switch]`, at the top of the file.
 fn with_source_switch(instead: &str) -> String {
     let begin = ROBOT.find("[source_switch]\n").expect("present");
     let end = ROBOT.find("[regulator]\n").expect("present");
@@ -368,7 +368,7 @@ fn a_robot_has_a_contact_at_the_source_or_leaves_it_out() {
     let pa = |on: f64, off: f64| Some([on, off].map(f64::to_bits));
     assert_eq!(fitted(ROBOT), pa(821_325.0, 781_325.0));
     assert_eq!(fitted(&with_source_switch("")), None);
-    // Both limits themselves: a contact without hysteresis, at what the source has.
+    // Both limits themselves: a contact without hysteresis, at the source's pressure.
     let highest = contact("1101325.0", "1101325.0");
     assert_eq!(fitted(&highest), pa(1_101_325.0, 1_101_325.0));
 }
@@ -590,7 +590,7 @@ fn unknown_names_and_missing_files() {
     );
 }
 
-/// Names become folders and files, and stand in files that are written.
+/// Names become folders and files, and are written into files.
 #[test]
 fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
     const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
@@ -622,7 +622,7 @@ fn a_name_is_one_part_of_a_path_and_no_way_out_of_its_folder() {
     }
 }
 
-/// Of very many problems the first are printed, with how many there are.
+/// Of very many problems the first ones are printed, with their number.
 #[test]
 fn of_very_many_problems_the_first_twenty_are_shown() {
     let mut text = SCENARIO.to_owned();
@@ -645,7 +645,7 @@ fn of_very_many_problems_the_first_twenty_are_shown() {
     assert_eq!(shown, 20);
 }
 
-/// What a file quotes of itself may be long; what is said of it is not.
+/// A quoted text of a file may be long; the message about it is not.
 #[test]
 fn what_is_said_is_short_however_long_the_value_is() {
     let long = "q".repeat(100_000);
@@ -660,7 +660,7 @@ fn what_is_said_is_short_however_long_the_value_is() {
     }
 }
 
-/// Every seed that the command line takes; TOML has numbers for half of them.
+/// Every seed that the command line accepts; TOML has numbers for half of them.
 #[test]
 fn seeds_reach_as_far_as_those_of_the_command_line() {
     let seed = |seed: &str| {
@@ -692,7 +692,7 @@ fn seeds_reach_as_far_as_those_of_the_command_line() {
     }
 }
 
-/// A file that no person wrote makes no page of an error.
+/// A machine-made file does not make an error a page long.
 #[test]
 fn a_long_line_is_named_and_not_shown() {
     let long = "x".repeat(1_000_000);
@@ -705,7 +705,7 @@ fn a_long_line_is_named_and_not_shown() {
     assert!(shown.len() < 6000, "{} bytes", shown.len());
 }
 
-/// A path that leads to no file of this kind: a folder, a device without end, other bytes.
+/// A path that does not lead to such a file: a folder, a device without end, other bytes.
 #[cfg(target_os = "linux")]
 #[test]
 fn what_is_no_text_is_told() {
@@ -723,7 +723,7 @@ fn what_is_no_text_is_told() {
     }
 }
 
-/// What a seed is not, and a name that stands twice.
+/// Invalid seeds, and a name that is given twice.
 #[test]
 fn odd_seeds_and_doubled_names_are_told_with_what_would_do() {
     let told = |seed: &str| {

@@ -1,12 +1,12 @@
-//! Keys of scenario files: what the table names is read.
+//! Keys of scenario files: every key of the table is read.
 
 mod common;
 
 use common::{assert_all, report};
 use wheeleg_config::{Scenario, keys};
 
-/// A key that the table has and the reader does not would be accepted and do nothing. A date is wrong for every
-/// key: whatever is read refuses it by name.
+/// A key in the table that the reader does not read would be accepted and do nothing. A date is wrong for
+/// every key: a key that is read refuses it by name.
 #[test]
 fn every_key_of_the_table_is_read() {
     let head = "name = \"a\"\ndescription = \"a\"\nrobot = \"wheeleg\"\nduration = \"9 s\"\nseed = 1\ntargets = \"none\"\n";

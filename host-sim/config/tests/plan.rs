@@ -1,4 +1,4 @@
-//! Plans of campaigns: what is read of them, and what is told of wrong ones.
+//! Plans of campaigns: how they are read, and how errors in them are reported.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use wheeleg_config::plan::{Plan, Resolver, Sources, Text, Value};
 const HEAD: &str =
     "name = \"test\"\nroot = 1\nreplicates = 10\n[base]\nscenario = \"three-step\"\n";
 
-/// The built-in texts that a plan on `three-step` stands on.
+/// The built-in texts for a plan on `three-step`.
 fn sources(plan: &str) -> Sources {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.toml");
@@ -82,7 +82,7 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
     let doubled = ["friction.coulomb", "friction.static"].map(|path| vec![2.0 * of(path)[0]]);
     let mut spread = of("cylinder.timing_spread");
     spread[2] = 1.5;
-    // A parameter that the file leaves at its default moves in the listing; it is looked up.
+    // The place in the listing of a parameter that the file leaves at its default may change, so look it up.
     let found = |path: &str| {
         let listed = case.robot.parameters.iter().find(|p| p.path == path);
         listed.expect(path).value.clone()
@@ -113,7 +113,7 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
     assert!(case.scenario_json.get("seed").is_none());
 }
 
-/// A case has a seed, a robot and a name of its own: a factor that sets them would do nothing.
+/// A case has its own seed, robot and name: a factor that sets them would do nothing.
 #[test]
 fn what_a_case_does_not_take_from_its_scenario_is_no_factor() {
     for (field, grid, instead) in [
@@ -138,7 +138,7 @@ fn what_a_case_does_not_take_from_its_scenario_is_no_factor() {
     }
 }
 
-/// What a plan names and what there is not is told with its place in the plan, all at once.
+/// Every unknown name in a plan is reported with its place in the plan, all at once.
 #[test]
 fn names_of_nothing_are_told_where_the_plan_has_them() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -172,7 +172,7 @@ fn names_of_nothing_are_told_where_the_plan_has_them() {
     assert!(help.contains("did you mean `stand`?"), "{help}");
 }
 
-/// A component that a list has not got is told those that there are; what is proposed may be set.
+/// The error for a component beyond a list names the components; each of them may be set.
 #[test]
 fn a_component_beyond_a_list_is_told_the_components() {
     for (field, told, help) in [
@@ -206,7 +206,7 @@ fn a_component_beyond_a_list_is_told_the_components() {
     assert!(said[0].contains("has no such parameter"), "{said:?}");
 }
 
-/// A flag and a count are whole: 0.5 would have become `true`, unseen.
+/// A flag and a count are whole: 0.5 would silently have become `true`.
 #[test]
 fn fractions_are_refused_where_only_whole_numbers_are_allowed() {
     for (field, values) in [
@@ -253,7 +253,7 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
         assert!(bars[0].required && !bars[1].required);
         assert_eq!((bars[1].min, bars[1].max), (None, None));
     }
-    // Without any, each has its own.
+    // Without bars in the plan, each keeps its own.
     let plan = walks("").expect("usable");
     let resolver = Resolver::new(&plan).expect("usable");
     let own = resolver.resolve(&[Value::Text("walk".to_owned())]);
@@ -275,7 +275,7 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     }
 }
 
-/// Each with a word of the field, of the value and of what is allowed.
+/// Each with a word of the field, of the value and of the allowed values.
 #[test]
 fn what_is_wrong_is_told_with_field_value_and_range() {
     let on = |parameter: &str, values: &str| {
@@ -419,7 +419,7 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
         for word in told {
             assert!(all.contains(word), "{word} in\n{all}\nof\n{factors}");
         }
-        // Where it stands: the section begins in line 6.
+        // Its place: the section begins in line 6.
         let line = found.iter().filter_map(|p| p.strip_prefix("plan.toml:"));
         let line = line.filter_map(|p| p.split(':').next()?.parse::<usize>().ok());
         assert!(line.into_iter().all(|line| line >= 6), "{all}");
@@ -577,7 +577,7 @@ fn a_plan_needs_its_head() {
         let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
         assert!(all.iter().any(|p| p.contains(told)), "{told}: {all:?}");
     }
-    // What cannot be given is not proposed.
+    // A value that cannot be given is not proposed.
     let text = "name = \"x\"\nroot = 1\ncase = 0\n[base]\nscenario = \"stand\"\n";
     let error = Plan::of(sources(text)).expect_err(text);
     let shown = format!("{:?}", error.problems());
@@ -598,7 +598,7 @@ fn a_plan_needs_its_head() {
 
 const ON_A_MAP: &str = "name = \"test\"\nroot = 1\n[base]\nscenario = ";
 
-/// A plan holds the table of heights that its scenario stands on, beside the texts.
+/// A plan holds the table of heights of its scenario, in addition to the texts.
 #[test]
 fn a_plan_may_stand_on_a_height_map() {
     let built_in = Plan::of(sources(&format!("{ON_A_MAP}\"height-map\"\n"))).expect("usable");
@@ -610,7 +610,7 @@ fn a_plan_may_stand_on_a_height_map() {
     let own = wheeleg_config::builtin::scenario("height-map").expect("built in");
     assert_eq!(ground.fingerprint(), own.ground.fingerprint());
 
-    // A scenario of one's own: the map lies beside it, and is needed no more once the plan is read.
+    // A user's scenario: the map is beside it, and is no longer needed once the plan is read.
     let with_map = |rows: &str| {
         let folder = tempfile::tempdir().expect("a folder");
         fs::create_dir(folder.path().join("ground")).expect("created");
@@ -635,7 +635,7 @@ fn a_plan_may_stand_on_a_height_map() {
     let other = resolve(&Plan::of(other).expect("usable"));
     assert_ne!(level.scenario_json, other.scenario_json);
 
-    // A wrong one is told as in a run: with the scenario's file, line and field.
+    // A wrong one is reported as in a run: with the scenario's file, line and field.
     let wrong = with_map("0,x\n").and_then(Plan::of).expect_err("no number");
     let said = format!("{:?}", miette::Report::new(wrong));
     for part in ["mine.toml:", "`terrain[0].file`", "line 1, column 2"] {

@@ -1,5 +1,5 @@
-//! Ranges stand once: what a file may say of a board's parameter, what the board takes, what a
-//! listing shows and what a refusal says are the protocol's table.
+//! Ranges are defined once: file, board, listing and refusals all use the protocol's table for a board's
+//! parameter.
 
 mod common;
 
@@ -43,7 +43,7 @@ fn file_board_listing_and_refusals_have_the_same_range() {
             let (min, max) = (i64::from(info.min), i64::from(info.max));
 
             let shown = listed.iter().find(|p| p.path == name).expect("listed");
-            // The shortest numbers that mean the board's.
+            // The shortest numbers for the board's values.
             let limits = [info.min, info.max].map(|raw| in_unit(info, raw));
             assert_eq!([shown.min, shown.max], limits, "{name}");
 
@@ -85,8 +85,8 @@ fn file_board_listing_and_refusals_have_the_same_range() {
     assert!(edges > 100, "{edges}");
 }
 
-/// What a board refuses together is told with the others that have a part in it, and with the limit up to
-/// which the board takes it.
+/// Values that a board refuses together are reported together, with the limit up to which the board accepts
+/// them.
 #[test]
 fn what_contradicts_others_is_told_how_far_it_may_go() {
     let info = |name: &str| {
@@ -147,8 +147,8 @@ fn with(text: &str, parameter: &ParameterInfo, value: f64) -> Option<String> {
     Some(changed)
 }
 
-/// At the ends of its range a parameter is accepted, or contradicts others, which are named. What
-/// the plant has ranges for, too, never comes out as its own refusal.
+/// At the ends of its range a parameter is accepted, or contradicts others, which are named. A quantity for
+/// which the plant has ranges, too, is never refused by the plant itself.
 #[test]
 fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
     const FIELD: &str = include_str!("../../robots/wheeleg-field.toml");
@@ -177,7 +177,7 @@ fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
             }
         }
     };
-    // Those of the boards are above.
+    // Those of the boards are tested above.
     let yes_or_no = |p: &&ParameterInfo| p.dimension == Some(Dimension::Flag);
     for p in plant.filter(|p| !p.path.starts_with("node.") && !yes_or_no(p)) {
         ensure(FIELD, p, &|text| RobotConfig::parse("my.toml", text).err());
@@ -191,8 +191,8 @@ fn the_plant_takes_what_the_files_may_say_or_the_fields_are_named() {
     assert!(tried > 700, "{tried}");
 }
 
-/// What a board's parameters hold of its axis: a quantity that is one field of the file has the limits of the
-/// board's parameter, one that is made of several is a relation between these.
+/// Board parameters that follow from the axis: a quantity that is one field of the file has the limits of the
+/// board's parameter, one computed from several is a relation between these.
 #[test]
 fn a_file_says_what_a_board_can_hold() {
     let (_, file, text) = axis::AXES[0];
@@ -200,7 +200,7 @@ fn a_file_says_what_a_board_can_hold() {
     for derived in DERIVED {
         let row = derived.parameter.info();
         let [low, high] = limits(derived.parameter);
-        // Each of these may say as much as their board can hold, or less.
+        // Each of these may have the range that its board can hold, or a narrower one.
         let alone = |path: &&str| {
             let field = listed.iter().find(|p| p.path == *path).expect("listed");
             let unit = field

@@ -1,5 +1,5 @@
-//! Fields that contradict each other are answered like single fields: every entry of the table of
-//! relations is broken once by a file that is sound but for one value, and just holds for another.
+//! Fields that contradict each other are reported like single fields: for every entry of the table of
+//! relations, a file that is sound except for one value breaks it, and another value just satisfies it.
 
 mod common;
 #[path = "common/values.rs"]
@@ -20,7 +20,7 @@ const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 const WALKER: &str = include_str!("../../robots/wheeleg.toml");
 const AXIS: &str = include_str!("../../axes/bench-vq110u.toml");
 
-/// A path, its value as it is written, and its unit.
+/// A path, its value as written, and its unit.
 type Set = (&'static str, &'static str, &'static str);
 
 /// A value that breaks a relation, and one for which it holds.
@@ -29,12 +29,12 @@ struct Example {
     file: &'static str,
     /// Other values of the file.
     beside: &'static [Set],
-    /// The field, how its value is written, with `{}` for the number, and its unit.
+    /// The field, its value as written, with `{}` for the number, and its unit.
     field: Set,
     broken: f64,
     sound: f64,
-    /// Fields, or those of several that do together, that are advised at `broken`; none where what is
-    /// allowed is told in words.
+    /// Fields, or sets of fields that work together, that are advised at `broken`; none where the limit is
+    /// given in words.
     advised: &'static [&'static str],
 }
 
@@ -57,7 +57,7 @@ const fn example(
     }
 }
 
-/// Little air, and an end stop that is as hard as can be.
+/// Little air, and the hardest possible end stop.
 const TIGHT_A: &[Set] = &[
     ("line.volume", "0.0", "cm3"),
     ("end_stop.stiffness", "10000.0", "N/mm"),
@@ -103,7 +103,7 @@ const SHORT_STEP: &[Set] = &[
     ("line.volume", "0.0", "cm3"),
     ("numerics.step", "1.0", "us"),
 ];
-/// A push that takes no time to speak of in a long step.
+/// A push that takes almost no time in a long step.
 const QUICK_PUSH: &[Set] = &[
     ("gait.period", "30.0", "s"),
     ("gait.stroke", "1.0", "mm"),
@@ -255,8 +255,8 @@ fn line(text: &str, path: &str) -> Option<usize> {
         .map(|(at, _)| before + at)
 }
 
-/// The relation alone is told, with its place, every field with its value and line, and what is
-/// allowed.
+/// Only this relation is reported: with its place, every field with its value and line, and the allowed
+/// values.
 fn ensure_told(relation: &Relation, example: &Example, value: f64, error: &ConfigError) {
     let (name, text, said) = (relation.name, example.text(value), report(error));
     let broken: Vec<_> = error.problems().iter().map(Problem::relation).collect();
@@ -283,7 +283,7 @@ fn ensure_told(relation: &Relation, example: &Example, value: f64, error: &Confi
     assert!(said.len() < 1500, "{name}: {said}");
 }
 
-/// The fields are advised that can mend the example, and no others.
+/// The advised fields are those that can mend the example, and no others.
 fn ensure_advised(relation: &Relation, example: &Example, error: &ConfigError) {
     let paths = |set: &Vec<Advised>| {
         let each: Vec<&str> = set.iter().map(|advised| advised.path.as_str()).collect();
@@ -299,8 +299,8 @@ fn ensure_advised(relation: &Relation, example: &Example, error: &ConfigError) {
     );
 }
 
-/// Narrows the example down to where the relation begins to hold: all that is refused on the way is
-/// refused for it alone.
+/// Narrows the example down to where the relation begins to hold: every refusal on the way is only for this
+/// relation.
 fn ensure_held(relation: &Relation, example: &Example) {
     let name = relation.name;
     let (mut broken, mut sound) = (example.broken, example.sound);
@@ -311,7 +311,7 @@ fn ensure_held(relation: &Relation, example: &Example) {
     if let Err(error) = example.read(sound) {
         panic!("{name} at {sound}: {}", report(&error));
     }
-    // A timer counts whole clocks. Of values on both sides of 0 the sign is what matters.
+    // A timer counts whole clocks. For values on both sides of 0 the sign matters.
     let near = match example.field.2 {
         "16 clocks" => 1.0,
         _ => 1e-3,
@@ -350,7 +350,7 @@ fn every_relation_of_the_table_is_refused_where_it_is_broken_and_accepted_where_
     assert!(examples.is_empty(), "of no relation: {:?}", examples.keys());
 }
 
-/// A relation is seen beside a section that lacks something, and all that is broken is told at once.
+/// A relation is seen beside an incomplete section, and all broken ones are reported at once.
 #[test]
 fn relations_are_told_together_and_beside_missing_fields() {
     let text = with(ROBOT, "gait.period", "1.0", "s");
@@ -371,7 +371,7 @@ fn relations_are_told_together_and_beside_missing_fields() {
     assert_eq!(said.lines().count(), 3, "{said}");
 }
 
-/// What has no part in a relation of the gait hides it not, whether it lacks or cannot be read.
+/// A field outside a relation of the gait does not hide it, whether it is missing or unreadable.
 #[test]
 fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
     let slow = with(ROBOT, "gait.touchdown_speed", "10.0", "mm/s");
@@ -380,7 +380,7 @@ fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
         ("steps", "1e9", 3),
         ("held_leg_s5", "\"x\"", 3),
         ("touchdown_reflex", "7", 3),
-        // Each of these has a part in one of them.
+        // Each of these takes part in one of them.
         ("push_acceleration", "-1.0", 2),
         ("lower", "-1.0", 2),
         // And this in both.
@@ -392,8 +392,8 @@ fn relations_of_the_gait_are_told_beside_fields_that_cannot_be_read() {
     }
 }
 
-/// A body that moves has a size, and what a refusal says that it may have is accepted: another
-/// integrator refuses a body without inertia.
+/// A body that moves has a size, and the sizes proposed by a refusal are accepted: another integrator refuses
+/// a body without inertia.
 #[test]
 fn no_moving_body_is_without_inertia() {
     for (link, least) in [
@@ -431,8 +431,8 @@ fn no_moving_body_is_without_inertia() {
     assert_eq!(relations, [Some("size of a wheel")], "{}", report(&error));
 }
 
-/// A sensor that a board reads at the edge of its codes is refused, though noise alone takes it beyond, and
-/// what is proposed leaves room for the noise and for what is not straight.
+/// A sensor that a board reads at the edge of its codes is refused even if only noise takes it beyond, and
+/// the proposal leaves room for the noise and for the nonlinearity.
 #[test]
 fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
     let text = with(
@@ -449,7 +449,7 @@ fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
     };
     assert_eq!(problem.relation(), Some("codes of the sensor"));
     assert!(!problem.advice().is_empty(), "{}", report(&error));
-    // 190 mm are at most 64880 of 65536 codes, with 129 codes beside them.
+    // 190 mm are at most 64880 of 65536 codes, with a margin of 129 codes.
     let least = 190.0 / (64_880.0 / 65_536.0 - 0.05e-2 - 6.0 / 4096.0);
     for set in problem.advice() {
         let mut mended = text.clone();
@@ -466,7 +466,7 @@ fn a_sensor_that_is_proposed_is_within_the_codes_with_its_noise() {
     }
 }
 
-/// A step of 10 mm has no 15 mm to lower slowly: it is judged by what it has.
+/// A step of 10 mm has no 15 mm to lower slowly: it is judged by its own 10 mm.
 #[test]
 fn a_short_step_is_judged_by_its_own_way_down() {
     let text = with(ROBOT, "gait.stroke", "10.0", "mm");
@@ -489,8 +489,7 @@ fn a_short_step_is_judged_by_its_own_way_down() {
     assert_eq!(slow, 0);
 }
 
-/// Fields that relations and offers are about, each with the share of its sound value to which it
-/// goes, and back, in a random file.
+/// Fields that take part in relations.
 fn fields_of_relations(listed: &[ParameterInfo]) -> Vec<&ParameterInfo> {
     let related = |p: &&ParameterInfo| {
         let mut fields = RELATIONS.iter().flat_map(|relation| relation.fields);
@@ -505,7 +504,7 @@ fn random_file(rng: &mut Pcg64Mcg, text: &str, fields: &[&ParameterInfo]) -> Str
     for _ in 0..rng.random_range(1..=3) {
         let field = fields[rng.random_range(0..fields.len())];
         let sound = field.value[0];
-        // Most values are near the sound one: what is far away is out of range at once.
+        // Most values are near the sound one: a distant one is out of range at once.
         let value = match rng.random_range(0..3) {
             0 => field.min + (field.max - field.min) * rng.random::<f64>(),
             _ => sound * 10_f64.powf(rng.random_range(-1.5..1.5)),
@@ -520,7 +519,7 @@ fn random_file(rng: &mut Pcg64Mcg, text: &str, fields: &[&ParameterInfo]) -> Str
     changed
 }
 
-/// The limit for a field is what a help prints: the value, or up to a thousandth beside it.
+/// The limit for a field equals the printed value of the help, or is up to a thousandth beside it.
 fn ensure_printed(help: &str, path: &str, value: f64) {
     let quoted = format!("`{path}`");
     let mut texts = help.split(&quoted).skip(1);
@@ -533,7 +532,7 @@ fn ensure_printed(help: &str, path: &str, value: f64) {
     assert!(texts.any(printed), "{path} = {value}: {help}");
 }
 
-/// A crank that is too short or too long is told one that is accepted, in a few digits.
+/// For a crank that is too short or too long, an accepted value is proposed, in a few digits.
 #[test]
 fn a_crank_that_makes_no_leg_is_told_one_that_does() {
     for crank in [0.05, 0.6] {
@@ -557,8 +556,8 @@ fn a_crank_that_makes_no_leg_is_told_one_that_does() {
     }
 }
 
-/// What a refusal proposes is accepted, of every relation: with the values in the file the relation
-/// holds, and no other one is broken by them; where nothing else was wrong, the file is read.
+/// The advice of a refusal is accepted, for every relation: with its values in the file the relation holds,
+/// and no other one is broken by them; if nothing else was wrong, the file is accepted.
 fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), ConfigError>) -> usize {
     let Err(error) = read(text) else { return 0 };
     let mut tried = 0;
@@ -576,7 +575,7 @@ fn ensure_advice_is_accepted(text: &str, read: &dyn Fn(&str) -> Result<(), Confi
                 Err(error) => error.problems().to_vec(),
             };
             let alone = error.problems().len() == 1;
-            // The plant is asked where all relations hold: what it says of other fields was there before.
+            // The plant is checked once all relations hold: its errors about other fields were there before.
             let by_advice = |p: &&Problem| {
                 let said = p.to_string();
                 p.relation().is_some() || set.iter().any(|advised| said.contains(&advised.path))
@@ -621,7 +620,7 @@ fn what_a_refusal_proposes_is_accepted_by_every_relation() {
     assert!(tried > 200, "{tried}");
 }
 
-/// Light mass on hard bristles and a hard stop: a step for the bristles alone would be refused for the
+/// Light mass on hard bristles and a hard stop: a step that suits only the bristles would be refused for the
 /// stop.
 #[test]
 fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
@@ -644,7 +643,7 @@ fn the_step_that_is_proposed_for_friction_does_for_the_end_stop_too() {
     AxisConfig::parse("my.toml", &mended).expect("accepted with that step");
 }
 
-/// The field that each set of advised values begins with.
+/// The first field of each set of advised values.
 fn first_paths(problem: &Problem) -> Vec<&str> {
     let sets = problem.advice().iter();
     sets.map(|set| set[0].path.as_str()).collect()
@@ -665,7 +664,7 @@ fn advice_is_given_beside_an_independent_mistake_of_the_whole_robot() {
     assert_eq!(paths, ["gait.push", "gait.reach"], "{}", report(&error));
 }
 
-/// The slowest push that the range of its speed allows has a remedy: a faster one.
+/// The slowest push that its range of speed allows has a remedy: a faster one.
 #[test]
 fn a_push_that_is_far_too_slow_is_told_the_speed_that_does() {
     let text = with(ROBOT, "gait.push_speed", "0.001", "m/s");
@@ -677,7 +676,7 @@ fn a_push_that_is_far_too_slow_is_told_the_speed_that_does() {
     assert_eq!(paths, ["gait.push_speed"], "{}", report(&error));
 }
 
-/// Where very much is wrong, the file is not read again and again for advice.
+/// With very many errors, the file is not read again and again for advice.
 #[test]
 fn no_advice_is_looked_for_where_very_much_is_wrong() {
     let advised = |unknown: usize| {
@@ -700,7 +699,7 @@ fn no_advice_is_looked_for_where_very_much_is_wrong() {
     assert!(help.contains("correct the other errors first"), "{help}");
 }
 
-/// What the plant refuses for itself is told by its field, in the unit of the file.
+/// Errors that the plant finds itself are reported by field, in the unit of the file.
 #[test]
 fn what_the_plant_cannot_follow_is_told_in_the_unit_of_the_file() {
     let text = with(ROBOT, "contact.stiffness", "1000000.0", "N/mm");
@@ -718,8 +717,8 @@ fn what_the_plant_cannot_follow_is_told_in_the_unit_of_the_file() {
     assert!(said.trim_end().ends_with(" N/mm"), "{said}");
 }
 
-/// Each limit that is advised for a stroke that is too long is accepted as it stands, and so is the
-/// sensor that it is measured by.
+/// Each limit advised for a stroke that is too long is accepted unchanged, and so is the sensor that measures
+/// it.
 #[test]
 fn a_stroke_that_is_advised_is_accepted() {
     for stroke_mm in ["184.8", "185.0", "187.0", "188.0", "200.0"] {

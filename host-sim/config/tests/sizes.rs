@@ -1,4 +1,4 @@
-//! Large files: what is read and checked grows as the file does, not with its square.
+//! Large files: the time to read and check them grows linearly, not with its square.
 
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ fn events(count: usize) -> String {
         let at_s = i as f64 / count as f64;
         format!("[[events]]\nat = \"{at_s:.9} s\"\naction = \"clear-fault\"\n")
     };
-    // The last first: they are put in order.
+    // In reverse order, so that they must be sorted.
     HEAD.to_owned() + &(0..count).rev().map(event).collect::<String>()
 }
 
@@ -29,7 +29,7 @@ fn blocks(count: usize) -> String {
     HEAD.to_owned() + &(0..count).map(block).collect::<String>()
 }
 
-/// Seconds to read a text; what is read goes to `check`.
+/// Seconds to read a text; the result goes to `check`.
 fn seconds(text: &str, check: &dyn Fn(&Scenario)) -> f64 {
     let begun = Instant::now();
     let scenario = Scenario::parse("large.toml", text).expect("accepted");
@@ -52,14 +52,14 @@ fn a_hundred_thousand_events_and_blocks_are_read_in_time_that_grows_as_they_do()
         let small = seconds(&make(SMALL), &|s| assert_eq!(count(s), SMALL));
         let large = seconds(&make(LARGE), &|s| assert_eq!(count(s), LARGE));
         println!("{SMALL} in {small:.2} s, {LARGE} in {large:.2} s");
-        // 8 times as many: 64 times as long if each looked at all others.
+        // 8 times as many: 64 times as long if each were compared with all others.
         assert!(large < 24.0 * small, "{small:.2} s, then {large:.2} s");
     }
     let scenario = Scenario::parse("large.toml", &events(1000)).expect("accepted");
     assert!(scenario.events.is_sorted_by(|a, b| a.at_s <= b.at_s));
 }
 
-/// A plan with as many wrong factors as that: each is told once.
+/// A plan with that many wrong factors: each is reported once.
 #[test]
 fn two_thousand_factors_are_judged_in_a_moment() {
     const COUNT: usize = 2000;
@@ -73,12 +73,12 @@ fn two_thousand_factors_are_judged_in_a_moment() {
     let begun = Instant::now();
     let error = wheeleg_config::plan::Plan::load(&path.to_string_lossy()).expect_err("wrong");
     let seconds = begun.elapsed().as_secs_f64();
-    // That there is no such parameter, and of all but the first that another sets it.
+    // The parameter is unknown, and all but the first are set by another, too.
     assert_eq!(error.problems().len(), 2 * COUNT - 1);
     assert!(seconds < 20.0, "{seconds} s");
 }
 
-/// Each case of a campaign reads its robot anew.
+/// Each case of a campaign reads its robot again.
 #[test]
 fn a_robot_is_read_in_a_moment() {
     const ROBOT: &str = include_str!("../../robots/wheeleg.toml");

@@ -1,4 +1,4 @@
-//! The ground of a scenario: what is accepted, and what is said of the rest.
+//! The ground of a scenario: accepted files, and errors in the others.
 
 mod common;
 
@@ -38,7 +38,7 @@ fn without_a_section_and_below_loose_parts_the_floor_is_level_rock() {
     assert_eq!(ground.height_m(1.5, 0.6), Some(0.0));
 }
 
-/// What a length is written as makes no other ground, to the last bit.
+/// The wording of a length does not change the ground, to the last bit.
 #[test]
 fn the_same_lengths_in_other_units_are_the_same_ground() {
     let ground = |x: [f64; 2], height: f64, per_m: f64, unit: &str| {
@@ -370,8 +370,8 @@ fn soils_are_materials_with_a_name() {
     );
 }
 
-/// Every quantity of every kind of part has a unit: it may be written short, and a bare number is
-/// refused with the units that there are.
+/// Every quantity of every kind of part has a unit: the short form is accepted, and a bare number is refused
+/// with the accepted units.
 #[test]
 fn every_quantity_of_a_part_has_a_unit() {
     let map = "kind = \"heightmap\"\nfile = \"map.csv\"\n";
@@ -383,7 +383,7 @@ fn every_quantity_of_a_part_has_a_unit() {
     let sizes = "size = { value = [5.0, 9.0], unit = \"cm\" }\n";
     let heights = "height = { value = [0.0, 0.1], unit = \"m\" }\n";
     let stairs = "kind = \"stairs\"\ncount = 3\n";
-    // What stands in the part beside the field, the field, its value, its unit.
+    // The other fields of the part; then the field, its value, its unit.
     let scalars = [
         ("kind = \"plane\"\n", "slope", "5", "deg"),
         (
@@ -521,7 +521,7 @@ fn every_quantity_of_a_part_has_a_unit() {
     assert!(read(&format!("{rocks}{box_}{sizes}exposed = \"50 %\"\n")).is_ok());
 }
 
-/// A map whose heights are all the same is none.
+/// A map whose heights are all the same is refused.
 #[test]
 fn a_map_without_heights_is_refused() {
     let said = with_map(b"0,1\n1,0\n", "map.csv", "scale = \"0 m\"\n").map(drop);
@@ -535,7 +535,7 @@ fn a_map_without_heights_is_refused() {
     );
 }
 
-/// Very many parts that lie on each other would each be asked at every step.
+/// With very many parts on top of each other, each would have to be checked at every step.
 #[test]
 fn parts_on_one_place_are_bounded() {
     let ground = |count: usize, apart_m: f64, kind: &str| {
@@ -557,7 +557,7 @@ fn parts_on_one_place_are_bounded() {
             .map(drop)
             .map_err(|error| common::report(&error))
     };
-    // Beside each other, and in a heap that is still one; with the floor below they are 64.
+    // Side by side, and in a heap of the largest allowed size; with the floor below they are 64.
     assert_eq!(ground(500, 1.0, "block"), Ok(()));
     assert_eq!(ground(63, 0.0, "block"), Ok(()));
     assert_eq!(ground(64, 0.0, "plane"), Ok(()));

@@ -36,19 +36,19 @@ pub const SUBPROTOCOL: &str = "wheeleg.console.v1";
 const FOXGLOVE: &str = "/foxglove";
 /// Bytes that may wait in a socket's own buffer.
 const WRITE_BUFFER_MAX: usize = 128 * 1024;
-/// The same of a viewer, who is told schemas and the ground in one message each.
+/// The same for a viewer, which gets schemas and the ground in one message each.
 const VIEWER_BUFFER_MAX: usize = 16 << 20;
 
 const CSP: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-/// What the routes need.
+/// State of the routes.
 pub(crate) struct Server {
-    /// What a session needs.
+    /// State of the sessions.
     pub(crate) context: Arc<Context>,
     /// Names under which the server answers.
     pub(crate) hosts: Hosts,
-    /// Foreign pages that may look by Foxglove's protocol.
+    /// Foreign pages that may watch over Foxglove's protocol.
     pub(crate) viewer_pages: Vec<String>,
     /// Whether a viewer with the control key may write parameters.
     pub(crate) viewers_write: bool,
@@ -56,7 +56,7 @@ pub(crate) struct Server {
     pub(crate) page: Page,
 }
 
-/// The name under which a request asks.
+/// The host name of a request.
 #[derive(Clone)]
 struct Host(String);
 
@@ -153,19 +153,19 @@ fn json_text(text: impl Into<Body>) -> Response {
     ([(CONTENT_TYPE, "application/json")], text.into()).into_response()
 }
 
-/// Lets nobody in from a foreign page, and says to the browser what the page may do.
+/// Refuses foreign pages, and sends the browser the page's security policy.
 async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Next) -> Response {
     let pages = match request.uri().path() {
         FOXGLOVE => &server.viewer_pages[..],
         _ => &[],
     };
     let host = server.hosts.check(request.headers(), pages);
-    // Some clients write the name once more before the path.
+    // Some clients repeat the host name before the path.
     let named = request.uri().authority().map(Authority::as_str);
     let host = host.filter(|host| named.is_none_or(|named| named == *host));
     let host = host.map(str::to_owned);
-    // Many requests may have come in one piece: between two of them it is others' turn, the robot's
-    // stop before all.
+    // Many requests may have come in one piece: between two of them others run, first of all a stop of the
+    // robot.
     tokio::task::yield_now().await;
     let mut response = match host {
         Some(host) => {
@@ -186,7 +186,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     let is_refused = refused.contains(&response.status());
     let headers = response.headers_mut();
     if is_refused {
-        // Whoever has no key asks once on a connection.
+        // A client without a key gets one request per connection.
         headers.insert(CONNECTION, HeaderValue::from_static("close"));
     }
     let mut set = |name: HeaderName, value| headers.insert(name, HeaderValue::from_static(value));
@@ -196,7 +196,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     set(CACHE_CONTROL, "no-store");
     for name in [
         "cross-origin-resource-policy",
-        // A page that has opened ours has no hold on it.
+        // A page that has opened ours gets no handle on it.
         "cross-origin-opener-policy",
     ] {
         set(HeaderName::from_static(name), "same-origin");
@@ -204,7 +204,7 @@ async fn door(State(server): State<Arc<Server>>, mut request: Request, next: Nex
     response
 }
 
-/// Lets nobody ask without a key.
+/// Refuses requests without a key.
 async fn key(
     State(server): State<Arc<Server>>,
     Extension(peer): Extension<Peer>,
@@ -212,7 +212,7 @@ async fn key(
     next: Next,
 ) -> Response {
     if server.context.look_only {
-        // No secret, and without a key nobody can read one on its way.
+        // These are not secret, and a request without a key exposes none on its way.
         let lists = ["/robot", "/channels", "/commands", "/faults"];
         let path = request.uri().path();
         if request.method() == Method::GET && lists.iter().any(|list| path.ends_with(list)) {
@@ -234,7 +234,7 @@ async fn key(
     )
 }
 
-/// What is not served where others on the way could read a key.
+/// Refusal of a path that is not served where others on the way could read a key.
 fn plain() -> Response {
     problem(
         StatusCode::FORBIDDEN,
@@ -252,7 +252,7 @@ fn has_key(context: &Context, headers: &HeaderMap) -> bool {
     let Some(token) = token.and_then(hex::decode::<32>) else {
         return false;
     };
-    // Both are compared, whichever fits.
+    // Always compare both, whichever fits.
     context.keys.control.is(&token) | context.keys.view.is(&token)
 }
 
@@ -297,7 +297,7 @@ struct Token {
     token: String,
 }
 
-/// A viewer can send no header: its key stands in the address, which this server writes nowhere.
+/// A viewer can send no header: its key is in the address, which this server writes nowhere.
 async fn viewer(
     State(server): State<Arc<Server>>,
     Extension(peer): Extension<Peer>,

@@ -1,5 +1,5 @@
-//! What can be seen and given, as data: channels, commands of the master, commands of the host,
-//! faults, each with what a form or a plot needs to know.
+//! Lists for clients, as data: channels, commands of the master, commands of the host, faults, each with the
+//! facts that a form or a plot needs.
 
 use serde_json::{Value, json};
 use wheeleg_access::host::HOST_TABLE;
@@ -9,8 +9,8 @@ use wheeleg_master::command::{CommandCode, TABLE};
 use wheeleg_telemetry::channels;
 use wheeleg_telemetry::event::holds;
 
-/// What the arguments of a command usually are, for who leaves some of them out: forms begin with it. Few
-/// commands have such values: a slow walk straight ahead on level ground.
+/// Usual arguments of a command, for clients that leave some out: forms begin with them. Few commands have
+/// such values: a slow walk straight ahead on level ground.
 #[must_use]
 pub fn usual(command: &str) -> Vec<(String, Value)> {
     let arguments = match CommandCode::of_name(command) {
@@ -25,7 +25,7 @@ pub fn usual(command: &str) -> Vec<(String, Value)> {
     }
 }
 
-/// First 16 digits of the BLAKE3 of what a list says.
+/// First 16 digits of the BLAKE3 of a list's contents.
 fn hash(list: &Value) -> String {
     let digest = blake3::hash(list.to_string().as_bytes());
     digest.to_hex().as_str()[..16].to_owned()
@@ -42,7 +42,7 @@ pub(crate) struct Catalogue {
     pub(crate) channels_json: String,
     /// Answer of `/api/v1/commands`.
     pub(crate) commands_json: String,
-    /// The faults that can begin in a robot that runs.
+    /// The faults that can begin while a robot runs.
     pub(crate) faults_json: String,
     /// Why all axes may hold, in words.
     pub(crate) holds_json: String,
@@ -149,7 +149,7 @@ fn argument(argument: &Argument) -> Value {
         "unit": argument.kind.unit(),
         "description": argument.doc,
     });
-    // The shortest decimal number that means the limit.
+    // The shortest decimal number for the limit.
     let number = |text: String| text.parse::<f64>().map_or(Value::Null, Value::from);
     match argument.kind {
         ArgumentKind::Whole(Limits { min, max }) => {

@@ -1,4 +1,4 @@
-//! A client for programs: speaks the contract of PROTOCOL.md over a blocking socket.
+//! A client for programs: speaks the protocol of PROTOCOL.md over a blocking socket.
 
 mod timed;
 mod url;
@@ -23,13 +23,13 @@ use wheeleg_access::mac::Transcript;
 
 /// Largest answer over HTTP, bytes.
 const LARGEST_ANSWER: usize = 1 << 20;
-/// What is said of another server.
+/// Message about another server.
 const NO_CONSOLE: &str = "this is not a Wheeleg console";
-/// What can be done about a key that is none of the server's.
+/// Remedy for a key that does not belong to the server.
 pub const KEYS: &str = "give the server's control.key to drive, or its view.key to watch and stop, with --key; `wheeleg serve` prints their paths";
-/// How often the control is kept by a beat.
+/// How often a beat renews control.
 const BEAT: Duration = Duration::from_millis(50);
-/// How long a look for a message lasts.
+/// How long a check for a message lasts.
 const LOOK: Duration = Duration::from_millis(10);
 
 /// Asks a path of the HTTP API; status and JSON of the answer.
@@ -44,7 +44,7 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
         ));
     }
     let mut stream = url.stream()?;
-    // In this version an answer of unknown length comes in one piece.
+    // With HTTP/1.0, an answer of unknown length comes in one piece.
     let request = format!(
         "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\n\r\n",
         url.host,
@@ -71,7 +71,7 @@ fn whole(stream: &mut Stream) -> std::io::Result<Vec<u8>> {
         match stream.read(&mut part) {
             Ok(0) => break,
             Ok(n) => answer.extend_from_slice(&part[..n]),
-            // The end of the answer is known; some servers leave TLS without a word.
+            // The length of the answer is known; some servers close TLS without notice.
             Err(e) if e.kind() == ErrorKind::UnexpectedEof => break,
             Err(e) if e.kind() == ErrorKind::Interrupted => {}
             Err(e) => return Err(e),
@@ -80,7 +80,7 @@ fn whole(stream: &mut Stream) -> std::io::Result<Vec<u8>> {
     Ok(answer)
 }
 
-/// What came from the server.
+/// A message from the server.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Incoming {
     /// A message in JSON.
@@ -110,7 +110,7 @@ pub enum Outcome {
     Done,
     /// Refused.
     Refused {
-        /// Name that stays the same.
+        /// Stable name.
         reason: String,
         /// For a person.
         text: String,
@@ -127,7 +127,7 @@ pub struct Client {
     socket: WebSocket<Stream>,
     key: Key,
     n: u64,
-    /// Newest master time that has come, µs.
+    /// Newest master time received, µs.
     seen_us: u64,
     beat: Option<Instant>,
 }
@@ -198,13 +198,13 @@ impl Client {
         })
     }
 
-    /// Newest master time that has come, µs.
+    /// Newest master time received, µs.
     #[must_use]
     pub fn seen_us(&self) -> u64 {
         self.seen_us
     }
 
-    /// Sends a frame and gives its number; `frame` lacks that alone.
+    /// Sends a frame and returns its number, the only thing that `frame` lacks.
     ///
     /// # Errors
     /// [`ConsoleError::Link`] if the connection has ended.
@@ -214,14 +214,14 @@ impl Client {
         Ok(self.n)
     }
 
-    /// The next frame of this session, which counts as sent.
+    /// The next frame of this session, counted as sent.
     pub fn sealed(&mut self, mut frame: Value) -> Vec<u8> {
         self.n += 1;
         frame["n"] = json!(self.n);
         self.key.seal(frame.to_string().as_bytes())
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged.
     ///
     /// # Errors
     /// [`ConsoleError::Link`] if the connection has ended.
@@ -230,12 +230,12 @@ impl Client {
         sent.map_err(|e| failed(&self.url, e))
     }
 
-    /// Leaves a number out, as a client does that loses a frame.
+    /// Skips a number, like a client that loses a frame.
     pub fn skip(&mut self) {
         self.n += 1;
     }
 
-    /// Gives a command, about the robot as it came last, and gives the number of its frame.
+    /// Gives a command, based on the newest state of the robot, and returns the number of its frame.
     ///
     /// # Errors
     /// As [`Client::send`].
@@ -244,17 +244,17 @@ impl Client {
         self.send(json!({ "seen_us": seen_us, "valid_ms": valid_ms, "cmd": name, "args": args }))
     }
 
-    /// From now on [`Client::read`] sends beats, until it is told not to.
+    /// Makes [`Client::read`] send beats from now on, or stops it.
     pub fn keep_control(&mut self, keep: bool) {
         self.beat = keep.then(Instant::now);
     }
 
-    /// What comes within a short look, if anything does.
+    /// The next message within a short wait, if one comes.
     pub fn read(&mut self) -> Option<Incoming> {
         if self.beat.is_some_and(|due| Instant::now() >= due) {
             self.beat = Some(Instant::now() + BEAT);
             let seen_us = self.seen_us;
-            // Of a connection that has ended, the read below tells.
+            // If the connection has ended, the read below reports it.
             let _ = self.send(json!({ "op": "beat", "seen_us": seen_us }));
         }
         let lost = || Incoming::Closed {
@@ -291,7 +291,7 @@ impl Client {
             Err(tungstenite::Error::Io(e))
                 if matches!(
                     e.kind(),
-                    // A signal of this program ends a read, too, not the connection.
+                    // A signal to this program also ends a read, but not the connection.
                     ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
                 ) =>
             {
@@ -320,7 +320,7 @@ impl Client {
         self.outcome_until(n, None)
     }
 
-    /// Sends a frame that is answered at once, and waits for its end: unknown if it is not.
+    /// Sends a frame that is answered at once, and waits for its end; `Unknown` without an answer.
     ///
     /// # Errors
     /// As [`Client::send`].
@@ -338,7 +338,7 @@ impl Client {
         self.outcome_unless(n, &is_over).unwrap_or(Outcome::Unknown)
     }
 
-    /// As [`Client::outcome`]; `None` as soon as `stop` says so.
+    /// As [`Client::outcome`]; `None` as soon as `stop` asks for it.
     pub fn outcome_unless(&mut self, n: u64, stop: &dyn Fn() -> bool) -> Option<Outcome> {
         loop {
             if stop() {

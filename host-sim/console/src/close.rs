@@ -2,20 +2,20 @@
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes};
 
-/// Why a connection is closed, by the table of PROTOCOL.md.
+/// Why a connection is closed, as in the table of PROTOCOL.md.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Close {
     /// The key is wrong, or the answer to `hello` is malformed.
     WrongKey,
-    /// The key is wrong once more.
+    /// The key is wrong again.
     Wait,
-    /// The client wants to drive where others could read and change what it sends.
+    /// The client wants to drive over a line on which others could read and change its messages.
     LookOnly,
     /// The client has loaded other lists.
     OtherHash,
     /// A frame is not authentic, not the next, or malformed.
     BadFrame,
-    /// The client does not take what it is sent.
+    /// The client does not read its messages.
     TooSlow,
     /// The client does not answer `hello`.
     Timeout,
@@ -36,7 +36,7 @@ impl Close {
         }
     }
 
-    /// Name that stays the same.
+    /// Stable name.
     pub(crate) const fn reason(self) -> &'static str {
         match self {
             Self::WrongKey => "wrong_key",

@@ -1,4 +1,4 @@
-//! What keeps the console from starting or a client from its robot.
+//! Errors that keep the console from starting or a client from its robot.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 use wheeleg_config::ConfigError;
 use wheeleg_sim::SimError;
 
-/// Why there is no console.
+/// An error of the console.
 #[derive(Debug, Error, Diagnostic)]
 pub enum ConsoleError {
     /// A file of a key cannot be used.
@@ -22,7 +22,7 @@ pub enum ConsoleError {
         help: String,
     },
 
-    /// The address cannot be listened at.
+    /// The server cannot listen at the address.
     #[error("cannot listen at {address}: {what}")]
     #[diagnostic(code(wheeleg::listen), help("{help}"))]
     Listen {
@@ -46,7 +46,7 @@ pub enum ConsoleError {
         help: String,
     },
 
-    /// Something of the page or of this computer is not as it should be.
+    /// Something is wrong with the page or with this computer.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::console), help("{help}"))]
     Other {

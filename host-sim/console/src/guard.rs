@@ -1,4 +1,4 @@
-//! Who is let near: host and origin of a request, and what becomes of wrong keys.
+//! Admission of requests: their host and origin, and the answer to wrong keys.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -10,14 +10,14 @@ use axum::http::HeaderMap;
 use axum::http::header::{HOST, ORIGIN};
 use tokio::sync::watch;
 
-/// Wrong keys of an address within [`WINDOW`] after which more are answered late.
+/// Wrong keys of an address within [`WINDOW`] after which further ones are answered late.
 const WRONG_MAX: usize = 10;
-/// How long wrong keys are remembered, from the first on.
+/// How long wrong keys are remembered, from the first one on.
 const WINDOW: Duration = Duration::from_secs(60);
 /// Addresses that are remembered.
 const ADDRESSES: usize = 1_024;
 
-/// Where a connection comes from.
+/// Origin of a connection.
 #[derive(Clone, Copy)]
 pub(crate) struct Peer {
     /// The client's address.
@@ -31,19 +31,18 @@ pub(crate) struct Peer {
 pub(crate) struct Hosts {
     /// With their port.
     names: Vec<String>,
-    /// How an origin of ours begins.
+    /// Start of our origins.
     scheme: &'static str,
 }
 
 impl Hosts {
-    /// Those of an address, `localhost` if it is reached there, and `names` of the user's; `tls`: by
-    /// HTTPS.
+    /// Those of an address, `localhost` if it reaches that address, and the user's `names`; `tls`: by HTTPS.
     pub(crate) fn new(address: SocketAddr, names: &[String], tls: bool) -> Self {
         let port = address.port();
         let own = (!address.ip().is_unspecified()).then(|| address.to_string());
         let named = names.iter().map(|name| format!("{name}:{port}"));
         let mut names: Vec<String> = own.into_iter().chain(named).collect();
-        // Elsewhere somebody else may listen under that name, and hand on what they hear.
+        // Otherwise somebody else may listen under that name, and pass on what they hear.
         if address.ip().is_unspecified() || other_loopback(address.ip()).is_some() {
             names.push(format!("localhost:{port}"));
         }
@@ -53,7 +52,7 @@ impl Hosts {
             ("http://", 80)
         };
         if port == usual {
-            // Then nobody writes it.
+            // Browsers leave out a default port.
             let bare = names.iter().filter_map(|name| name.rsplit_once(':'));
             let bare: Vec<String> = bare.map(|(name, _)| name.to_owned()).collect();
             names.extend(bare);
@@ -61,8 +60,8 @@ impl Hosts {
         Self { names, scheme }
     }
 
-    /// The name under which a request asks, if it is one of ours and the page that asks, if any,
-    /// is ours too or among `pages`.
+    /// The host name of a request, if it is one of ours and the requesting page, if any, is ours too or among
+    /// `pages`.
     pub(crate) fn check<'a>(&self, headers: &'a HeaderMap, pages: &[String]) -> Option<&'a str> {
         let mut hosts = headers.get_all(HOST).iter();
         let (Some(host), None) = (hosts.next(), hosts.next()) else {
@@ -94,12 +93,12 @@ pub(crate) fn is_host(text: &str) -> bool {
             && text.split('.').all(is_label))
 }
 
-/// Whether a text is what stands between the dots of a name.
+/// Whether a text is a label, the part between the dots of a name.
 fn is_label(text: &str) -> bool {
     (1..=63).contains(&text.len()) && !text.starts_with('-') && !text.ends_with('-')
 }
 
-/// Whether a text is what a browser sends as the origin of a page: scheme, name and port, no more.
+/// Whether a text is a page's origin as a browser sends it: scheme, name and port, no more.
 pub(crate) fn is_origin(text: &str) -> bool {
     let name = ["http://", "https://"]
         .iter()
@@ -108,15 +107,15 @@ pub(crate) fn is_origin(text: &str) -> bool {
     name.is_some_and(|name| !name.is_empty() && name.chars().all(plain))
 }
 
-/// Whether a client is on this computer: it comes from an address that is this computer's own,
-/// which from elsewhere nobody has.
+/// Whether a client is on this computer: its address is one of this computer's own, which nobody elsewhere
+/// has.
 pub(crate) fn is_local(client: IpAddr, own: IpAddr) -> bool {
     let [client, own] = [client, own].map(|ip| ip.to_canonical());
     client.is_loopback() || client == own
 }
 
-/// The other address that `localhost` stands for on many computers. A server at one of them listens
-/// at the other too: else another user could, and clients would take theirs for ours.
+/// The other address of `localhost` on many computers. A server at one of them listens at the other too:
+/// otherwise another user could, and clients would take that server for ours.
 pub(crate) fn other_loopback(own: IpAddr) -> Option<IpAddr> {
     match own {
         IpAddr::V4(Ipv4Addr::LOCALHOST | Ipv4Addr::UNSPECIFIED) => Some(Ipv6Addr::LOCALHOST.into()),
@@ -130,8 +129,8 @@ const CONNECTIONS: usize = 128;
 /// Those of one address.
 const OF_ONE_ADDRESS: usize = 96;
 
-/// Places for connections. Whoever comes gets one: where all are taken, the address that has most gives
-/// its oldest, unless a key was proved on it. So nobody is kept out who wants to stop the robot.
+/// Places for connections. Every newcomer gets one: if all are taken, the address with the most loses its
+/// oldest, unless a key was proved on it. So nobody who wants to stop the robot is kept out.
 #[derive(Debug, Default)]
 pub(crate) struct Places(Mutex<Taken>);
 
@@ -147,7 +146,7 @@ struct Holder {
     address: IpAddr,
     /// It has proved a key, and keeps its place.
     stays: bool,
-    /// Gone: the place is another's.
+    /// Closed when another connection gets the place.
     _held: watch::Sender<()>,
 }
 
@@ -159,7 +158,7 @@ impl Taken {
         oldest.map(|(number, _)| *number)
     }
 
-    /// The address that has taken most places without a key; of several the one that came first.
+    /// The address that holds most places without a key; of several the first one.
     fn most(&self) -> Option<IpAddr> {
         let mut counts = BTreeMap::<IpAddr, (usize, Reverse<u64>)>::new();
         for (number, holder) in self.all.iter().filter(|(_, holder)| !holder.stays) {
@@ -186,7 +185,7 @@ impl Places {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A place; none if all are held by those who have proved a key.
+    /// A place; none if holders of a key have all of them.
     pub(crate) fn take(self: &Arc<Self>, address: IpAddr) -> Option<Place> {
         let mut taken = self.taken();
         let own = taken.all.values().filter(|h| h.address == address).count();
@@ -219,14 +218,14 @@ impl Places {
 }
 
 impl Place {
-    /// A key was proved on it: nobody else gets the place. False: it is another's already.
+    /// Keeps the place, since a key was proved on it. False: another connection has it already.
     pub(crate) fn keep(&self) -> bool {
         let mut taken = self.places.taken();
         let holder = taken.all.get_mut(&self.number);
         holder.map(|holder| holder.stays = true).is_some()
     }
 
-    /// Waits until the place is another's.
+    /// Waits until another connection gets the place.
     pub(crate) async fn lost(&self) {
         let mut held = self.held.clone();
         while held.changed().await.is_ok() {}
@@ -252,8 +251,8 @@ struct Wrong {
 pub(crate) struct WrongKeys(Mutex<BTreeMap<IpAddr, Wrong>>);
 
 impl WrongKeys {
-    /// A wrong key came; true if there were too many of them from there. However many addresses are
-    /// remembered, it is the same little work.
+    /// Counts a wrong key; true if there were too many from that address. The work is small, and the same for
+    /// any number of remembered addresses.
     pub(crate) fn count(&self, address: IpAddr, now: Instant) -> bool {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if all.len() >= ADDRESSES && !all.contains_key(&address) {
@@ -388,21 +387,21 @@ mod tests {
             let still = held.iter().filter(|p| p.lost().now_or_never().is_none());
             still.count()
         };
-        // Over and over from two addresses: one has its most, and all places are taken.
+        // Repeatedly from two addresses: one has its limit, and all places are taken.
         let driver = take(1, 1);
         assert!(driver[0].keep());
         let (of_a, of_b) = (take(1, 1_000), take(2, 1_000));
         let (a, b) = (still(&of_a), still(&of_b));
         assert_eq!(a + b, CONNECTIONS - 1);
         assert!(a < OF_ONE_ADDRESS && b <= OF_ONE_ADDRESS, "{a} {b}");
-        // From a third one there are places all the same, and they are not taken away at once.
+        // A third address still gets places, and does not lose them at once.
         let of_c = take(3, 4);
         let refilled = (take(1, 30), take(2, 30));
         assert_eq!((of_c.len(), still(&of_c), still(&driver)), (4, 4, 1));
         assert_eq!(places.taken().all.len(), CONNECTIONS);
         let lost = of_a.iter().find(|p| p.lost().now_or_never().is_some());
         assert!(!lost.expect("the oldest").keep());
-        // With a key on all of them there is none.
+        // If a key was proved on all of them, there is none.
         drop((of_a, of_b, of_c));
         let all = take(1, OF_ONE_ADDRESS - 1);
         assert!(all.iter().all(Place::keep) && places.take(address(1)).is_none());

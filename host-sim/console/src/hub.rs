@@ -1,5 +1,5 @@
-//! The hub between the robot's thread and everybody who looks: it decimates and encodes each
-//! sample once, knows who is in control, and answers requests. It never makes the robot wait.
+//! The hub between the robot's thread and all clients: it decimates and encodes each sample once, knows who
+//! is in control, and answers requests. It never makes the robot wait.
 
 mod control;
 mod history;
@@ -34,20 +34,20 @@ use wheeleg_access::request::{BadRequest, Body};
 
 /// How often the rings are emptied.
 pub(crate) const PERIOD: Duration = Duration::from_millis(5);
-/// How often the state is told.
+/// How often the state is sent.
 const STATE_PERIOD: Duration = Duration::from_millis(50);
 /// How often batches are sent.
 const BATCH_PERIOD: Duration = Duration::from_millis(20);
 /// Time in which a command must have its ticket.
 const TICKET: Duration = Duration::from_secs(2);
-/// Events that are kept for who asks later.
+/// Events kept for clients that ask later.
 pub const EVENTS: usize = 256;
-/// Stops of one connection whose answers are waited for.
+/// Stops of one connection that may wait for an answer.
 const STOPS: usize = 16;
 /// Clients at a time; the last place is for a role that may control.
 pub(crate) const CLIENTS: usize = 32;
 
-/// What a client may do.
+/// Rights of a client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
     /// Look and stop.
@@ -69,7 +69,7 @@ struct Subscription {
     /// `None`: all samples.
     period_ns: Option<u64>,
     next_ns: u64,
-    /// Samples that the robot's ring dropped, not told yet.
+    /// Samples that the robot's ring dropped, not reported yet.
     missed: u32,
 }
 
@@ -85,12 +85,12 @@ struct Client {
     writes: bool,
 }
 
-/// A request that is not at its end.
+/// A request that has not ended.
 struct Pending {
     client: ClientId,
     n: u64,
     since: Instant,
-    /// Master time at which the master has accepted it, µs.
+    /// Master time at which the master accepted it, µs.
     accepted_us: Option<u64>,
     what: Asked,
 }
@@ -100,7 +100,7 @@ enum Asked {
     Release,
     /// A release for another client.
     HandOver(ClientId),
-    /// And for how long it is then reserved for the robot's own computer.
+    /// How long control is then reserved for the robot's own computer.
     Revoke {
         hold: Duration,
     },
@@ -110,20 +110,20 @@ enum Asked {
 }
 
 impl Asked {
-    /// Whether the asker is in control, or is not, with its answer.
+    /// Whether its answer decides if the asker is in control.
     fn is_of_control(&self) -> bool {
         matches!(self, Self::Take | Self::Release | Self::HandOver(_))
     }
 }
 
-/// A client's connection, as it asks.
+/// A client's connection, for its requests.
 pub(crate) struct Asking {
     id: ClientId,
     stops: StopsUnderWay,
 }
 
-/// Stops of one connection whose answers are waited for: few at a time. Whoever asks for more of
-/// them is read no further until then, and costs nobody else time or memory.
+/// Limits the stops of one connection that wait for an answer. A client that asks for more is not read until
+/// then, and costs nobody else time or memory.
 pub(crate) struct StopsUnderWay(Arc<Semaphore>);
 
 impl StopsUnderWay {
@@ -131,16 +131,16 @@ impl StopsUnderWay {
         Self(Arc::new(Semaphore::new(STOPS)))
     }
 
-    /// The next one begins, when it may; it ends where this is dropped.
+    /// Begins the next one, when it may; it ends when the permit is dropped.
     pub(crate) async fn begin(&self) -> Option<OwnedSemaphorePermit> {
         Arc::clone(&self.0).acquire_owned().await.ok()
     }
 }
 
-/// What of a channel came since the last look.
+/// Samples of a channel since the last turn.
 #[derive(Default)]
 struct Arrived {
-    /// Number of the newest sample that came.
+    /// Number of the newest sample received.
     number: u64,
     /// All samples since the last batch, encoded, while somebody wants all.
     batch: Vec<u8>,
@@ -155,18 +155,18 @@ struct Inner {
     clients: BTreeMap<ClientId, Client>,
     viewers: Viewers,
     desk: Desk,
-    /// The holder of the control that was told last that somebody asks for it, and when.
+    /// The holder of control that was last notified of a request for it, and when.
     asked: Option<(ClientId, Instant)>,
     /// Name of the client that was in control last.
     last_holder: String,
-    /// Its connection has ended while it was in control.
+    /// Its connection ended while it was in control.
     last_is_gone: bool,
-    /// Name of the client that has taken the control away from it.
+    /// Name of the client that took control away from it.
     revoked_by: Option<String>,
     pending: BTreeMap<u32, Pending>,
     arrived: Vec<Arrived>,
     history: History,
-    /// The newest events, each as it was told.
+    /// The newest events, each as it was sent.
     events: VecDeque<Utf8Bytes>,
     faults: Vec<(FaultSpec, u64)>,
     /// The stop that is latched, or has just been asked for.
@@ -201,12 +201,12 @@ pub(crate) struct Hub {
     asked_stops: AskedStops,
 }
 
-/// How far stops have come.
+/// Progress of stops.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Stops {
-    /// Number of the last one that the master has taken.
+    /// Number of the last one that the master has accepted.
     taken: u64,
-    /// It goes out: the next SYNC has its bit, and a board answered the last one; or the clock stands.
+    /// It is being sent: the next SYNC has its bit, and a board answered the last one; or the clock stands.
     sent: bool,
     /// Master time, µs.
     now_us: u64,
@@ -263,7 +263,7 @@ impl Hub {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Ends the robot and closes everybody.
+    /// Ends the robot and closes all connections.
     pub(crate) fn end(&self) {
         self.signals.end();
         let inner = self.inner();
@@ -273,12 +273,12 @@ impl Hub {
         inner.viewers.close(Close::Ended);
     }
 
-    /// Whether a client with this role finds a place.
+    /// Whether there is a place for a client with this role.
     pub(crate) fn has_place(&self) -> bool {
         self.inner().taken_places() < CLIENTS
     }
 
-    /// A client whose key was right.
+    /// Adds a client whose key was right.
     pub(crate) fn enter(
         &self,
         role: Role,
@@ -313,7 +313,7 @@ impl Hub {
         Some((Asking { id, stops }, now_us))
     }
 
-    /// A client is gone. Its lease ends with its beats, at the master.
+    /// Removes a client. Without its beats the master ends its lease.
     pub(crate) fn leave(&self, asking: &Asking) {
         let mut inner = self.inner();
         inner.clients.remove(&asking.id);
@@ -321,7 +321,7 @@ impl Hub {
         inner.desk.leave(asking.id);
     }
 
-    /// What a client asks; `limited`: it asks too often.
+    /// Handles a client's request; `limited`: it asks too often.
     pub(crate) async fn ask(self: &Arc<Self>, asking: &Asking, n: u64, body: Body, limited: bool) {
         let id = asking.id;
         if matches!(body, Body::Stop) {
@@ -348,7 +348,7 @@ impl Hub {
                     self.signals.beat(seen_us);
                 }
             }
-            // Above: it waits for its answer without the lock.
+            // Handled above: it waits for its answer without the lock.
             Body::Stop => {}
             _ if limited => inner.tell(
                 id,
@@ -376,9 +376,9 @@ impl Hub {
         }
     }
 
-    /// Stops the robot; the master time at which it was confirmed, or `None` after 200 ms.
+    /// Stops the robot; returns the master time of the confirmation, or `None` after 200 ms.
     pub(crate) async fn stop(&self, by: StopBy) -> Option<u64> {
-        // The stop waits for nothing that takes long.
+        // The stop waits for nothing slow.
         let number = self.asked_stops.stop(&self.signals, by);
         self.inner().name_stops();
         let mut stops = self.stops.subscribe();
@@ -387,7 +387,7 @@ impl Hub {
         Some(confirmed.ok()?.ok()?.now_us)
     }
 
-    /// The state, as told to everybody.
+    /// The state, as sent to all clients.
     pub(crate) fn state(&self) -> String {
         self.state_of(&self.inner())
     }
@@ -422,8 +422,8 @@ impl Hub {
         inner.history.reader(channel, from_ns)
     }
 
-    /// Its next samples, at most so many, the oldest first, each as a frame has it; none: there are no
-    /// more. What nobody keeps by now is left out: a slow reader keeps nothing.
+    /// Its next samples, at most `most`, the oldest first, each as in a frame; none: there are no more.
+    /// Samples that are no longer kept are left out: a slow reader holds nothing back.
     pub(crate) fn samples(&self, reader: &mut Reader, most: usize) -> Vec<Bytes> {
         self.inner().history.read(reader, most)
     }
@@ -438,7 +438,7 @@ impl Hub {
         self.inner().active_faults()
     }
 
-    /// Empties the rings, and tells everybody what is due.
+    /// Empties the rings, and sends all clients the due messages.
     pub(crate) fn turn(&self) {
         let now = Instant::now();
         let mut inner = self.inner();
@@ -460,7 +460,7 @@ impl Hub {
             inner.take_status(status);
             self.stops.send_replace(Stops {
                 taken: status.stops,
-                // Where no board answers nobody knows whether it is heard.
+                // If no board answers, nobody knows whether any of them hears it.
                 sent: (status.emergency_stop && status.hears()) || status.pace.paused,
                 now_us: status.now_us,
             });
@@ -488,7 +488,7 @@ impl Hub {
 }
 
 impl Inner {
-    /// Places that clients and viewers have.
+    /// Places taken by clients and viewers.
     fn taken_places(&self) -> usize {
         self.clients.len() + self.viewers.count()
     }

@@ -1,5 +1,5 @@
-//! The two keys of a console: who has the control key may drive, who has the view key may look and
-//! stop. Each is a file that only its owner can read.
+//! The two keys of a console: the control key allows driving, the view key looking and stopping. Each is a
+//! file that only its owner can read.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -16,9 +16,9 @@ pub const CONTROL_FILE: &str = "control.key";
 /// File of the view key.
 pub const VIEW_FILE: &str = "view.key";
 
-/// What a server can do about its own files.
+/// Remedy for a server's own files.
 const MAKE: &str = "make new keys: wheeleg serve --new-key; clients need them then";
-/// What a client can do: new keys would lock out everybody.
+/// Remedy for a client: new keys would lock out all others.
 const GIVE: &str = "give the file control.key or view.key; `wheeleg serve` prints their paths";
 
 /// Digits of a key in its file.
@@ -34,7 +34,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// Reads both keys from `folder`, and makes the files that are not there.
+    /// Reads both keys from `folder`, and creates missing files.
     ///
     /// # Errors
     /// [`ConsoleError::Key`] if a file cannot be read or made, others can read it, or it holds no
@@ -52,7 +52,7 @@ impl Keys {
         Ok(Self { control, view })
     }
 
-    /// New keys, which are in no file yet.
+    /// New keys, not in any file yet.
     ///
     /// # Errors
     /// [`ConsoleError::Other`] if the system has no random numbers.
@@ -71,7 +71,7 @@ impl Keys {
         })
     }
 
-    /// Puts the keys in those files of `folder` that are not there.
+    /// Writes the keys to those files in `folder` that are missing.
     fn put(&self, folder: &Path) -> Result<(), ConsoleError> {
         for (name, key) in [(CONTROL_FILE, &self.control), (VIEW_FILE, &self.view)] {
             let path = folder.join(name);
@@ -85,7 +85,7 @@ impl Keys {
         Ok(())
     }
 
-    /// Puts the keys in place of those in `folder`: the old ones open nothing any more.
+    /// Replaces the keys in `folder`: the old ones no longer open anything.
     ///
     /// # Errors
     /// [`ConsoleError::Key`] if a file cannot be removed or made.
@@ -104,7 +104,7 @@ impl Keys {
     }
 }
 
-/// Where keys are: `$XDG_STATE_HOME/wheeleg`, else `~/.local/state/wheeleg`.
+/// The folder of keys: `$XDG_STATE_HOME/wheeleg`, else `~/.local/state/wheeleg`.
 ///
 /// # Errors
 /// [`ConsoleError::Other`] if neither is known.
@@ -129,7 +129,7 @@ pub fn read(path: &Path) -> Result<Key, ConsoleError> {
     read_or(path, GIVE)
 }
 
-/// The same; `help`: what can be done about a file that is no key.
+/// The same; `help`: remedy for a file that is not a key.
 fn read_or(path: &Path, help: &str) -> Result<Key, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"), help);
     let file = owners_alone(path, help)?;
@@ -152,13 +152,13 @@ fn read_or(path: &Path, help: &str) -> Result<Key, ConsoleError> {
     }
 }
 
-/// Opens a file that its owner alone can read; `help`: what can be done if it cannot be read.
+/// Opens a file that only its owner can read; `help`: remedy if it cannot be read.
 ///
 /// # Errors
 /// [`ConsoleError::Key`] if it cannot be read, or others can read it.
 pub(crate) fn owners_alone(path: &Path, help: &str) -> Result<File, ConsoleError> {
     let cannot = |e: std::io::Error| wrong(path, format!("cannot be read: {e}"), help);
-    // Nobody is to change who may read a device or a folder, nor to wait for who writes to a pipe.
+    // Do not change the permissions of a device or a folder, or wait for the writer of a pipe.
     let file = open_file(path).map_err(cannot)?;
     match open_to_others(&file).map_err(cannot)? {
         None => Ok(file),
@@ -211,7 +211,7 @@ fn make(path: &Path, key: &Key) -> std::io::Result<()> {
     writeln!(file, "{}", key.to_hex())
 }
 
-/// Permissions of a file that others than its owner may open.
+/// Permissions of a file that others besides its owner may open.
 #[cfg(unix)]
 fn open_to_others(file: &File) -> std::io::Result<Option<u32>> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -219,7 +219,7 @@ fn open_to_others(file: &File) -> std::io::Result<Option<u32>> {
     Ok((mode & 0o077 != 0).then_some(mode))
 }
 
-/// Permissions of a folder that others than its owner may write to.
+/// Permissions of a folder that others besides its owner may write to.
 #[cfg(unix)]
 fn open_to_writers(folder: &Path) -> Option<u32> {
     use std::os::unix::fs::PermissionsExt as _;
@@ -233,7 +233,7 @@ fn open_to_writers(_folder: &Path) -> Option<u32> {
     None
 }
 
-/// Where files have no such permissions, the folder of the user is what protects them.
+/// Where files have no such permissions, the user's folder protects them.
 #[cfg(not(unix))]
 fn open_to_others(_file: &File) -> std::io::Result<Option<u32>> {
     Ok(None)
@@ -297,7 +297,7 @@ mod tests {
             let error = read(&path).expect_err("refused");
             assert!(error.to_string().contains(word), "{error}");
             assert!(!error.to_string().contains("aaaa"), "{error}");
-            // New keys are for the server to make: those of everybody else would no longer work.
+            // Only the server makes new keys: everybody else's would no longer work.
             let help = |error: &ConsoleError| match error {
                 ConsoleError::Key { help, .. } => help.clone(),
                 other => panic!("{other}"),
@@ -310,7 +310,7 @@ mod tests {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).expect("set");
         let error = Keys::open(home.path()).expect_err("refused");
         assert!(error.to_string().contains("others can read"), "{error}");
-        // A pipe that nobody writes to is not waited for.
+        // A pipe without a writer is not waited for.
         let pipe = home.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status();
         assert!(made.expect("mkfifo").success());

@@ -1,5 +1,5 @@
-//! The operator's console: a robot that runs live, and the server through which people see and
-//! drive it. The contract with clients is `PROTOCOL.md` beside this crate.
+//! The operator's console: a robot that runs live, and the server through which people see and drive it.
+//! `PROTOCOL.md` beside this crate is the contract with clients.
 //!
 //! # Glossary
 //!
@@ -8,7 +8,7 @@
 //!   clients
 //! * **session**: one client's connection, from handshake to close
 //! * **control**: the right to give commands; a lease of the master, held by one client
-//! * **beat**: message that keeps the control: the holder has seen the robot as it was at a master time
+//! * **beat**: message that keeps control: the holder has seen the robot's state of a given master time
 //! * **outbox**: messages that wait for one client
 //! * **viewer**: a client with the protocol of Foxglove and Lichtblick: watches, and may stop
 //! * **recording**: a folder with the log of a live robot and all its inputs, from which `replay` repeats it

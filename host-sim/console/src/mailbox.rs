@@ -1,4 +1,4 @@
-//! What waits for one connection: put in from anywhere, taken out by its writer.
+//! Messages that wait for one connection: put in from anywhere, taken out by its writer.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,30 +7,30 @@ use tokio::sync::Notify;
 
 use crate::close::Close;
 
-/// Messages that wait, each kind with its own answer to a client that is slow.
+/// Waiting messages; each kind handles a slow client in its own way.
 pub(crate) trait Waiting: Default {
-    /// What is to be sent next.
+    /// The next message to send.
     fn next(&mut self) -> Option<Message>;
 }
 
-/// What waits for one connection, and its end.
+/// Messages that wait for one connection, and its end.
 #[derive(Default)]
 pub(crate) struct Mailbox<W> {
     waiting: Mutex<Contents<W>>,
     wake: Notify,
 }
 
-/// What is in a mailbox.
+/// Contents of a mailbox.
 #[derive(Default)]
 pub(crate) struct Contents<W> {
-    /// The connection is closed, after nothing else.
+    /// The connection is closed, without sending anything else.
     pub(crate) close: Option<Close>,
     /// Messages.
     pub(crate) messages: W,
 }
 
 impl<W: Waiting> Contents<W> {
-    /// Closes the connection. What waits is not sent any more.
+    /// Closes the connection. Waiting messages are no longer sent.
     pub(crate) fn close(&mut self, why: Close) {
         self.close.get_or_insert(why);
         self.messages = W::default();
@@ -38,13 +38,13 @@ impl<W: Waiting> Contents<W> {
 }
 
 impl<W: Waiting> Mailbox<W> {
-    /// What is in it.
+    /// Its contents.
     pub(crate) fn contents(&self) -> MutexGuard<'_, Contents<W>> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts something in, and wakes the writer. Nothing is kept for a connection that is closed:
-    /// one that takes nothing is not gone yet, and may go on asking.
+    /// Puts a message in, and wakes the writer. Nothing is kept for a closed connection: a client that reads
+    /// nothing is not gone yet, and may go on asking.
     pub(crate) fn put(&self, put: impl FnOnce(&mut Contents<W>)) {
         let mut contents = self.contents();
         if contents.close.is_none() {
@@ -54,12 +54,12 @@ impl<W: Waiting> Mailbox<W> {
         self.wake.notify_one();
     }
 
-    /// Closes the connection, after nothing else.
+    /// Closes the connection, without sending anything else.
     pub(crate) fn close(&self, why: Close) {
         self.put(|contents| contents.close(why));
     }
 
-    /// What is to be sent next; a close is the last.
+    /// The next message to send; a close is the last.
     pub(crate) fn next(&self) -> Option<Message> {
         let mut contents = self.contents();
         match contents.close {
@@ -68,7 +68,7 @@ impl<W: Waiting> Mailbox<W> {
         }
     }
 
-    /// Waits for what is to be sent next.
+    /// Waits for the next message to send.
     pub(crate) async fn wait(&self) -> Message {
         loop {
             if let Some(message) = self.next() {

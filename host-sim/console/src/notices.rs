@@ -1,8 +1,8 @@
-//! What the person at the server should know of its clients, until it is taken and told.
+//! Notices about clients for the person at the server, kept until they are printed.
 
 use std::sync::{Mutex, PoisonError};
 
-/// Lines that may wait. Whoever could fill it has a key; more than this at once nobody reads.
+/// Lines that may wait. Only clients with a key could fill it; nobody reads more than this at once.
 const MOST: usize = 32;
 
 /// Lines that wait.

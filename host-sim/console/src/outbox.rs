@@ -1,6 +1,6 @@
-//! What waits for one client. Each kind has its own answer to a client that is slow: of the state
-//! and of newest samples, the newest wins; of all samples, the oldest go and are counted; of
-//! answers and events none may be lost, so a client that lets them pile up is closed.
+//! Messages that wait for one client. Each kind handles a slow client in its own way: of the state and of
+//! newest samples, the newest wins; of all samples, the oldest are dropped and counted; answers and events
+//! must not be lost, so a client that lets them pile up is closed.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -21,7 +21,7 @@ const BATCHES_MAX: usize = 50;
 /// Version of the binary layout.
 const VERSION: u8 = 1;
 
-/// Samples of a channel that wait.
+/// Waiting samples of a channel.
 struct Samples {
     channel: u16,
     count: u32,
@@ -49,15 +49,15 @@ pub(crate) struct Queue {
     newest: BTreeMap<u16, Samples>,
     batches: VecDeque<Samples>,
     batch_bytes: usize,
-    /// Samples of batches that were dropped, until a frame of the channel tells.
+    /// Samples of dropped batches, until a frame of the channel reports them.
     lost: BTreeMap<u16, u32>,
 }
 
-/// What waits for one client.
+/// Messages that wait for one client.
 pub(crate) type Outbox = Mailbox<Queue>;
 
 impl Outbox {
-    /// An answer or event.
+    /// Queues an answer or event.
     pub(crate) fn ordered(&self, text: Utf8Bytes) {
         self.put(|contents| {
             let queue = &mut contents.messages;
@@ -69,17 +69,17 @@ impl Outbox {
         });
     }
 
-    /// The state of the robot.
+    /// Queues the state of the robot.
     pub(crate) fn state(&self, text: Utf8Bytes) {
         self.put(|contents| contents.messages.state = Some(text));
     }
 
-    /// The newest sample of a channel.
+    /// Queues the newest sample of a channel.
     pub(crate) fn newest(&self, channel: u16, missed: u32, body: Bytes) {
         self.put(|contents| contents.messages.replace(channel, missed, body));
     }
 
-    /// All samples of a channel since the last batch.
+    /// Queues all samples of a channel since the last batch.
     pub(crate) fn batch(&self, channel: u16, count: u32, missed: u32, body: Bytes) {
         let samples = Samples {
             channel,
@@ -197,7 +197,7 @@ mod tests {
             assert!(outbox.contents().close.is_none());
             outbox.ordered(Utf8Bytes::from_static("{}"));
         }
-        // What it goes on asking is not kept.
+        // Further requests are not kept.
         for _ in 0..ORDERED_MAX {
             outbox.ordered(Utf8Bytes::from_static("{}"));
             outbox.batch(1, 1, 0, Bytes::from_static(b"x"));

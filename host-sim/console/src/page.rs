@@ -1,5 +1,5 @@
-//! The page: a fixed table of files, built into the program, or read from a folder for who works
-//! on it. No name of a request ever becomes a path.
+//! The page: a fixed table of files, built into the program, or read from a folder by people who work on it.
+//! No name in a request ever becomes a path.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,10 @@ use crate::error::ConsoleError;
 
 static BUILT_IN: Dir = include_dir!("$CARGO_MANIFEST_DIR/../report/page");
 
-/// Name of the file that `/` gives.
+/// Name of the file served at `/`.
 const INDEX: &str = "index.html";
 
-/// Where a file of the table is.
+/// Location of a file in the table.
 #[derive(Debug, Clone)]
 enum Place {
     BuiltIn(&'static [u8]),
@@ -125,7 +125,7 @@ mod tests {
         String::from_utf8(bytes.to_vec()).expect("text")
     }
 
-    /// What is at the boards is written in the page once more: as everywhere else.
+    /// The page repeats the places of the boards: the same as everywhere else.
     #[test]
     fn the_page_has_the_boards_where_the_program_has_them() {
         let places: Vec<String> = PLACES.iter().map(|place| format!("{place:?}")).collect();
@@ -133,7 +133,7 @@ mod tests {
         assert!(text("boards.js").contains(&line), "{line}");
     }
 
-    /// The page says what to press where a terminal names commands; why, both say in the same words.
+    /// The page names buttons where a terminal names commands; both give the reason in the same words.
     #[test]
     fn the_page_gives_the_same_reasons_as_a_terminal() {
         let words = text("words.js");

@@ -1,5 +1,5 @@
-//! The boards' parameters as clients see them: as the robot's file stores them, and as the boards
-//! have told them since.
+//! The boards' parameters as clients see them: as stored in the robot's file, and as the boards have reported
+//! them since.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,26 +22,26 @@ struct Parameter {
     place: Place,
     info: &'static ParamInfo,
     raw: i32,
-    /// The board has told it; else it is what the robot's file stores.
+    /// The board has reported it; otherwise it comes from the robot's file.
     told: bool,
-    /// As the viewers' protocol has it, JSON.
+    /// As in the viewers' protocol, JSON.
     shown: String,
 }
 
-/// All parameters, by name. Their texts are made once: who asks without end costs little time.
+/// All parameters, by name. Their texts are made once: a client that asks without end costs little time.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameters {
     all: BTreeMap<String, Parameter>,
-    /// Those of all.
+    /// Their places.
     places: BTreeSet<Place>,
     /// The robot's description, as a parameter of the viewers' protocol.
     description: String,
-    /// [`Self::document`], until a board tells a value.
+    /// [`Self::document`], until a board reports a value.
     document: OnceCell<String>,
 }
 
 impl Parameters {
-    /// Parameters of boards that a robot's file has set up.
+    /// Parameters of boards, as set by a robot's file.
     pub(crate) fn new(stored: &NodeParams, urdf: String) -> Self {
         let boards = Node::ALL.into_iter().flat_map(|node| {
             let board = node.number();
@@ -96,8 +96,7 @@ impl Parameters {
         })
     }
 
-    /// Those of `names` that there are, each once, or all: a list in JSON as the viewers' protocol
-    /// has it.
+    /// Those of `names` that exist, each once, or all: a JSON list as in the viewers' protocol.
     pub(crate) fn list(&self, names: &[String]) -> String {
         let texts: Vec<&str> = match names.is_empty() {
             true => self.shown().collect(),
@@ -106,24 +105,24 @@ impl Parameters {
         format!("[{}]", texts.join(","))
     }
 
-    /// Boards and numbers of all that boards have.
+    /// Boards and numbers of all boards' parameters.
     pub(crate) fn places(&self) -> &BTreeSet<Place> {
         &self.places
     }
 
-    /// Board and number of the one with this name, if a board has it.
+    /// Board and number of the parameter with this name, if a board has it.
     pub(crate) fn place(&self, name: &str) -> Option<Place> {
         self.all.get(name).map(|parameter| parameter.place)
     }
 
-    /// Texts of all.
+    /// Texts of all parameters.
     fn shown(&self) -> impl Iterator<Item = &str> {
         let of_boards = self.all.values().map(|parameter| &*parameter.shown);
         of_boards.chain([&*self.description])
     }
 
-    /// Texts of those of `names` that there are, each once however often it is named: a short request
-    /// has no endless answer.
+    /// Texts of those of `names` that exist, each once however often it is named: a short request must not
+    /// have an endless answer.
     fn named(&self, names: &[String]) -> impl Iterator<Item = &str> {
         let once: BTreeSet<&str> = names.iter().map(String::as_str).collect();
         once.into_iter().filter_map(|name| {
@@ -132,7 +131,7 @@ impl Parameters {
         })
     }
 
-    /// Arguments of the `WriteParameter` that sets a parameter, or what is wrong with it.
+    /// Arguments of the `WriteParameter` that sets a parameter, or the error in it.
     pub(crate) fn write(&self, name: &str, value: Option<&Value>) -> Result<Value, String> {
         let Some(Parameter { place, info, .. }) = self.all.get(name) else {
             return Err(format!("there is no parameter {name} that can be written"));
@@ -142,7 +141,7 @@ impl Parameters {
         Ok(json!({ "board": place.0, "parameter": info.name, "value": value }))
     }
 
-    /// A board has told the value of a parameter; its name.
+    /// Takes the value of a parameter that a board has reported; returns its name.
     pub(crate) fn told(&mut self, place: Place, raw: i32) -> Option<String> {
         let mut all = self.all.iter_mut();
         let (name, parameter) = all.find(|(_, p)| p.place == place)?;
@@ -236,7 +235,7 @@ mod tests {
     #[test]
     fn what_a_board_has_told_is_shown_in_its_unit() {
         let mut parameters = parameters();
-        // Asked for before, too.
+        // It was also requested before.
         assert_eq!(json(parameters.document())["boards"][2]["address"], 3);
         let info = params_at(3)
             .iter()

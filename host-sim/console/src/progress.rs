@@ -1,5 +1,5 @@
-//! A connection that ends when its client takes nothing for too long: who asks and never reads
-//! keeps no place. And one that reads little at a time: who sends without end waits its turn.
+//! A connection that ends if its client reads nothing for too long: a client that asks and never reads keeps
+//! no place. And it reads little at a time: a client that sends without end waits its turn.
 
 use std::io::{ErrorKind, IoSlice};
 use std::pin::Pin;
@@ -9,11 +9,11 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Sleep;
 
-/// Time in which a client must take something of what waits for it.
+/// Time within which a client must read some of its waiting data.
 pub(crate) const PROGRESS: Duration = Duration::from_secs(5);
 
-/// Bytes that are read at a time. Between two reads it is the turn of others: whatever is made of
-/// the bytes, a client that sends without end has no more than these in front of anybody's stop.
+/// Bytes read at a time. Between two reads others run: whatever the bytes ask for, a client that sends
+/// without end has no more than these in front of anybody's stop.
 const READ: usize = 4 * 1024;
 
 /// A stream whose writes fail after [`PROGRESS`] without any, and which reads [`READ`] at a time.
@@ -22,7 +22,7 @@ pub(crate) struct Progressing<S> {
     stream: S,
     /// Runs while a write waits.
     waits: Option<Pin<Box<Sleep>>>,
-    /// It has read, and is not at its next turn yet.
+    /// It has read, and its next turn has not come yet.
     has_read: bool,
 }
 
@@ -35,7 +35,7 @@ impl<S> Progressing<S> {
         }
     }
 
-    /// What came of a write; of one that waits for too long, a failure.
+    /// The result of a write; a failure if it waits for too long.
     fn judge<T>(
         &mut self,
         context: &mut Context<'_>,
@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
 
-    /// However much has come: some of it, then the turn of others, then more.
+    /// However much has come: it reads some, lets others run, then reads more.
     #[test]
     fn who_sends_without_end_is_read_a_little_at_a_time() {
         let sent = vec![7; 10 * READ];
@@ -137,7 +137,7 @@ mod tests {
         }
     }
 
-    /// Bytes that have come, and a client that takes all.
+    /// Bytes that have come, from a client that reads everything.
     struct Pretended<'a>(&'a [u8]);
 
     impl AsyncRead for Pretended<'_> {

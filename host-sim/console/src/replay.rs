@@ -1,5 +1,5 @@
-//! A recorded session, once more: the same robot is powered up, is given the same at the same
-//! times, and must do the same to the bit.
+//! Replays a recorded session: the same robot is powered up, gets the same inputs at the same times, and must
+//! behave the same to the bit.
 
 use std::fs::{self, File};
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -22,41 +22,41 @@ use crate::record::folder::{INPUTS, ROBOT, SCENARIO, SUMMARY, opened, summary};
 use crate::record::inputs::{Input, LINE_MAX, Line};
 use wheeleg_access::request::Order;
 
-/// Longest session that is repeated, ms: a month.
+/// Longest session that can be repeated, ms: a month.
 const LONGEST_MS: u64 = 31 * 24 * 3_600_000;
 /// Largest robot or scenario file.
 const TOML_MAX: u64 = 4 << 20;
-/// What is said of a line that is none.
+/// Message about an invalid line.
 const NO_INPUT: &str = "it is no input: allowed is an object of JSON with `ms`, a whole number, and one of \
     `beat`, `stop`, `command`, `fault_begins`, `fault_ends`, `pace`, `revoked` and `hash`";
-/// Simulated between two looks at the progress, ms.
+/// Simulated time between two progress reports, ms.
 const STRIDE_MS: u64 = 10;
 
-/// What came of a repetition.
+/// Result of a repetition.
 #[derive(Debug)]
 pub struct Replayed {
-    /// What the recording says of itself.
+    /// The recording's own summary.
     pub summary: Summary,
-    /// Simulated since power-up, ms.
+    /// Simulated time since power-up, ms.
     pub end_ms: u64,
-    /// Inputs that were given: commands, stops, beats, faults.
+    /// Inputs given: commands, stops, beats, faults.
     pub inputs: u64,
     /// Hash of everything from power-up to the end.
     pub hash: String,
     /// Hashes of the recording that were compared.
     pub compared: u64,
-    /// Times between which it first did something else, ms.
+    /// Times between which it first behaved differently, ms.
     pub parted: Option<(u64, u64)>,
-    /// It was ended by the caller before its end.
+    /// The caller stopped it early.
     pub stopped: bool,
     /// The last line is cut short: the recording was killed.
     pub cut_short: bool,
-    /// Why its log is not whole; all else holds.
+    /// Why its log is incomplete; everything else holds.
     pub unwritten: Option<LogError>,
 }
 
 impl Replayed {
-    /// Every hash of the recording was found again, and there was one.
+    /// Whether every hash of the recording was found again, and there was one.
     #[must_use]
     pub fn is_same(&self) -> bool {
         self.parted.is_none() && self.compared > 0
@@ -75,7 +75,7 @@ pub struct Recorded {
 /// Reads the recording in `folder`.
 ///
 /// # Errors
-/// [`ConsoleError`] if the folder is no recording that can be repeated.
+/// [`ConsoleError`] if the folder is not a recording that can be repeated.
 pub fn recorded(folder: &Path) -> Result<Recorded, ConsoleError> {
     let folder = folder_of(folder);
     let summary = summary(&folder).map_err(unusable)?;
@@ -107,12 +107,12 @@ pub fn recorded(folder: &Path) -> Result<Recorded, ConsoleError> {
     })
 }
 
-/// Repeats a recording, as fast as it goes, and writes its log from power-up on to `log`.
-/// `progress` is told the time in ms and that of the end.
+/// Repeats a recording, as fast as possible, and writes its log from power-up on to `log`. `progress` gets
+/// the time and the end time, ms.
 ///
 /// # Errors
-/// [`ConsoleError`] if a line of its inputs is none, the robot cannot be built, or the log cannot
-/// be written.
+/// [`ConsoleError`] if a line of its inputs is invalid, the robot cannot be built, or the log cannot be
+/// written.
 pub fn replay(
     recorded: Recorded,
     log: Option<&Path>,
@@ -185,7 +185,7 @@ pub fn replay(
     })
 }
 
-/// The folder, also where one of its files is named.
+/// The folder, also if `path` names one of its files.
 fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if path.is_file() => parent.to_owned(),
@@ -213,7 +213,7 @@ fn source(folder: &Path, name: &str) -> Result<Source, ConsoleError> {
     })
 }
 
-/// A robot under way once more.
+/// A robot that repeats a session.
 struct Repeated {
     session: Session,
     recorder: Recorder<'static>,

@@ -1,4 +1,5 @@
-//! The server: listens at one address, with TLS where others are on the way, and hands each connection to the routes.
+//! The server: listens at one address, with TLS if others are on the way, and passes connections to the
+//! routes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::ErrorKind;
@@ -41,58 +42,58 @@ use crate::record::{self, About};
 use crate::session::Context;
 use crate::tls::{Certificate, Files, Fingerprint};
 
-/// Where the server listens unless it is told otherwise.
+/// Default address of the server.
 pub const ADDRESS: &str = "127.0.0.1:7420";
-/// Threads for those who have proved a key at the console; the robot has its own.
+/// Threads for clients that have proved a key at the console; the robot has its own.
 const SESSIONS: usize = 2;
-/// Threads for all that others ask. Whoever floods it has one core at most.
+/// Threads for all other requests. A flood of them gets one core at most.
 const REQUESTS: usize = 1;
-/// How often a port is looked for that is free at all addresses.
+/// How often to look for a port that is free at all addresses.
 const PORTS: usize = 16;
-/// Time in which a request must have come.
+/// Time within which a request must arrive.
 const HEAD: Duration = Duration::from_secs(3);
-/// Bytes that may wait in the system for a client: who has a slow line sees what was so much before.
-/// Linux takes twice as many, its own overhead with them. A line of 100 ms there and back needs so many.
+/// Bytes that may wait in the system for a client: on a slow line they are old by the time they arrive. Linux
+/// allocates twice as many, with its overhead. A line with a round trip of 100 ms needs this many.
 const SEND_BUFFER: u32 = 8 * 1024;
-/// Of these, bytes that are not even on their way: what is newer overtakes all else, at the hub.
+/// Of these, bytes that are not yet on their way: newer messages overtake everything else, at the hub.
 #[cfg(target_os = "linux")]
 const UNSENT: u32 = 2 * 1024;
 /// Connections that may wait to be accepted.
 const BACKLOG: u32 = 256;
 
-/// How what is sent is protected on its way.
+/// Protection of the traffic on its way.
 #[derive(Debug, Clone, Default)]
 pub enum Protection {
-    /// TLS with a certificate made at the start; at addresses of this computer's own, nothing is
-    /// on the way.
+    /// TLS with a certificate made at the start; none at this computer's own addresses, where nobody is on
+    /// the way.
     #[default]
     AsNeeded,
     /// TLS with this certificate.
     Tls(Files),
-    /// Nothing: from elsewhere one may look and stop, and no more.
+    /// None: clients from elsewhere may only look and stop.
     Plain,
 }
 
-/// What is served, to whom and where.
+/// Options of the server: what it serves, for which clients and where.
 #[derive(Debug)]
 pub struct Options {
     /// The robot.
     pub live: Live,
     /// Folder for recordings.
     pub recordings: PathBuf,
-    /// Whether the first recording begins with the power.
+    /// Whether the first recording begins at power-up.
     pub record: bool,
     /// Where to listen.
     pub listen: SocketAddr,
-    /// Names under which clients know this computer, beside its address.
+    /// Names under which clients know this computer, in addition to its address.
     pub names: Vec<String>,
-    /// How what is sent is protected on its way.
+    /// Protection of the traffic on its way.
     pub protection: Protection,
-    /// Who may drive, and who may look.
+    /// Keys of those who may drive, and of those who may look.
     pub keys: Keys,
-    /// Folder of the page, instead of that in the program.
+    /// Folder of the page, instead of the built-in one.
     pub page: Option<PathBuf>,
-    /// Origins of foreign pages that may look by Foxglove's protocol.
+    /// Origins of foreign pages that may watch over Foxglove's protocol.
     pub viewer_pages: Vec<String>,
     /// Whether a viewer with the control key may write parameters.
     pub viewers_write: bool,
@@ -121,8 +122,8 @@ impl std::fmt::Debug for Server {
     }
 }
 
-/// A server that has read all that it was given, and listens. It has written nothing yet, lets nobody
-/// in, and its robot has no power.
+/// A server that has read all its inputs, and listens. It has written nothing yet, lets nobody in, and its
+/// robot has no power.
 pub struct Prepared {
     options: Options,
     certificate: Option<Certificate>,
@@ -149,7 +150,7 @@ impl Prepared {
     ///
     /// # Errors
     /// [`ConsoleError`] if the address is in use or has no name, the certificate is wrong, the page is
-    /// not there, or the robot cannot be drawn.
+    /// missing, or the robot cannot be drawn.
     pub fn new(options: Options) -> Result<Self, ConsoleError> {
         ensure_names(&options)?;
         let certificate = certificate(&options)?;
@@ -247,7 +248,7 @@ impl Prepared {
     }
 }
 
-/// Refuses names that are not of the form that a name must have, and an address without one.
+/// Refuses malformed names, and an address without a name.
 fn ensure_names(options: &Options) -> Result<(), ConsoleError> {
     if let Some(page) = options.viewer_pages.iter().find(|page| !is_origin(page)) {
         return Err(ConsoleError::other(
@@ -273,7 +274,7 @@ fn ensure_names(options: &Options) -> Result<(), ConsoleError> {
     }
 }
 
-/// The certificate that the options name, or a new one where others are on the way.
+/// The certificate named by the options, or a new one if others are on the way.
 fn certificate(options: &Options) -> Result<Option<Certificate>, ConsoleError> {
     let ip = options.listen.ip();
     match &options.protection {
@@ -290,8 +291,8 @@ fn certificate(options: &Options) -> Result<Option<Certificate>, ConsoleError> {
 
 /// Threads of the server.
 struct Threads {
-    /// Connections come here, all sockets are watched here, and who has proved a key at the console is
-    /// served here: nothing that others ask for is in front of a stop.
+    /// Accepts connections, watches all sockets, and serves clients that have proved a key at the console:
+    /// other requests are never in front of a stop.
     sessions: Runtime,
     /// Requests, handshakes and viewers.
     requests: Runtime,
@@ -317,10 +318,10 @@ impl Threads {
     }
 }
 
-/// What the page draws of the robot.
+/// The robot's data for the page's drawing.
 fn robot_json(live: &Live) -> String {
     let is_real = live.port.is_some();
-    // The level floor needs no grid, and what real boards stand on nobody knows.
+    // The level floor needs no grid, and the ground below real boards is unknown.
     let ground = &live.scenario.ground;
     let uneven = !is_real && !ground.parts.is_empty();
     json!({
@@ -334,7 +335,7 @@ fn robot_json(live: &Live) -> String {
     .to_string()
 }
 
-/// What a recording is of.
+/// The subject of a recording.
 fn about(live: &Live) -> Result<About, ConsoleError> {
     let about = About::new(
         &live.robot,
@@ -352,24 +353,24 @@ impl Server {
     /// [`Prepared::new`] and [`Prepared::start`] in one.
     ///
     /// # Errors
-    /// Those of the two.
+    /// As for the two.
     pub fn start(options: Options) -> Result<Self, ConsoleError> {
         Prepared::new(options)?.start()
     }
 
-    /// Whether the system has granted the robot's thread to run before ordinary ones.
+    /// Whether the system lets the robot's thread run before ordinary ones.
     #[must_use]
     pub fn robot_goes_first(&self) -> bool {
         self.goes_first
     }
 
-    /// Where it listens.
+    /// Its address.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Its address as one opens it, without a path.
+    /// Its address for a browser, without a path.
     #[must_use]
     pub fn url(&self) -> String {
         let scheme = if self.fingerprint.is_some() {
@@ -389,26 +390,26 @@ impl Server {
         self.fingerprint
     }
 
-    /// Whether others on the way can read all, so that nobody may drive.
+    /// Whether others on the way can read everything, so that nobody may drive.
     #[must_use]
     pub fn is_look_only(&self) -> bool {
         self.look_only
     }
 
-    /// What ended the recording early: a full disk. None while all goes well.
+    /// Why the recording ended early: a full disk. None while all goes well.
     #[must_use]
     pub fn recording_failure(&self) -> Option<String> {
         self.recorded.status()?.failure
     }
 
-    /// Lines for the person at the server, since they were asked for last: clients that sent forged,
-    /// repeated or lost frames.
+    /// Takes the lines for the person at the server since the last call: clients that sent forged, repeated
+    /// or lost frames.
     #[must_use]
     pub fn notices(&self) -> Vec<String> {
         self.notices.take()
     }
 
-    /// Switches the robot off and ends. What the recording lacks, if it lacks something.
+    /// Switches the robot off and ends. Returns what the recording lacks, if anything.
     #[must_use]
     pub fn end(self) -> Option<String> {
         let recorded = Arc::clone(&self.recorded);
@@ -417,7 +418,7 @@ impl Server {
     }
 
     #[doc(hidden)]
-    /// The server does nothing but wait for so long; for tests of what happens to the robot then.
+    /// Blocks the server for `time`; to test what then happens to the robot.
     pub fn block_for(&self, time: Duration) {
         self.block_requests_for(time);
         if let Some(Threads { sessions, .. }) = &self.threads {
@@ -428,7 +429,7 @@ impl Server {
     }
 
     #[doc(hidden)]
-    /// What serves requests and viewers does nothing but wait for so long; for tests of a stop then.
+    /// Blocks the threads of requests and viewers for `time`; to test a stop then.
     pub fn block_requests_for(&self, time: Duration) {
         if let Some(Threads { requests, .. }) = &self.threads {
             for _ in 0..REQUESTS {
@@ -441,7 +442,7 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.hub.end();
-        // Time for the last words to everybody.
+        // Time to send everybody the last messages.
         std::thread::sleep(Duration::from_millis(20));
         if let Some(Threads { sessions, requests }) = self.threads.take() {
             requests.shutdown_timeout(Duration::from_millis(500));
@@ -450,14 +451,14 @@ impl Drop for Server {
         if let Some(robot) = self.robot.take() {
             let _ = robot.join();
         }
-        // It has what the robot's last cycle told.
+        // It has the reports of the robot's last cycle.
         if let Some(recorder) = self.recorder.take() {
             let _ = recorder.join();
         }
     }
 }
 
-/// Fields that have no value, by the topic of their channel: those that no real board tells.
+/// Fields without a value, by the topic of their channel: those that no real board reports.
 fn unmeasured(real: bool) -> BTreeMap<&'static str, &'static [&'static str]> {
     let of = |schema: &str| {
         wheeleg_sim::unmeasured()
@@ -469,7 +470,7 @@ fn unmeasured(real: bool) -> BTreeMap<&'static str, &'static [&'static str]> {
     fields.collect()
 }
 
-/// Listens at an address; at loopback at both that `localhost` may stand for, if the computer has them.
+/// Listens at an address; for loopback at both addresses of `localhost`, if the computer has them.
 fn bind_all(listen: SocketAddr) -> Result<(Vec<TcpListener>, SocketAddr), ConsoleError> {
     let mut tries = 0;
     loop {
@@ -483,11 +484,11 @@ fn bind_all(listen: SocketAddr) -> Result<(Vec<TcpListener>, SocketAddr), Consol
             Ok((second, _)) => return Ok((vec![listener, second], address)),
             Err(e) => e,
         };
-        // Where the computer has no such address, nobody else listens there either.
+        // If the computer has no such address, nobody else listens there either.
         if e.kind() != ErrorKind::AddrInUse {
             return Ok((vec![listener], address));
         }
-        // Of the ports that the system gives, another may be free at both.
+        // Another port that the system gives may be free at both.
         if listen.port() != 0 || tries == PORTS {
             return Err(ConsoleError::Listen {
                 address: other.to_string(),
@@ -508,7 +509,7 @@ fn listen_at(address: SocketAddr) -> std::io::Result<(TcpListener, SocketAddr)> 
     } else {
         TcpSocket::new_v6()?
     };
-    // A server that restarts does not wait for connections of the one before.
+    // A restarted server does not wait for connections of the one before.
     #[cfg(unix)]
     socket.set_reuseaddr(true)?;
     // A client that reads slowly is noticed here, not seconds later.
@@ -546,10 +547,10 @@ async fn turn(hub: Arc<Hub>) {
     }
 }
 
-/// The address that a client at the other end of a connection has.
+/// The client's address, from the other end of a connection.
 type AddressOf = fn(SocketAddr) -> IpAddr;
 
-/// What becomes of a connection.
+/// Handling of a connection.
 #[derive(Clone)]
 struct Door {
     router: Router,
@@ -562,7 +563,7 @@ struct Door {
 
 async fn accept(listener: TcpListener, door: Door) {
     loop {
-        // Whoever connects without end waits for others between two connections.
+        // A flood of connections lets others run between two of them.
         tokio::task::yield_now().await;
         let (stream, peer) = match listener.accept().await {
             Ok(accepted) => accepted,
@@ -577,7 +578,7 @@ async fn accept(listener: TcpListener, door: Door) {
             // Closed at once.
             continue;
         };
-        // Without it an answer waits for the client's acknowledgement: 40 ms.
+        // Otherwise an answer waits for the client's acknowledgement: 40 ms.
         let _ = stream.set_nodelay(true);
         #[cfg(target_os = "linux")]
         let _ = socket2::SockRef::from(&stream).set_tcp_notsent_lowat(UNSENT);
@@ -587,7 +588,7 @@ async fn accept(listener: TcpListener, door: Door) {
         };
         let (router, tls) = (door.router.clone(), door.tls.clone());
         door.requests.spawn(async move {
-            // A socket takes its place along.
+            // A socket keeps its place.
             let place = Arc::new(place);
             let served = async {
                 match tls {
@@ -636,8 +637,8 @@ mod tests {
     use crate::client::{Client, Incoming, Outcome, Url};
     use std::time::Instant;
 
-    /// Asks to revoke the control of a driver as a client that has this address; what is answered, and
-    /// whether the driver has lost the control.
+    /// Asks to revoke a driver's control as a client with this address; returns the answer, and whether the
+    /// driver has lost control.
     fn revoke_from(address_of: AddressOf) -> (Outcome, bool) {
         let home = tempfile::tempdir().expect("a folder");
         let keys = Keys::open(home.path()).expect("keys");

@@ -1,4 +1,4 @@
-//! One client's connection: handshake, then frames in and whatever its outbox holds out.
+//! One client's connection: handshake, then frames in, and messages of its outbox out.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,16 +26,16 @@ use wheeleg_access::mac::Transcript;
 
 /// Time for the whole handshake.
 const HANDSHAKE: Duration = Duration::from_secs(2);
-/// How often a client is asked whether it is there, also one that is told much and says nothing.
+/// How often a client is pinged, also one that receives much and says nothing.
 const PING: Duration = Duration::from_secs(5);
-/// Time after which a client that sends nothing, no answer to a ping either, is gone.
+/// Time after which a client that sends nothing, not even an answer to a ping, counts as gone.
 pub(crate) const SILENCE: Duration = Duration::from_secs(20);
-/// How late a wrong key is answered after too many of them.
+/// Delay of the answer to a wrong key after too many of them.
 const LATE: Duration = Duration::from_millis(1_500);
 /// Version of the contract.
 const VERSION: u32 = 1;
 
-/// What a session needs of the server.
+/// Server state for a session.
 pub(crate) struct Context {
     /// The hub.
     pub(crate) hub: Arc<Hub>,
@@ -51,7 +51,7 @@ pub(crate) struct Context {
     pub(crate) sessions: Handle,
     /// Folder of the recordings.
     pub(crate) recordings: PathBuf,
-    /// Others on the way can read all: nobody may drive, and no key is to be sent.
+    /// Others on the way can read everything: nobody may drive, and no key may be sent.
     pub(crate) look_only: bool,
 }
 
@@ -67,7 +67,7 @@ struct Auth {
     mac: String,
 }
 
-/// A client who has proved to have the key.
+/// A client that has proved to have the key.
 struct Admitted {
     role: Role,
     name: String,
@@ -76,14 +76,14 @@ struct Admitted {
     key: Key,
 }
 
-/// A nonce of the system's random numbers.
+/// A nonce from the system's random numbers.
 fn nonce() -> Option<[u8; 32]> {
     let mut out = [0; 32];
     getrandom::fill(&mut out).ok()?;
     Some(out)
 }
 
-/// Lets one client in, if it has a key. Who has none loses its place if another needs it.
+/// Lets one client in, if it has a key. One without a key loses its place if another needs it.
 pub(crate) async fn serve(
     mut socket: WebSocket,
     context: Arc<Context>,
@@ -98,7 +98,7 @@ pub(crate) async fn serve(
     let Some(admitted) = admitted.filter(|_| place.keep()) else {
         return;
     };
-    // Nothing that others ask is in front of its stop there.
+    // There, no other request is in front of its stop.
     let threads = context.sessions.clone();
     threads.spawn(async move {
         run(socket, &context, admitted, peer).await;
@@ -106,7 +106,7 @@ pub(crate) async fn serve(
     });
 }
 
-/// What a client has proved; `None`: it was refused, or is gone.
+/// The client's proven role; `None`: it was refused, or is gone.
 async fn admit(
     socket: &mut WebSocket,
     context: &Context,
@@ -183,7 +183,7 @@ async fn run(
                 };
                 let Entered { n, body, limited } = entered;
                 context.hub.ask(&asking, n, body, limited).await;
-                // Whoever sends without end waits for others between two frames.
+                // A client that sends without end lets others run between two frames.
                 tokio::task::yield_now().await;
             }
         };
@@ -195,7 +195,7 @@ async fn run(
     context.hub.leave(&asking);
 }
 
-/// Sends what waits for a client until it is closed or takes nothing more.
+/// Sends a client's waiting messages until it is closed or reads no more.
 pub(crate) async fn send_all<F: Future<Output = Message>>(
     out: &mut SplitSink<WebSocket, Message>,
     next: impl Fn() -> F,
@@ -247,7 +247,7 @@ async fn refuse(socket: &mut WebSocket, why: Close) {
     let _ = timeout(HANDSHAKE, send).await;
 }
 
-/// Proves the keys to each other; `Err(None)`: the client is gone.
+/// Both sides prove their key; `Err(None)`: the client is gone.
 async fn handshake(
     socket: &mut WebSocket,
     context: &Context,
@@ -311,7 +311,7 @@ async fn handshake(
     })
 }
 
-/// Whether a name can be shown to others as it is.
+/// Whether a name can be shown to others unchanged.
 fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     (1..=32).contains(&name.len()) && name.chars().all(plain)

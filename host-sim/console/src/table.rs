@@ -1,5 +1,5 @@
-//! Samples of a channel as an answer of the HTTP API: JSON or CSV, made piece by piece while it is
-//! sent, so that an answer that nobody reads costs no memory.
+//! Samples of a channel as an answer of the HTTP API: JSON or CSV, made piece by piece while it is sent, so
+//! that an answer that nobody reads costs no memory.
 
 use std::convert::Infallible;
 
@@ -13,12 +13,12 @@ use wheeleg_telemetry::channels;
 
 use crate::unpack::unpack;
 
-/// Samples of one piece: it is made at a time, and others wait for it.
+/// Samples in a piece, which is made in one go while others wait.
 const PIECE: usize = 8;
 /// Name of the first column.
 const TIME: &str = "t_ns";
 
-/// Whether a client would rather have CSV than JSON: the first of both that it names counts.
+/// Whether a client prefers CSV to JSON: the first of both that it names counts.
 pub(crate) fn prefers_csv(headers: &HeaderMap) -> bool {
     let named = headers.get_all(ACCEPT).iter();
     let kinds = named.filter_map(|value| value.to_str().ok());
@@ -33,8 +33,8 @@ pub(crate) fn prefers_csv(headers: &HeaderMap) -> bool {
     }) == Some(true)
 }
 
-/// The answer with the samples of a channel. `next` gives those of the next piece, at most so many, each
-/// as a frame has it; none: that was the last.
+/// The answer with the samples of a channel. `next` gives those of the next piece, at most the given number,
+/// each as in a frame; none: that was the last.
 pub(crate) fn table(
     channel: u16,
     mut next: impl FnMut(usize) -> Vec<Bytes> + Send + 'static,
@@ -82,7 +82,7 @@ pub(crate) fn table(
         };
         let piece = piece.map(|(text, then)| (Ok::<_, Infallible>(Bytes::from(text)), then));
         async move {
-            // Between two pieces it is others' turn.
+            // Between two pieces others run.
             tokio::task::yield_now().await;
             piece
         }
@@ -90,14 +90,14 @@ pub(crate) fn table(
     ([(CONTENT_TYPE, kind)], Body::from_stream(pieces)).into_response()
 }
 
-/// What of an answer comes next.
+/// The next part of an answer.
 enum Part {
     Head,
     Rows { is_first: bool },
     Over,
 }
 
-/// A value in a table; what is no number is empty.
+/// A value in a table; empty if it is not a number.
 fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

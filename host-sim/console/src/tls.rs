@@ -1,4 +1,4 @@
-//! TLS: the server's certificate, and how a client of ours knows it again.
+//! TLS: the server's certificate, and how our clients recognize it.
 
 use std::fmt;
 use std::fs::File;
@@ -32,7 +32,7 @@ impl Fingerprint {
     /// Reads 64 hexadecimal digits, with or without colons between pairs.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The error in them, in words.
     pub fn parse(text: &str) -> Result<Self, String> {
         let digits: String = text.chars().filter(|c| *c != ':').collect();
         let bytes = hex::decode(&digits);
@@ -51,7 +51,7 @@ impl fmt::Display for Fingerprint {
 /// Files of a certificate of the user's own.
 #[derive(Debug, Clone)]
 pub struct Files {
-    /// Certificate, and those that vouch for it, in PEM.
+    /// Certificate, and those that sign it, in PEM.
     pub certificate: PathBuf,
     /// Its private key, in PEM; only its owner may read it.
     pub key: PathBuf,
@@ -64,7 +64,7 @@ pub(crate) struct Certificate {
 }
 
 impl Certificate {
-    /// Reads one.
+    /// Reads a certificate.
     pub(crate) fn read(files: &Files) -> Result<Self, ConsoleError> {
         let text = contents(File::open(&files.certificate), &files.certificate)?;
         let chain = CertificateDer::pem_slice_iter(&text);
@@ -85,7 +85,7 @@ impl Certificate {
         })
     }
 
-    /// Makes one for these names, that nobody else vouches for.
+    /// Makes a self-signed certificate for these names.
     pub(crate) fn make(names: Vec<String>) -> Result<Self, ConsoleError> {
         let failed = |e: &dyn fmt::Display| {
             let what = format!("cannot make a certificate: {e}");
@@ -133,7 +133,7 @@ fn config(
     Ok(Arc::new(config))
 }
 
-/// What can be done where the private key cannot be read.
+/// Remedy if the private key cannot be read.
 const KEY_FILE: &str = "give the private key of the certificate, PEM, with --tls-key";
 
 fn wrong(path: &Path, what: impl fmt::Display) -> ConsoleError {
@@ -143,8 +143,8 @@ fn wrong(path: &Path, what: impl fmt::Display) -> ConsoleError {
     )
 }
 
-/// How a client of ours connects: to the one certificate that has this fingerprint, whoever
-/// vouches for it.
+/// TLS settings of our own clients: they accept only the certificate with this fingerprint, whoever signed
+/// it.
 pub(crate) fn client(fingerprint: Fingerprint) -> Result<Arc<ClientConfig>, rustls::Error> {
     let provider = provider();
     let pinned = Pinned {
@@ -159,7 +159,7 @@ pub(crate) fn client(fingerprint: Fingerprint) -> Result<Arc<ClientConfig>, rust
     Ok(Arc::new(config))
 }
 
-/// Knows one certificate.
+/// Accepts one certificate.
 #[derive(Debug)]
 struct Pinned {
     fingerprint: Fingerprint,

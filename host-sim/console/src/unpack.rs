@@ -1,10 +1,10 @@
-//! Samples as they are laid out in PROTOCOL.md, read back to values.
+//! Reads samples as laid out in PROTOCOL.md back to values.
 
 use serde_json::{Value, json};
 use wheeleg_telemetry::{FieldDef, Wire, channels};
 
-/// Time in ns and values of the sample of `channel` at the begin of `bytes`, which then begin behind
-/// it; `None` if there is no whole one. A number that is none is null.
+/// Time in ns and values of the sample of `channel` at the start of `bytes`, which is then advanced past it;
+/// `None` if there is no complete one. Not a number becomes null.
 #[must_use]
 pub fn unpack(channel: u16, bytes: &mut &[u8]) -> Option<(u64, Vec<Value>)> {
     let t_ns = u64::from_le_bytes(take(bytes)?);
@@ -73,7 +73,7 @@ mod tests {
         };
         let mut bytes = vec![0; 8];
         event.pack(&mut bytes);
-        // Two in a row, as batches have them.
+        // Two in a row, as in batches.
         bytes.extend(bytes.clone());
         let mut rest = &bytes[..];
         for _ in 0..2 {

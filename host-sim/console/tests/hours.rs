@@ -1,5 +1,5 @@
-//! A robot that lives long, is recorded and is looked at: its server does not grow. The clock goes as
-//! fast as it can, so that an hour passes in minutes.
+//! A robot that lives long, is recorded and watched: its server does not grow. The clock runs as fast as
+//! possible, so that an hour passes in minutes.
 
 #![cfg(target_os = "linux")]
 
@@ -23,7 +23,7 @@ use common::TestRig;
 const CLIENTS: usize = 8;
 /// Bar of the specification, MB.
 const GROWS_MB: f64 = 16.0;
-/// Share of the time after which the memory is looked at first: rings and buffers are full then.
+/// Share of the time before the first check of the memory: rings and buffers are full then.
 const SETTLED: f64 = 0.1;
 
 /// Memory of this process, server and clients, MB.
@@ -93,7 +93,7 @@ fn memory_does_not_grow_while_a_robot_lives_is_recorded_and_is_looked_at() {
     );
     assert!(state["recording"]["failure"].is_null(), "{state}");
     assert!(log_mb > 1e-3 * seconds, "hardly anything was recorded");
-    // Cut every 10 minutes; the last part may have just begun.
+    // Split every 10 minutes; the last part may have just begun.
     let whole = (seconds / 600.0) as usize;
     assert!((whole..=whole + 1).contains(&sizes.len()), "{sizes:?}");
     assert!(frames.load(Ordering::Relaxed) > 1_000);

@@ -1,5 +1,4 @@
-//! The interface definitions so far, as `protocol/interfaces` held them when this program
-//! was built.
+//! The interface definitions so far, from `protocol/interfaces` when this program was built.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! Lines in which two interface definitions differ, and what they belong to.
+//! Lines in which two interface definitions differ, and their places.
 
 use std::fmt;
 
@@ -7,8 +7,7 @@ use similar::{Algorithm, capture_diff_slices};
 /// A line of a definition.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Line {
-    /// The message, enumeration or table in which it stands: many messages have fields
-    /// with the same line.
+    /// The message, enumeration or table that contains it: many messages have fields with the same line.
     pub place: String,
     /// The line itself.
     pub text: String,
@@ -17,9 +16,9 @@ pub struct Line {
 /// Neighbouring lines that differ, between lines that are the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Change {
-    /// Lines of the first definition alone.
+    /// Lines only in the first definition.
     pub here: Vec<Line>,
-    /// Lines of the second alone.
+    /// Lines only in the second.
     pub there: Vec<Line>,
     /// Place of the line before them.
     before: String,
@@ -52,7 +51,7 @@ fn lines(definition: &str) -> Vec<Line> {
     definition.lines().map(line).collect()
 }
 
-/// What differs between two definitions, from the top.
+/// Differences of two definitions, from the top.
 #[must_use]
 pub fn changes(here: &str, there: &str) -> Vec<Change> {
     let (here, there) = (lines(here), lines(there));
@@ -80,7 +79,7 @@ impl Change {
     fn first(&self) -> (Option<&Line>, Option<&Line>) {
         match (self.here.first(), self.there.first()) {
             (Some(here), Some(there)) if here.place != there.place => {
-                // One side goes on where the other begins something else.
+                // One side continues where the other begins something else.
                 if there.place == self.before {
                     (None, Some(there))
                 } else {
@@ -91,7 +90,7 @@ impl Change {
         }
     }
 
-    /// The first differing line in words; the two are told by their names.
+    /// The first differing line in words; the two are named as given.
     pub(crate) fn message(&self, here_name: &str, there_name: &str) -> String {
         let (here, there) = self.first();
         let place = here.or(there).map_or("", |line| line.place.as_str());

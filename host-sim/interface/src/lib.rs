@@ -1,10 +1,10 @@
 //! The differences between two interface definitions, found by their hashes.
 //!
-//! Master and boards exchange hashes alone, because a board has no room for more. The
-//! definition behind a hash is here:
+//! Master and boards exchange only hashes, because a board has no room for more. This crate has the
+//! definition behind a hash:
 //!
 //! * [`archive`]: the definitions so far;
-//! * [`difference`]: lines in which two of them differ.
+//! * [`difference`]: lines in which two definitions differ.
 //!
 //! # Glossary
 //!
@@ -16,16 +16,16 @@ pub mod difference;
 
 use difference::Change;
 
-/// One of two definitions that are compared: whose it is, and its hash.
+/// One of two compared definitions: its owner, and its hash.
 #[derive(Debug, Clone, Copy)]
 pub struct Side<'a> {
-    /// As the user knows who has it.
+    /// The owner's name, as the user knows it.
     pub name: &'a str,
     /// Hash of the definition.
     pub hash: u64,
 }
 
-/// What differs between the definitions with these hashes.
+/// Differences of the definitions with these hashes.
 ///
 /// # Errors
 /// The hash that is not in the archive.
@@ -34,7 +34,7 @@ pub fn changes(here: u64, there: u64) -> Result<Vec<Change>, u64> {
     Ok(difference::changes(&text(here)?, &text(there)?))
 }
 
-/// That nothing is known of a definition, and why that may be.
+/// Message that a definition is unknown, and why that may be.
 pub fn not_archived(hash: u64) -> String {
     format!(
         "{hash:016x} is not an interface of this archive: a version between releases or newer \
@@ -42,7 +42,7 @@ pub fn not_archived(hash: u64) -> String {
     )
 }
 
-/// The first difference of two definitions as a sentence, or why there is none to tell.
+/// The first difference of two definitions as a sentence, or why it is not known.
 #[must_use]
 pub fn first_difference(here: Side<'_>, there: Side<'_>) -> String {
     match changes(here.hash, there.hash) {

@@ -1,5 +1,5 @@
-//! The robot on rigid ground, and what our plant makes of it, as JSON for a comparison with
-//! another physics engine (`tests/python/check_terrain.py`).
+//! The robot on rigid ground in our plant, as JSON for a comparison with another physics engine
+//! (`tests/python/check_terrain.py`).
 //!
 //!     cargo run --example rigid_terrain > terrain.json
 //!
@@ -59,7 +59,7 @@ fn driven(duty: [f64; 2]) -> Inputs {
     }
 }
 
-/// Chassis and legs as one body, and where the soles are.
+/// Chassis and legs as one body, and the positions of the soles.
 fn body(params: &PlantParams) -> Result<Value, Failed> {
     let plant = Plant::new(params)?;
     let zero = &params.stroke_zero_m;
@@ -133,7 +133,7 @@ fn slide(mu: f64) -> Result<f64, Failed> {
     let mut params = robot(false);
     let slope = Plane::sloping(25_f64.to_radians(), FRAC_PI_2);
     params.terrain.parts[0].shape = Shape::Plane(slope);
-    // It stands while it holds; then it is put on slippery ground.
+    // It stands while it holds; then the ground becomes slippery.
     let mut state = Plant::new(&params)?.initial_state(1)?;
     for law in [
         &mut params.contacts.wheel.law,
@@ -181,7 +181,7 @@ fn step(height: f64) -> Result<f64, Failed> {
     Err("it does not climb".into())
 }
 
-/// Two seconds of an arc: rates of the wheels, and what the robot has turned.
+/// Two seconds of an arc: wheel rates and the robot's turn.
 fn arc() -> Result<Value, Failed> {
     let (plant, mut state) = slippery(&robot(false))?;
     let mut run = |ticks: u32| -> Result<Outputs, Failed> {

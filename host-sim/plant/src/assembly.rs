@@ -21,9 +21,9 @@ use crate::hash::StateHasher;
 use crate::supply::{SupplyModel, SupplyState};
 use crate::valve::NEVER_NS;
 
-/// What the pistons are attached to: C cylinders and whatever else moves.
+/// The parts that the pistons drive: C cylinders and everything else that moves.
 pub trait Mechanics<const C: usize> {
-    /// Positions, speeds, accelerations and everything else that carries over.
+    /// Positions, speeds, accelerations and everything else carried from step to step.
     type State;
 
     /// Piston strokes \[m\], 0 retracted.
@@ -89,7 +89,7 @@ pub struct Assembly<M, const C: usize> {
 }
 
 impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
-    /// Forces on each piston with the state as it is.
+    /// Forces on each piston in the present state.
     #[must_use]
     pub fn forces(&self, state: &AssemblyState<M::State>) -> [CylinderForces; C] {
         let strokes = self.mechanics.strokes_m(&state.motion);
@@ -97,8 +97,8 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         std::array::from_fn(|i| self.cylinders[i].forces(&state.cylinders[i], strokes[i], rates[i]))
     }
 
-    /// Evaluates the accelerations of the state as it is: before the first step, and where forces
-    /// were changed from outside and the next step is not to wait for its end to feel them.
+    /// Evaluates the accelerations of the present state: before the first step, and after outside changes of
+    /// forces that the next step must feel from its start.
     ///
     /// # Errors
     /// As [`Mechanics::evaluate`].
@@ -245,8 +245,7 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         self.supply.check(&state.supply)
     }
 
-    /// Gas in the assembly minus what came in plus what went out \[kg\]:
-    /// constant but for rounding.
+    /// Gas in the assembly minus inflow plus outflow \[kg\]: constant but for rounding.
     #[must_use]
     pub fn mass_balance_kg(&self, state: &AssemblyState<M::State>) -> f64 {
         let mut sum =
@@ -288,7 +287,7 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
     }
 }
 
-/// What can be seen of one cylinder.
+/// Observable values of one cylinder.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CylinderOutputs {
     /// Stroke \[m\], 0 retracted.

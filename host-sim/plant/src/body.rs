@@ -90,7 +90,7 @@ impl BodyMotion {
     }
 }
 
-/// What the ground does at one instant, and where the robot is.
+/// Forces of the ground at one instant, and the robot's pose.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene {
     /// Robot at that instant.
@@ -136,7 +136,7 @@ fn ahead(motion: &BodyMotion, ahead_s: f64) -> Velocity {
 }
 
 impl BodyMechanics {
-    /// Angles of the wheels against the chassis \[rad\], what the encoders see.
+    /// Angles of the wheels relative to the chassis \[rad\], as the encoders see them.
     #[must_use]
     pub fn wheel_angle_rad(&self, motion: &BodyMotion) -> [f64; 2] {
         motion.state.wheel_rad
@@ -155,7 +155,7 @@ impl BodyMechanics {
         self.motors[wheel].wheel_torque_n_m(motion.motors[wheel].current_a, rate_rad_s)
     }
 
-    /// The robot as it is, with the forces of the ground.
+    /// The robot in its present state, with the forces of the ground.
     ///
     /// # Errors
     /// [`PlantError::Mechanics`] or [`PlantError::NonFinite`] if the pose cannot be.
@@ -177,7 +177,7 @@ impl BodyMechanics {
         Ok(self.touching.points(&kin, rate, &motion.contacts))
     }
 
-    /// Mechanical power with the state as it is and these forces of the pistons \[N\].
+    /// Mechanical power in the present state with these piston forces \[N\].
     ///
     /// # Errors
     /// As [`Self::scene`].

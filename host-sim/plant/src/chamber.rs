@@ -1,4 +1,4 @@
-//! One gas volume: what is stored in it and how it changes.
+//! One gas volume: its contents and how they change.
 //!
 //! The state is the gas mass m and the product Y = pV, not the pressure:
 //!
@@ -75,11 +75,11 @@ pub struct ChamberState {
     pub pv_j: f64,
     /// Gas mass \[kg\].
     pub mass_kg: f64,
-    /// What crossed the border so far.
+    /// Flows across the border so far.
     pub ledger: Ledger,
 }
 
-/// What a chamber holds, without its ledger.
+/// Contents of a chamber, without its ledger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Content {
     pub(crate) pv_j: f64,
@@ -111,7 +111,7 @@ impl ChamberState {
         }
     }
 
-    /// What the chamber holds now.
+    /// The present contents of the chamber.
     #[inline]
     pub(crate) fn content(&self) -> Content {
         Content {
@@ -120,7 +120,7 @@ impl ChamberState {
         }
     }
 
-    /// What the chamber would hold `h` seconds later.
+    /// The contents of the chamber `h` seconds later.
     #[inline]
     pub(crate) fn predicted(&self, rates: &ChamberRates, exponent: f64, h: f64) -> Content {
         Content {

@@ -8,13 +8,12 @@
 //!
 //! # Friction
 //!
-//! An elastic–plastic bristle (a two-dimensional brush): the bristle stretches with the sliding
-//! of the body, F = −σ0 z − σ1 v, and total force and stretch are limited to the friction
-//! circle μ(v) F. Below the limit it is a spring: a foot under a steady load below μ F does not
-//! creep, as it would with the plain LuGre bristle (Dupont et al., 2002). Above the limit the
-//! bristle is dragged along: Coulomb friction, with μ falling from static to kinetic over the
-//! Stribeck velocity. The stretch is a vector of the world, laid into the tangent plane anew in
-//! every step, so that it follows a curved surface.
+//! An elastic–plastic bristle (a two-dimensional brush): the bristle stretches with the sliding of the body,
+//! F = −σ0 z − σ1 v, and total force and stretch are limited to the friction circle μ(v) F. Below the limit
+//! it is a spring: a foot under a steady load below μ F does not creep, as it would with the plain LuGre
+//! bristle (Dupont et al., 2002). Above the limit the bristle is dragged along: Coulomb friction, with μ
+//! falling from static to kinetic over the Stribeck velocity. The stretch is a vector in the world frame,
+//! projected into the tangent plane in every step, so that it follows a curved surface.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -50,7 +49,7 @@ pub struct Touch {
     pub normal: Vector3<f64>,
     /// Velocity of the body's point against the surface \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// What that point has moved since the last instant \[m\].
+    /// Displacement of that point since the last instant \[m\].
     pub moved_m: Vector3<f64>,
     /// The ground.
     pub material: Material,
@@ -130,7 +129,7 @@ impl ContactLaw {
         (elastic * (1.0 + self.damping_s_m * closing_m_s)).max(0.0)
     }
 
-    /// Stretches the bristle by what the body has moved, and gives the force on the body.
+    /// Stretches the bristle by the body's displacement, and returns the force on the body.
     #[must_use]
     #[inline]
     pub fn force(&self, stretch_m: &mut Vector3<f64>, touch: &Touch) -> ContactForce {

@@ -69,8 +69,7 @@ pub struct CylinderParams {
     pub initial_pressure_b_pa: f64,
 }
 
-/// How far a piston may be past its stop at least, whatever its stroke \[m\]: as far as a soft stop
-/// yields to a large bore.
+/// Least stop margin for any stroke \[m\]: as far as a soft stop yields to a large bore.
 const STOP_MARGIN_M: f64 = 5e-3;
 
 impl CylinderParams {
@@ -195,7 +194,7 @@ impl CylinderState {
         self.next_event_ns
     }
 
-    /// Recomputes what is cached; call after changing a valve or a fault by hand.
+    /// Recomputes cached values; call after changing a valve or a fault by hand.
     pub fn refresh(&mut self) {
         self.next_event_ns = NEVER_NS;
         self.open_mask = 0;

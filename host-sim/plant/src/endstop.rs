@@ -41,8 +41,8 @@ impl EndStopParams {
         )
     }
 
-    /// Force of one stop away from itself, >= 0 \[N\]. `depth_m` is how far the
-    /// piston is past the stop (negative: still free), `rate_m_s` how fast it goes in.
+    /// Force of one stop away from itself, >= 0 \[N\]. `depth_m` is the piston's depth in the stop (negative:
+    /// still free), `rate_m_s` its rate of entry.
     #[inline]
     fn one_side_n(&self, depth_m: f64, rate_m_s: f64) -> f64 {
         let mut force = 0.0;

@@ -1,6 +1,6 @@
 //! The plant's one error type: every failure names the variable and its value.
 
-/// Why the plant refused to go on.
+/// Why the plant cannot continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// A state variable stopped being a finite number.
@@ -59,7 +59,7 @@ pub enum PlantError {
         /// Largest value accepted.
         max: f64,
     },
-    /// `advance` was asked for an interval that does not start where the state stands.
+    /// `advance` was called for an interval that does not start at the state's time.
     #[error(
         "time does not follow on: the state stands at {state_ns} ns, asked for {from_ns}..{to_ns} ns"
     )]
@@ -74,7 +74,7 @@ pub enum PlantError {
     /// More switching edges are under way in a line than the model can hold.
     #[error("valve {0}: more edges under way in its line than the model holds")]
     EdgeQueueFull(usize),
-    /// The robot does not stand at rest in its start pose where it starts.
+    /// The robot does not stand at rest in its start pose at the start place.
     #[error(
         "the robot does not stand on its wheels and feet at the start place, x = 0 and y = 0, heading along x"
     )]
@@ -98,7 +98,7 @@ pub enum PlantError {
         shown(*.into_m), shown(.place_m[0]), shown(.place_m[1])
     )]
     InChassis {
-        /// Where it stands highest above the belly \[m\].
+        /// Where the ground is highest above the belly \[m\].
         place_m: [f64; 2],
         /// How far above the belly \[m\].
         into_m: f64,

@@ -101,8 +101,7 @@ pub struct Iso6358 {
     pub critical_ratio: f64,
     /// Subsonic exponent m \[-\]; 0.5 by default (ISO 6358-1:2013).
     pub subsonic_exponent: f64,
-    /// Ratio β above which the flow is taken as linear \[-\], b < β < 1;
-    /// 0.999 by default.
+    /// Ratio β above which the flow is linear \[-\], b < β < 1; 0.999 by default.
     pub linear_ratio: f64,
 }
 
@@ -150,8 +149,8 @@ impl Iso6358 {
                 ..*self
             };
         }
-        // Intermediate pressure ratio r at which the upstream path passes
-        // what chokes the downstream one: (c1/c2)² (1 - ((r-b1)/(1-b1))²) = r².
+        // Intermediate pressure ratio r at which the upstream path passes the flow that chokes the downstream
+        // one: (c1/c2)² (1 - ((r-b1)/(1-b1))²) = r².
         let k2 = (c1 / c2) * (c1 / c2);
         let beta2 = (1.0 - b1) * (1.0 - b1);
         let denominator = beta2 + k2;

@@ -1,4 +1,4 @@
-//! Random numbers whose bits depend on the generator alone, not on the system's mathematics.
+//! Random numbers whose bits depend only on the generator, not on the system's mathematics.
 
 use rand::Rng;
 

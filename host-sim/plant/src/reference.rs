@@ -27,7 +27,7 @@ const VISCOUS_N_S_M: f64 = 50.0;
 const STRIBECK_M_S: f64 = 0.05;
 /// Speed over which the friction changes its sign \[m/s\].
 const SIGN_M_S: f64 = 0.002;
-/// Beyond so many times that speed tanh is 1 to the last bit of a double.
+/// Beyond this multiple of that speed tanh is 1 to the last bit of a double.
 const SIGN_FULL: f64 = 20.0;
 const STOP_N_M: f64 = 1e6;
 const STOP_N_S_M: f64 = 500.0;
@@ -71,7 +71,7 @@ pub fn path() -> Iso6358 {
     }
 }
 
-/// What a loop came to.
+/// Result of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Looped {
     /// Root mean square of the error \[mm\].
@@ -84,7 +84,7 @@ pub struct Looped {
 /// decision of two ticks ago and gives position and speed.
 ///
 /// # Errors
-/// What `step` gives.
+/// The errors of `step`.
 pub fn three_state_loop<E>(
     ticks: usize,
     (mut x_m, mut v_m_s): (f64, f64),
@@ -275,7 +275,7 @@ pub fn bench_axis() -> AxisParams {
     c.gas_model = GasModel::Polytropic { exponent: EXPONENT };
     for valve in [&mut c.fill_valve, &mut c.vent_valve] {
         valve.flow = path();
-        // A lag of 1 ms lets through what a dead time of 1 ms does.
+        // A lag of 1 ms passes as much as a dead time of 1 ms.
         (valve.t_on_s, valve.t_off_s) = (LAG_S, LAG_S);
     }
     let f = &mut c.friction;

@@ -51,7 +51,7 @@ pub struct PlantParams {
     pub step_ns: u64,
 }
 
-/// What the floating chassis needs beyond [`RobotDynamicsParams`].
+/// Parameters of the floating chassis beyond [`RobotDynamicsParams`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpatialParams {
     /// Chassis inertia about its centre of mass, roll axis \[kg m²\].
@@ -127,7 +127,7 @@ pub struct PlantState {
     pub adc: [AdcState; 6],
 }
 
-/// What can be seen of the plant at one instant.
+/// Observable values of the plant at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outputs {
     /// Time \[ns\].
@@ -437,7 +437,7 @@ impl Plant {
         state.adc[joint].read(&self.params.adc, ratio)
     }
 
-    /// Where a sound potentiometer's wiper stands, as a share of its reference.
+    /// Wiper position of a sound potentiometer, as a share of its reference.
     #[must_use]
     pub fn position_ratio(&self, state: &PlantState, joint: usize) -> f64 {
         use crate::assembly::Mechanics;

@@ -31,7 +31,7 @@ pub const PRESSURES_PA: [f64; 2] = [1e3, 1e7];
 pub struct SupplyParams {
     /// Pressure before the regulator \[Pa absolute\], 1e5..3e7; 0 flow below the reservoir's.
     pub source_pressure_pa: f64,
-    /// Regulator set pressure \[Pa absolute\], 1e5..2e6: what it holds at no flow.
+    /// Regulator set pressure \[Pa absolute\], 1e5..2e6: held at no flow.
     pub set_pressure_pa: f64,
     /// Pressure drop below the set point at which the regulator is fully open \[Pa\],
     /// 100..1e6 (its droop).
@@ -124,7 +124,7 @@ pub struct SupplyState {
 }
 
 impl SupplyState {
-    /// Pressure switch as it is read: its contacts in series.
+    /// Pressure switch as read: its contacts in series.
     #[must_use]
     pub fn pressure_switch(&self) -> bool {
         self.contacts == [true; 2]
@@ -143,7 +143,7 @@ impl SupplyState {
     }
 }
 
-/// Flows of the supply, without what the cylinders take \[kg/s\].
+/// Flows of the supply, without those to the cylinders \[kg/s\].
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SupplyRates {
     pub(crate) source_kg_s: f64,

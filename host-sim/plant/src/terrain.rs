@@ -1,8 +1,8 @@
 //! The ground: bodies that do not move, each with its material.
 //!
-//! What touches it is a point (the centre of a sphere, the corner of a box) or a disc (a slice of
-//! a wheel). A [`Surface`] answers both with its closest place: distance, outward normal, point.
-//! World axes: X and Y horizontal, Z up, gravity vertical whatever the slope.
+//! The touching shape is a point (the centre of a sphere, the corner of a box) or a disc (a slice of a
+//! wheel). A [`Surface`] answers both with its closest place: distance, outward normal, point. World axes: X
+//! and Y horizontal, Z up, gravity vertical on any slope.
 
 mod ellipsoid;
 mod height_map;
@@ -99,12 +99,12 @@ impl Surface for Shape {
     }
 }
 
-/// What a surface is made of. Friction is that of the pair: the smaller of body and ground.
+/// Material of a surface. Friction is that of the pair: the smaller of body and ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// Most static friction that it gives.
+    /// Highest static friction that it gives.
     pub mu_static: f64,
-    /// Most kinetic friction that it gives, at most the static one.
+    /// Highest kinetic friction that it gives, at most the static one.
     pub mu_kinetic: f64,
     /// Soft soil; steep faces of it, and what of the robot is neither wheel nor foot, have the
     /// frictions above.
@@ -200,7 +200,7 @@ impl Terrain {
         hasher.finish()
     }
 
-    /// No part of it is higher \[m\].
+    /// Height that no part of it exceeds \[m\].
     #[must_use]
     pub fn top_m(&self) -> f64 {
         let tops = self.parts.iter().map(|p| p.shape.top_m());

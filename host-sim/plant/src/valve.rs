@@ -48,13 +48,13 @@ impl ValveParams {
     }
 }
 
-/// What is wrong with a valve, for fault injection.
+/// Fault of a valve, for fault injection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ValveFault {
     /// Healthy.
     #[default]
     None,
-    /// Passes flow whatever the command.
+    /// Passes flow for any command.
     StuckOpen,
     /// Never passes flow.
     StuckShut,
@@ -130,7 +130,7 @@ impl ValveState {
         self.commanded
     }
 
-    /// Whether the poppet stands open (before the line delay and faults).
+    /// Whether the poppet is open (before the line delay and faults).
     #[must_use]
     pub fn poppet_open(&self) -> bool {
         self.poppet_open
@@ -162,7 +162,7 @@ impl ValveState {
 
     /// Sets the driver's level at `now_ns`. Repeating a level does nothing.
     ///
-    /// Due edges must have been taken with [`Self::settle`] first.
+    /// Take due edges with [`Self::settle`] first.
     pub fn command(&mut self, on: bool, now_ns: u64, timing: &ValveTiming) {
         if on == self.commanded {
             return;
@@ -330,8 +330,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the pulse train at two edges a millisecond, the line queue
-        /// never fills and the effect ends where the command ends.
+        /// For any pulse train at two edges a millisecond, the line queue never fills and the effect ends
+        /// where the command ends.
         #[test]
         fn any_pulse_train_ends_where_commanded(
             pulses in proptest::collection::vec((0u64..=1000, any::<bool>()), 1..200),

@@ -1,4 +1,4 @@
-//! What is compared between a board outside and the application in this process.
+//! Quantities compared between a board outside and the application in this process.
 
 use schemars::JsonSchema;
 use serde::Serialize;

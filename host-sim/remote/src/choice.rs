@@ -81,7 +81,7 @@ impl FromStr for NodeChoice {
 pub struct Nodes(pub [NodeKind; 8]);
 
 impl Nodes {
-    /// All as `kind`, but for the choices.
+    /// All as `kind`, except for the choices.
     ///
     /// # Errors
     /// [`RemoteError`]: two choices for one node.

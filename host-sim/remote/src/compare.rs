@@ -1,9 +1,8 @@
 //! Bit-for-bit comparison of a board outside with the same application in
 //! this process, given the same inputs.
 //!
-//! What is compared is what the time base defines (ARCHITECTURE.md): per tick
-//! the inputs as the application saw them and the outputs that act from its edge
-//! on; per transmission its bytes and the instant of its first bit.
+//! The time base (ARCHITECTURE.md) defines the comparison: per tick the inputs as the application saw them
+//! and the outputs that act from its edge on; per transmission its bytes and the instant of its first bit.
 
 use std::fmt;
 
@@ -19,7 +18,7 @@ pub struct Difference {
     pub at_ns: u64,
     /// The board.
     pub node: Node,
-    /// What differed.
+    /// Differing field.
     pub field: String,
     /// Value of the application in this process.
     pub here: String,
@@ -156,7 +155,7 @@ impl Comparison {
         }
     }
 
-    /// A transmission; `None` where one side has none.
+    /// Compares a transmission; `None` if one side has none.
     pub(crate) fn frame(
         &mut self,
         at_ns: u64,
@@ -180,7 +179,7 @@ impl Comparison {
             there: text(there),
         };
         let (Some((start, bytes)), Some((start_there, bytes_there))) = (here, there) else {
-            // All bits of what the other side lacks.
+            // All bits that the other side lacks.
             let bits = 8 * here.or(there).map_or(0, |(_, b)| b.len() as u64);
             self.of(node).of(Channel::FrameStart).add(64, 64);
             self.of(node).of(Channel::FrameBytes).add(bits, bits);

@@ -1,10 +1,9 @@
 //! Cores on which simulator and emulated boards run.
 //!
-//! They take turns some thousand times a second, and to wake a process on a core that
-//! has gone to sleep takes longer than the ticks of all boards. So the simulator and the
-//! boards near to it share one core, on which a turn is a change of the process; the
-//! far boards have a core of their own, which stays awake between requests. What is
-//! computed does not depend on it.
+//! They take turns some thousand times a second, and waking a process on a sleeping core takes longer than
+//! the ticks of all boards. So the simulator and the boards near to it share one core, on which a turn is a
+//! process switch; the far boards have their own core, which stays awake between requests. The results do not
+//! depend on it.
 //!
 //! Where a program cannot choose its cores (anywhere but on Linux) all emulated boards
 //! share one process and run one after the other: slower, and the same to the bit.
@@ -26,7 +25,7 @@ pub(super) struct Cores {
 
 #[cfg(target_os = "linux")]
 impl Cores {
-    /// `None` where there is only one, or no way to choose.
+    /// `None` if there is only one, or no way to choose.
     pub(super) fn choose() -> Option<Self> {
         let allowed = sched_getaffinity(None).ok()?;
         let here = sched_getcpu();
@@ -43,7 +42,7 @@ impl Cores {
 
     /// Starts a process on the far core.
     pub(super) fn far<T>(&self, start: impl FnOnce() -> T) -> T {
-        // A process inherits what its starter is bound to.
+        // A process inherits the affinity of its starter.
         let _ = sched_setaffinity(None, &self.far);
         let started = start();
         let _ = sched_setaffinity(None, &self.near);

@@ -1,9 +1,9 @@
-//! What can go wrong with a board elsewhere.
+//! Errors of boards elsewhere.
 
 use miette::Diagnostic;
 use thiserror::Error;
 
-/// A board that does not come up, stops, or is not what is asked for; with the remedy.
+/// A board that does not come up, stops, or is not the requested one; with the remedy.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{what}")]
 #[diagnostic(code(wheeleg::simulation), help("{help}"))]

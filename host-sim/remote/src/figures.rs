@@ -16,7 +16,7 @@ pub struct BoardFigures {
     pub image: String,
     /// Digest of the image, hexadecimal.
     pub digest: String,
-    /// What it runs on.
+    /// Its host.
     pub host: String,
     /// Bits compared with the application in this process.
     pub compared_bits: u64,
@@ -24,8 +24,8 @@ pub struct BoardFigures {
     pub differing_bits: u64,
     /// Ticks worked off.
     pub ticks: u64,
-    /// Instructions of a tick, interrupt entry and main loop included, median; `None`
-    /// where nobody counts them.
+    /// Instructions of a tick, interrupt entry and main loop included, median; `None` if they are not
+    /// counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tick_instructions_median: Option<u32>,
     /// The same, mean, rounded up.
@@ -37,7 +37,7 @@ pub struct BoardFigures {
     /// Most instructions between two sleeps, whatever caused them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub longest_awake_instructions: Option<u32>,
-    /// Deepest stack, bytes; `None` where it is not measured.
+    /// Deepest stack, bytes; `None` if it is not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack_used_bytes: Option<u32>,
     /// Room for the stack, bytes.
@@ -47,7 +47,7 @@ pub struct BoardFigures {
     pub resets: u16,
     /// Bytes that came late to the emulator.
     pub late_bytes: u32,
-    /// Frames that the emulator told of after their first byte.
+    /// Frames that the emulator reported after their first byte.
     pub late_frames: u32,
     /// Frames that did not leave whole: cut off by the driver's time limit, or not on the pins.
     pub cut_frames: u16,
@@ -104,7 +104,7 @@ impl BoardFigures {
     }
 }
 
-/// What a run with boards outside adds to the summary.
+/// Part of the summary about boards outside.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct PilSummary {
     /// Where each node ran, addresses 1 to 8.

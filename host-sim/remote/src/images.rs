@@ -1,5 +1,5 @@
-//! The images of boards outside, found and looked at before anything is started: one of
-//! another kind or interface would differ, or not answer, and nobody would know why.
+//! The images of boards outside, found and checked before anything is started: one of another kind or
+//! interface would differ, or not answer, and nobody would know why.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use super::unicorn::{self, IMAGES_VARIABLE};
 use crate::RemoteError;
 use wheeleg_interface::{Side, first_difference};
 
-/// Sources that the images would have if they were built from what this program was.
+/// Digest of the sources that images must have to match this program.
 const SOURCES_G431: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources-g431"));
 const SOURCES_QEMU: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources-qemu"));
 
@@ -27,8 +27,7 @@ pub(super) struct Image {
 /// The images of all nodes that run on emulated boards, one of each kind.
 ///
 /// # Errors
-/// [`RemoteError`]: an image is missing, says nothing of itself, or is of
-/// another kind or interface than is wanted.
+/// [`RemoteError`]: an image is missing, has no identity, or is not of the wanted kind or interface.
 pub(super) fn find(nodes: &Nodes) -> Result<Vec<Image>, RemoteError> {
     let mut images: Vec<Image> = Vec::new();
     for (node, place) in Node::ALL.into_iter().zip(&nodes.0) {
@@ -109,10 +108,10 @@ impl Image {
     }
 }
 
-/// For a run that is repeated natively and must then be the same to the bit: the images
-/// are of the sources of this program. What images of other sources do can be seen in a
-/// run without the repetition, in which every board is compared with the application
-/// here; but two programs that were never meant to be equal give no verdict.
+/// For a run that is repeated natively and must then be the same to the bit, checks that the images are built
+/// from this program's sources. Images of other sources can be examined in a run without the repetition, in
+/// which every board is compared with the application here; but two programs that were never meant to be
+/// equal allow no verdict.
 ///
 /// # Errors
 /// As [`find`]; [`RemoteError`] that names the image of other sources.

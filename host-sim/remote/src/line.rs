@@ -1,4 +1,4 @@
-//! Boards outside of this process, whatever they run on.
+//! Boards outside of this process, on any host.
 
 use wheeleg_remote_link::{Reply, Request};
 
@@ -8,7 +8,7 @@ use crate::RemoteError;
 /// One or several boards at the end of one stream. Requests are queued and
 /// sent together, so that boards can work at the same time.
 pub trait Line {
-    /// Who is at the other end, for messages.
+    /// Name of the other end, for messages.
     fn name(&self) -> String;
 
     /// Queues a request for the board with this index.
@@ -17,14 +17,14 @@ pub trait Line {
     /// [`RemoteError`] when the other end has gone.
     fn queue(&mut self, index: u8, request: &Request) -> Result<(), RemoteError>;
 
-    /// Sends what is queued.
+    /// Sends the queued requests.
     ///
     /// # Errors
     /// [`RemoteError`] when the other end has gone.
     fn flush(&mut self) -> Result<(), RemoteError>;
 
-    /// Waits for the next reply; gives the board's index with it. Replies of
-    /// one line come in the order of the requests.
+    /// Waits for the next reply; returns the board's index with it. Replies of one line come in the order of
+    /// the requests.
     ///
     /// # Errors
     /// [`RemoteError`] when the other end has gone or sends rubbish.
@@ -59,7 +59,7 @@ mod tests {
     use wheeleg_remote_link::frame::MAX_FRAME;
     use wheeleg_remote_link::{Deframer, encode};
 
-    /// A board that loses what comes while it owes an answer.
+    /// A board that loses bytes while it owes an answer.
     #[derive(Default)]
     struct OneAtATime {
         deframer: Deframer,

@@ -1,7 +1,7 @@
 //! A serial port with the robot's bus behind it.
 //!
-//! Nothing here waits: what is there is read, what the system takes at once is sent. A port that
-//! is lost is opened again, once in [`RETRY`].
+//! Nothing here waits: available bytes are read, and the system gets only as many as it takes at once. A lost
+//! port is opened again, once in [`RETRY`].
 
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
@@ -33,10 +33,10 @@ impl std::fmt::Debug for BusPort {
 }
 
 impl BusPort {
-    /// Opens the port for this program alone.
+    /// Opens the port for exclusive use.
     ///
     /// # Errors
-    /// [`RemoteError`]: another program has it, or what the operating system says.
+    /// [`RemoteError`]: another program has it, or the operating system's reason.
     pub fn open(options: &HilOptions) -> Result<Self, RemoteError> {
         Ok(Self {
             open: Some(open(options, Duration::ZERO)?),
@@ -52,7 +52,7 @@ impl BusPort {
         self.open.is_none().then_some(self.lost.as_str())
     }
 
-    /// What has come, up to the size of the buffer; nothing from a port that is lost.
+    /// Received bytes, up to the size of the buffer; none from a lost port.
     pub fn read(&mut self, buffer: &mut [u8]) -> usize {
         self.retry();
         let Some(port) = &mut self.open else {
@@ -67,7 +67,7 @@ impl BusPort {
         0
     }
 
-    /// Sends bytes. What the system does not take at once is lost, as on a cable that is cut.
+    /// Sends bytes. Those that the system does not take at once are lost, as on a cut cable.
     pub fn write(&mut self, bytes: &[u8]) {
         if let Some(port) = &mut self.open
             && let Err(e) = port.write_all(bytes)

@@ -1,4 +1,4 @@
-//! A serial port without hardware: what is at its other end is this program.
+//! A serial port without hardware: this program is at its other end.
 
 use std::io::{self, Read as _, Write as _};
 use std::time::Duration;
@@ -19,7 +19,7 @@ impl Pty {
     /// A new one.
     ///
     /// # Errors
-    /// [`RemoteError`] with what the operating system says.
+    /// [`RemoteError`] with the operating system's reason.
     pub fn open() -> Result<Self, RemoteError> {
         let failed = |e: serialport::Error| {
             RemoteError::new(
@@ -38,18 +38,18 @@ impl Pty {
         self.far.name().unwrap_or_default()
     }
 
-    /// What has come, up to the size of the buffer.
+    /// Received bytes, up to the size of the buffer.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The operating system's error.
     pub fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         idle(self.near.read(buffer))
     }
 
-    /// Sends bytes. What nobody reads at the far end is lost once the system has no more room.
+    /// Sends bytes. If nobody reads at the far end, they are lost once the system has no more room.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The operating system's error.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         idle(self.near.write_all(bytes).map(|()| bytes.len())).map(|_| ())
     }

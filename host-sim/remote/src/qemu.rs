@@ -66,16 +66,16 @@ pub struct QemuOptions {
     pub program: PathBuf,
     /// The image.
     pub image: PathBuf,
-    /// TCG plugin with its arguments, as after `-plugin`. `{n}` in it stands for
-    /// the image's name and a number of its own for every emulator of this program.
+    /// TCG plugin with its arguments, as after `-plugin`. `{n}` in it is replaced by the image's name and a
+    /// number unique to each emulator of this program.
     pub plugin: Option<String>,
     /// How long an answer may take.
     pub patience: Duration,
 }
 
 impl QemuOptions {
-    /// The emulator and the plugin of the environment, or the one on the path
-    /// and none, with `image`.
+    /// The emulator and the plugin from the environment, or the emulator on the path without a plugin, with
+    /// `image`.
     pub fn new(image: impl Into<PathBuf>) -> Self {
         let program = std::env::var_os(PROGRAM_VARIABLE);
         Self {
@@ -224,8 +224,8 @@ impl Qemu {
         lock(&self.child).id()
     }
 
-    /// Closes the pipe, upon which the image ends, and waits for the emulator.
-    /// Whatever it writes at its end (a plugin's result) is then written.
+    /// Closes the pipe, which ends the image, and waits for the emulator. Its final output (a plugin's
+    /// result) is then written.
     ///
     /// # Errors
     /// [`RemoteError`] if it does not end, or not well.
@@ -284,7 +284,7 @@ impl Qemu {
                 "what was logged up to here is complete; start the run again",
             )
         };
-        // What it said before it died has arrived by now, or soon.
+        // Its last output before it died has arrived by now, or soon.
         thread::sleep(Duration::from_millis(20));
         let said: Vec<String> = lock(&self.complaints).iter().cloned().collect();
         let said = if said.is_empty() {

@@ -1,9 +1,8 @@
 //! Boards outside of this process, in the place of native ones.
 //!
-//! Beside each of them the same application runs here, on the same inputs. It
-//! gives the internals that an image does not show, and it is what the board is
-//! compared with at every tick and for every frame. What moves the plant and
-//! what goes on the line comes from the board outside.
+//! Beside each of them the same application runs here, on the same inputs. It gives the internals that an
+//! image does not show, and is compared with the board at every tick and for every frame. The board outside
+//! moves the plant, and its frames go on the line.
 
 use std::cmp::Reverse;
 use std::collections::VecDeque;
@@ -47,7 +46,7 @@ struct Board {
     edge_ns: Option<u64>,
     /// Inputs of the newest edges that have not been compared.
     latched: VecDeque<(u64, Inputs)>,
-    /// Quadrature edges at which its counter stood at 0, of a wheel.
+    /// For a wheel, the quadrature edges at which its counter was 0.
     count_zero: i32,
     /// Sent here by the native application, there by the board.
     here: VecDeque<(u64, Vec<u8>)>,
@@ -55,11 +54,11 @@ struct Board {
     /// Time of the first tick after the newest start, ns; `None` while down.
     running_from_ns: Option<u64>,
     tripped: Option<Trip>,
-    /// First tick after a start that has not been told, ns.
+    /// First tick after a start, not reported yet, ns.
     started_ns: Option<u64>,
     power: Power,
     tick_instructions: Vec<u32>,
-    /// Frames that were told when others should have heard some of them.
+    /// Frames that were reported when others should already have heard some of them.
     late_frames: u32,
 }
 
@@ -73,16 +72,16 @@ pub struct RemoteBoards {
     by_node: [Option<usize>; 8],
     comparison: Comparison,
     requests: Vec<usize>,
-    /// The first difference has been told.
+    /// The first difference has been printed.
     printed: bool,
     /// Where boards run on cores of their own.
     cores: Option<Cores>,
 }
 
-/// Of eight boards, those that run on the simulator's core: it has enough to do itself.
+/// Number of boards, of eight, that run on the simulator's core: it is busy enough itself.
 const NEAR: usize = 4;
 
-/// The image of a board, among those that were found.
+/// The image of a board, among those found.
 fn image_of(images: &[Image], kind: &NodeKind, node: Node) -> Result<PathBuf, RemoteError> {
     let wanted = images::kind(kind, node);
     let found = images.iter().find(|image| Some(image.kind) == wanted);
@@ -117,7 +116,7 @@ impl RemoteBoards {
         };
         let images = images::find(nodes)?;
         images.iter().for_each(Image::warn);
-        // Before cores are chosen: a process inherits what its starter is bound to.
+        // Before cores are chosen: a process inherits the affinity of its starter.
         for (node, kind) in Node::ALL.into_iter().zip(&nodes.0) {
             match kind {
                 NodeKind::Sil | NodeKind::Pil => {}
@@ -145,13 +144,13 @@ impl RemoteBoards {
         Ok(Some(outside))
     }
 
-    /// Spreads the byte-identical images over two cores, where there are two.
+    /// Spreads the byte-identical images over two cores, if there are two.
     fn start_pil(&mut self, nodes: &Nodes, images: &[Image]) -> Result<(), RemoteError> {
         let all = Node::ALL.into_iter().zip(&nodes.0);
         let pil = all.filter(|(_, kind)| **kind == NodeKind::Pil);
         let mut pil: Vec<Node> = pil.map(|(node, _)| node).collect();
-        // The wheels are near: their edges come twice as often as the joints' and at
-        // the same instant, when nobody else has anything to do.
+        // The wheels are near: their edges come twice as often as the joints' and at the same instant, when
+        // nothing else is to be done.
         pil.sort_by_key(|node| node.is_joint());
         if pil.len() > NEAR {
             self.cores = Cores::choose();
@@ -286,15 +285,13 @@ impl RemoteBoards {
         self.boards[n].tripped.take()
     }
 
-    /// First tick of a board after a start that is known since the last
-    /// call, ns.
+    /// First tick of a board after a start that became known since the last call, ns.
     pub fn take_first_edge(&mut self, node: Node) -> Option<u64> {
         let n = self.number(node)?;
         self.boards[n].started_ns.take()
     }
 
-    /// The counter of a wheel board, if that is outside, stood at 0 at
-    /// `edges` quadrature edges.
+    /// The counter of a wheel board, if that is outside, was 0 at `edges` quadrature edges.
     pub fn counts_from(&mut self, node: Node, edges: i64) {
         if let Some(n) = self.number(node) {
             // The counter wraps, as the board's does.
@@ -330,7 +327,7 @@ impl RemoteBoards {
         heard.min().unwrap_or(u64::MAX)
     }
 
-    /// Queues a run of one board to `now_ns`, with what it has heard.
+    /// Queues a run of one board to `now_ns`, with the bytes that it has heard.
     fn queue(
         &mut self,
         number: usize,
@@ -350,7 +347,7 @@ impl RemoteBoards {
         for (end_ns, byte) in heard {
             let gap = !run.received.is_empty() && run.received_end_ns + byte_ns != *end_ns;
             if gap || run.received.len() == MAX_RECEIVED {
-                // What follows does not join on: an own run up to here.
+                // The next bytes do not follow on: a separate run up to here.
                 let part = Run {
                     until_ns: run.received_end_ns,
                     ..run.clone()
@@ -376,9 +373,8 @@ impl RemoteBoards {
         Ok(())
     }
 
-    /// Runs boards to `now_ns`: with an edge those that have inputs, to
-    /// the bare instant the others. `heard` gives what the board at an address has
-    /// heard after the instant named.
+    /// Runs boards to `now_ns`: those with inputs run an edge, the others only to that instant. `heard` gives
+    /// the bytes that the board at an address has heard after the given instant.
     ///
     /// # Errors
     /// [`RemoteError`] when a board stops.
@@ -410,7 +406,7 @@ impl RemoteBoards {
         self.requests = asked;
         if let (Some(first), false) = (&self.comparison.first, self.printed) {
             self.printed = true;
-            // Told at once: the run may end before its summary.
+            // Printed at once: the run may end before its summary.
             let _ = writeln!(std::io::stderr(), "a board differs from the host: {first}");
         }
         Ok(())
@@ -474,7 +470,7 @@ impl RemoteBoards {
         }
     }
 
-    /// What a board has scheduled to send since the last call.
+    /// Frames that a board has scheduled since the last call.
     pub fn take_frames(&mut self, node: Node) -> Vec<(u64, Vec<u8>)> {
         let Some(n) = self.number(node) else {
             return Vec::new();
@@ -500,7 +496,7 @@ impl RemoteBoards {
     fn finish(&mut self, now_ns: u64) {
         for board in &mut self.boards {
             while let Some((start, bytes)) = board.here.pop_front() {
-                // One that is due later need not stand ready yet.
+                // A frame that is due later need not be ready yet.
                 if start + 1_000_000 < now_ns {
                     let here = Some((start, bytes.as_slice()));
                     self.comparison.frame(start, board.node, here, None);

@@ -3,29 +3,25 @@
 //!
 //! # Pacing
 //!
-//! The simulator leads. Every tick is one request with the inputs latched at its
-//! edge and one reply with the outputs, and simulated time stands still until
-//! the reply is there. So a run gives the same bits at any speed of the port, and
-//! a slow port makes it slow, never wrong. Real time is no requirement: the board
-//! has no output that could move anything (its image says so when the session
-//! opens, and is refused otherwise).
+//! The simulator leads. Every tick is one request with the inputs latched at its edge and one reply with the
+//! outputs, and simulated time stands still until the reply is there. So a run gives the same bits at any
+//! speed of the port: a slow port makes it slow, never wrong. Real time is not required: the board has no
+//! output that could move anything (its image says so when the session opens, and is refused otherwise).
 //!
-//! What a real-time loop would show, overruns, is measured on the board itself:
-//! it times the work of each tick on its own clock and latches the fault of the
-//! application when a tick takes longer than its period. That fault is in the log.
+//! Overruns, which a real-time loop would show, are measured on the board itself: it times the work of each
+//! tick on its own clock and latches the fault of the application when a tick takes longer than its period.
+//! That fault is in the log.
 //!
 //! # Latency
 //!
-//! A round trip costs the time of about 30 + 60 bytes on the line (8 ms at
-//! 115 200 Bd, 1 ms at 1 MBd) and the latency of the USB bridge, 1 to 16 ms.
-//! One joint takes some 20 exchanges in a bus cycle of 10 ms: ten ticks and the
-//! frames that it hears. [`SerialLine::statistics`] tells what they took.
+//! A round trip costs the time of about 30 + 60 bytes on the line (8 ms at 115 200 Bd, 1 ms at 1 MBd) and the
+//! latency of the USB bridge, 1 to 16 ms. One joint takes some 20 exchanges in a bus cycle of 10 ms: ten
+//! ticks and the frames that it hears. [`SerialLine::statistics`] gives their times.
 //!
 //! # Loss
 //!
-//! A port that vanishes, or a board that stays silent longer than
-//! [`HilOptions::patience`], ends the run with an error; what was logged up to
-//! there is complete. The board waits for a new session, outputs nowhere.
+//! A port that vanishes, or a board that stays silent longer than [`HilOptions::patience`], ends the run with
+//! an error; the log up to there is complete. The board waits for a new session and has no outputs.
 
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
@@ -40,7 +36,7 @@ use crate::{Stream, Transport};
 const BAUD: u32 = 1_000_000;
 /// An exchange takes milliseconds; after this long the board has gone.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// How often a board is called before it is held to be absent.
+/// How often a board is called before it counts as absent.
 const CALLS: u32 = 3;
 
 /// A serial port with a bench board.
@@ -59,7 +55,7 @@ impl HilOptions {
     /// `/dev/ttyACM0@115200`.
     ///
     /// # Errors
-    /// [`RemoteError`]: no port, or a rate that is none.
+    /// [`RemoteError`]: no port, or an invalid rate.
     pub fn parse(text: &str) -> Result<Self, RemoteError> {
         let (port, baud) = match text.rsplit_once('@') {
             Some((port, baud)) => (port, baud.parse().ok()),
@@ -85,7 +81,7 @@ impl HilOptions {
 pub struct Statistics {
     /// Requests answered.
     pub exchanges: u64,
-    /// Time spent waiting for answers, all told.
+    /// Total time spent waiting for answers.
     pub waited: Duration,
     /// Longest wait.
     pub longest: Duration,
@@ -109,10 +105,10 @@ impl std::fmt::Debug for SerialLine {
 }
 
 impl SerialLine {
-    /// Opens the port for this program alone.
+    /// Opens the port for exclusive use.
     ///
     /// # Errors
-    /// [`RemoteError`] with what the operating system says.
+    /// [`RemoteError`] with the operating system's reason.
     pub fn open(options: &HilOptions) -> Result<Self, RemoteError> {
         Ok(Self {
             port: open(options, options.patience)?,
@@ -145,8 +141,8 @@ impl SerialLine {
     }
 }
 
-/// Opens a port for this program alone; reading and writing wait for at most `timeout`. It is locked,
-/// too: to root the former means nothing.
+/// Opens a port for exclusive use; reading and writing wait for at most `timeout`. It is also locked, since
+/// exclusive use means nothing to root.
 pub(crate) fn open(
     options: &HilOptions,
     timeout: Duration,
@@ -159,7 +155,7 @@ pub(crate) fn open(
              and that you may use it (group `dialout` on Debian)",
         )
     })?;
-    // What a former session left in the buffers belongs to nobody.
+    // Drop the rest of an earlier session in the buffers.
     let _ = port.clear(ClearBuffer::All);
     Ok(port)
 }
@@ -183,7 +179,7 @@ impl Stream for SerialLine {
                 Err(e) => return Err(self.lost(&e)),
             }
         };
-        // A frame ends with a zero, and there is none inside.
+        // A frame ends with a zero and contains no other.
         if buffer[..count].contains(&0)
             && let Some(asked) = self.asked.take()
         {
@@ -212,8 +208,8 @@ pub fn connect(
         if answer.is_ok() {
             break;
         }
-        // The first call may have met the rest of a former session. The port
-        // is opened anew, which drops what is still under way.
+        // The first call may have met the rest of an earlier session. Opening the port again drops what is
+        // still under way.
         answer = call(options)?;
     }
     let (transport, hello) = answer.map_err(|e| {

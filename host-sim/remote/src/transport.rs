@@ -7,10 +7,9 @@ use wheeleg_remote_link::{Deframer, FrameError, Hello, LINK_VERSION, Reply, Requ
 
 use crate::RemoteError;
 
-/// A stream of bytes to one board. It knows what it is connected to and says
-/// so in its errors.
+/// A stream of bytes to one board. It knows the other end and names it in its errors.
 pub trait Stream {
-    /// Who is at the other end, for messages: "QEMU (qemu-joint)".
+    /// Name of the other end, for messages: "QEMU (qemu-joint)".
     fn name(&self) -> String;
 
     /// Sends all bytes.
@@ -19,7 +18,7 @@ pub trait Stream {
     /// [`RemoteError`] when the other end has gone.
     fn send(&mut self, bytes: &[u8]) -> Result<(), RemoteError>;
 
-    /// Waits for bytes; gives how many came, at least one.
+    /// Waits for bytes; returns their number, at least one.
     ///
     /// # Errors
     /// [`RemoteError`] when the other end has gone or stays silent for too long.
@@ -52,13 +51,13 @@ pub struct Transport<S> {
     unread: std::ops::Range<usize>,
     /// Requests without a reply, the oldest first: whether each is a greeting.
     waiting: VecDeque<bool>,
-    /// Requests that wait for the reply to the one before: a board that answers keeps
-    /// no more than a few bytes of the next.
+    /// Requests that wait for the reply to the one before: a board that is answering keeps only a few bytes
+    /// of the next.
     queued: VecDeque<Request>,
 }
 
 impl<S: Stream> Transport<S> {
-    /// Nothing said yet.
+    /// Nothing exchanged yet.
     pub fn new(stream: S) -> Self {
         Self {
             stream,
@@ -70,7 +69,7 @@ impl<S: Stream> Transport<S> {
         }
     }
 
-    /// Who is at the other end.
+    /// Name of the other end.
     pub fn name(&self) -> String {
         self.stream.name()
     }
@@ -90,7 +89,7 @@ impl<S: Stream> Transport<S> {
     /// # Errors
     /// [`RemoteError`]: no answer, another version, no such board.
     pub fn hello(&mut self) -> Result<Hello, RemoteError> {
-        // Ends whatever a former simulator left half sent.
+        // Ends a half-sent frame of an earlier simulator.
         self.stream.send(&[0])?;
         let version = LINK_VERSION;
         match self.ask(&Request::Hello { version })? {
@@ -121,8 +120,8 @@ impl<S: Stream> Transport<S> {
         Ok(())
     }
 
-    /// Waits for the reply to the oldest request. A greeting that nobody waits for is the late
-    /// answer to a call that was given up; it is passed over.
+    /// Waits for the reply to the oldest request. A greeting that nobody waits for is the late answer to an
+    /// abandoned call; it is skipped.
     ///
     /// # Errors
     /// [`RemoteError`] when the board has gone, stays silent or sends rubbish.
@@ -148,7 +147,7 @@ impl<S: Stream> Transport<S> {
         }
     }
 
-    /// Queues a request behind those that have no reply yet.
+    /// Queues a request behind those without a reply yet.
     pub(super) fn queue(&mut self, request: &Request) {
         self.queued.push_back(request.clone());
     }
@@ -217,7 +216,7 @@ mod tests {
     use super::*;
     use wheeleg_remote_link::Image;
 
-    /// Says what it was told to, whatever it hears.
+    /// Gives its prepared answers, whatever it hears.
     struct Canned(VecDeque<Vec<u8>>);
 
     impl Stream for Canned {
@@ -236,7 +235,7 @@ mod tests {
         }
     }
 
-    /// On a slow line the greeting of a call that was given up comes behind that of the next.
+    /// On a slow line the greeting of an abandoned call comes after that of the next.
     #[test]
     fn a_late_greeting_is_no_answer() {
         let hello = Reply::Hello(Hello {
@@ -256,7 +255,7 @@ mod tests {
         let mut transport = Transport::new(Canned(said.into()));
         assert!(transport.hello().is_ok());
         assert_eq!(transport.ask(&Request::Bye).ok(), Some(Reply::Done));
-        // A session may be opened anew, by anybody.
+        // Anybody may open a new session.
         let version = LINK_VERSION;
         let answer = transport.ask(&Request::Hello { version });
         assert_eq!(answer.ok(), Some(hello));

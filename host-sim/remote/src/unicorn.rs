@@ -1,5 +1,5 @@
-//! Emulated STM32G431 boards: the program `wheeleg-pil-unicorn`, which stands
-//! under another licence and is therefore found and started, never linked.
+//! Emulated STM32G431 boards: the program `wheeleg-pil-unicorn`, which has another licence and is therefore
+//! found and started, never linked.
 
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -23,11 +23,10 @@ pub const IMAGES_VARIABLE: &str = "WHEELEG_IMAGES";
 /// Where images lie below a target folder: as `cargo xtask firmware` lays them
 /// down, and as cargo builds them.
 const FOLDERS: [&str; 2] = ["firmware", "thumbv7em-none-eabi/firmware"];
-/// What builds program and images.
+/// How to build program and images.
 const BUILD: &str = "build the emulator and the images with: cargo xtask pil --build";
 
-/// Folders in which built things may lie: beside this program, and the target
-/// folders above it.
+/// Folders that may hold the built files: beside this program, and the target folders above it.
 fn places() -> Vec<PathBuf> {
     let mut places = Vec::new();
     if let Ok(here) = std::env::current_exe() {
@@ -102,9 +101,9 @@ pub fn image(name: &str) -> Result<PathBuf, RemoteError> {
 /// Where a process of emulated boards runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// On the simulator's core, or anywhere: whoever waits sleeps.
+    /// On the simulator's core, or anywhere: the side that waits sleeps.
     Near,
-    /// On a core of its own: who waits for the other stays awake for a while.
+    /// On a core of its own: the side that waits for the other stays awake for a while.
     Far,
 }
 

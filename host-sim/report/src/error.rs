@@ -1,4 +1,4 @@
-//! What can go wrong with a page, a figure or the folder that they go to.
+//! Errors of pages, figures and the folder that they go to.
 
 use std::path::PathBuf;
 
@@ -15,11 +15,11 @@ pub enum ReportError {
         help("choose another place with --out, or make this one writable")
     )]
     Output {
-        /// What was tried, for example "create the folder".
+        /// The attempted action, for example "create the folder".
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's reason.
         reason: std::io::Error,
     },
 
@@ -34,11 +34,11 @@ pub enum ReportError {
         folder: PathBuf,
         /// Its lock file.
         lock: PathBuf,
-        /// What the lock file says of who holds it.
+        /// The holder, as named in the lock file.
         holder: String,
     },
 
-    /// A result would take the place of a file that the command reads.
+    /// A result would overwrite a file that the command reads.
     #[error("`{}` is an input, and the result `{}` would take its place", input.display(), result.display())]
     #[diagnostic(
         code(wheeleg::output),
@@ -60,11 +60,11 @@ pub enum ReportError {
     Plot {
         /// Name of the figure.
         figure: String,
-        /// What the library said.
+        /// The library's reason.
         reason: String,
     },
 
-    /// A picture was asked for in a format that this program cannot write.
+    /// A picture was requested in a format that this program cannot write.
     #[error("`--png`: this program was built without PNG")]
     #[diagnostic(
         code(wheeleg::png),

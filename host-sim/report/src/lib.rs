@@ -1,5 +1,5 @@
-//! What every result page is made of: charts ([`plot`]), the page's frame, tables beside the
-//! pictures, the folder that they go to ([`output`]) and its names ([`results`]), and statistics ([`stats`]).
+//! Parts of every result page: charts ([`plot`]), the page's frame, tables beside the pictures, the folder
+//! that they go to ([`output`]) and its names ([`results`]), and statistics ([`stats`]).
 //!
 //! # Glossary
 //!

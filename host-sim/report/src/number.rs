@@ -3,7 +3,7 @@
 
 use minijinja::{Environment, Error, ErrorKind, Value};
 
-/// Stands where there is no number.
+/// Printed if there is no number.
 pub const DASH: &str = "–";
 
 /// `value` with `digits` decimals.
@@ -22,7 +22,7 @@ pub fn or_dash(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| DASH.to_owned(), |value| fixed(value, digits))
 }
 
-/// A difference: always with its sign, but on zero.
+/// A difference: always with its sign, except for zero.
 #[must_use]
 pub fn signed(value: f64, digits: usize) -> String {
     let text = fixed(value, digits);
@@ -34,7 +34,7 @@ pub fn signed(value: f64, digits: usize) -> String {
     }
 }
 
-/// At most `digits` decimals, none of them a zero at the end.
+/// At most `digits` decimals, without trailing zeros.
 #[must_use]
 pub fn trimmed(value: f64, digits: usize) -> String {
     let text = fixed(value, digits);
@@ -97,8 +97,8 @@ pub fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
 
-/// Makes a filter of a formatter: what is there is formatted, none is the word given
-/// to the filter, else a dash. A name that nobody has is an error.
+/// Makes a filter of a formatter: a value is formatted; without one the filter gives its word, or else a
+/// dash. An unknown name is an error.
 fn filter(
     value: &Value,
     none: Option<String>,

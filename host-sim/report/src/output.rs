@@ -1,15 +1,14 @@
 //! The folder of a run's results.
 //!
-//! New results never mix with old ones: what stands where they go is set aside
-//! in `previous`, or `previous-2` and so on where that is taken. Nothing is
-//! deleted, and files with other names stay untouched.
+//! New results never mix with old ones: existing results in their place are set aside in `previous`, or
+//! `previous-2` and so on if that is taken. Nothing is deleted, and files with other names stay untouched.
 //!
-//! A run that ends without a result leaves nothing: the folder that it made goes, and what it set
-//! aside comes back.
+//! A run that ends without a result leaves nothing: the folder that it made is removed, and the results that
+//! it set aside come back.
 //!
-//! A run holds its folder ([`Folder`]) until it is done, so that a second run at the same
-//! time cannot move the results of the first from under it. The lock is the operating
-//! system's, on the file `.lock`: it ends with the process, however that ends.
+//! A run holds its folder ([`Folder`]) until it is done, so that a second run at the same time cannot move
+//! its results away. It uses the operating system's lock, on the file `.lock`: the lock ends with the
+//! process, however that ends.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read as _, Seek as _, Write as _};
@@ -19,16 +18,16 @@ use crate::{ReportError, results};
 
 /// The file that a run holds while it writes into a folder.
 const LOCK: &str = ".lock";
-/// Where the results of the run before stay.
+/// Where earlier results are kept.
 const PREVIOUS: &str = "previous";
 
-/// All results of a kind of run that writes `also`, too.
+/// All results of a kind of run that also writes `also`.
 fn results(also: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
     results::ALL.into_iter().chain(also.iter().copied())
 }
 
-/// The result that has the place of a file in a folder, or of the folder that the file is in: a run
-/// that reads the file may not write there.
+/// The result that would overwrite a file in a folder, or the folder of that file: a run that reads the file
+/// may not write there.
 fn result_in_place_of(
     file: &Path,
     folder: &Path,
@@ -41,14 +40,14 @@ fn result_in_place_of(
     })
 }
 
-/// Whether two paths lead to one file that there is.
+/// Whether two paths lead to the same existing file.
 #[must_use]
 pub fn same_file(one: &Path, other: &Path) -> bool {
     let real = |path: &Path| path.canonicalize().ok();
     real(one).is_some_and(|one| real(other) == Some(one))
 }
 
-/// Refuses a file to write that is one of those that are read.
+/// Refuses an output file that is one of the inputs.
 ///
 /// # Errors
 /// [`ReportError::InPlaceOfInput`] with both paths.
@@ -62,14 +61,14 @@ pub fn ensure_no_input(out: &Path, reads: &[&Path]) -> Result<(), ReportError> {
     }
 }
 
-/// Whether something stands at this path, also a link that leads nowhere: what is written to it would
-/// go wherever it leads.
+/// Whether something is at this path, even a link that leads nowhere: output written to it would go to
+/// wherever it leads.
 #[must_use]
 pub fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// The first of `previous`, `previous-2`, … at whose `place` nothing is.
+/// The first of `previous`, `previous-2`, … whose `place` is free.
 #[must_use]
 pub fn free_place(place: impl Fn(&str) -> PathBuf) -> PathBuf {
     let numbered = (2_u32..).map(|n| format!("{PREVIOUS}-{n}"));
@@ -80,28 +79,28 @@ pub fn free_place(place: impl Fn(&str) -> PathBuf) -> PathBuf {
         .unwrap_or_else(|| place(PREVIOUS))
 }
 
-/// The folder of the results of a run that is under way. Nobody else gets it until this is
-/// dropped.
+/// The folder for the results of a running command. Nobody else gets it until this is dropped.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// Names of results beside those that every run has.
+    /// Names of results in addition to those of every run.
     also: &'static [&'static str],
-    /// Folders that were not there before, the innermost first.
+    /// Folders that it created, the innermost first.
     made: Vec<PathBuf>,
-    /// Where the results of the run before went.
+    /// Where the earlier results went.
     previous: Option<PathBuf>,
     /// Locked while it is open.
     _lock: File,
 }
 
 impl Folder {
-    /// Creates the folder, or sets aside the results in it, and holds it. `also` are the names of
-    /// results that only this kind of run has, `reads` the files that it reads: they stay where they are.
+    /// Creates the folder, or sets aside the results in it, and holds it. `also` are names of results that
+    /// only this kind of run has, `reads` its input files: they stay where they are.
     ///
     /// # Errors
-    /// [`ReportError::InPlaceOfInput`] if a result has the place of such a file, [`ReportError::InUse`] if another run holds it, [`ReportError::Output`] if a folder or
-    /// its lock cannot be created or a result not moved.
+    /// [`ReportError::InPlaceOfInput`] if a result would overwrite such a file, [`ReportError::InUse`] if
+    /// another run holds the folder, [`ReportError::Output`] if a folder or its lock cannot be created or a
+    /// result not moved.
     pub fn prepare(
         path: &Path,
         also: &'static [&'static str],
@@ -133,7 +132,7 @@ impl Folder {
         })
     }
 
-    /// Where it is.
+    /// Its path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -141,7 +140,7 @@ impl Folder {
 }
 
 impl Drop for Folder {
-    /// Of a run that has written nothing, nothing is left.
+    /// A run that has written nothing leaves nothing.
     fn drop(&mut self) {
         if results(self.also).any(|name| is_there(&self.path.join(name))) {
             return;
@@ -150,25 +149,25 @@ impl Drop for Folder {
             let all: Vec<&str> = results(self.also).collect();
             bring_back(&self.path, previous, &all);
         } else if !self.made.is_empty() {
-            // It is still locked; who has opened it meanwhile finds another file in its place.
+            // It is still locked; a process that has opened it meanwhile finds another file in its place.
             let _ = std::fs::remove_file(self.path.join(LOCK));
             remove_empty(&self.made);
         }
     }
 }
 
-/// Removes folders as far as they are empty, the innermost first.
+/// Removes empty folders, the innermost first.
 fn remove_empty(folders: &[PathBuf]) {
     for folder in folders {
-        // One that holds something stays.
+        // A folder with contents stays.
         let _ = std::fs::remove_dir(folder);
     }
 }
 
-/// Begin of what stands in a lock.
+/// Start of the text in a lock file.
 const HOLDER: &str = "process ";
 
-/// Opens the lock file and locks it; who holds it stands in it, for the message to others.
+/// Opens the lock file, locks it and writes its holder into it, for the message to others.
 fn lock(path: &Path) -> Result<File, ReportError> {
     let failed = |e: std::io::Error| ReportError::output("lock", path, e);
     let foreign = |what: &str| {
@@ -177,7 +176,7 @@ fn lock(path: &Path) -> Result<File, ReportError> {
         )))
     };
     let open = || {
-        // What a link leads to belongs to somebody else, and a pipe would be waited for.
+        // A link may lead to another user's file, and opening a pipe would block.
         if let Ok(about) = std::fs::symlink_metadata(path)
             && !about.is_file()
         {
@@ -223,7 +222,7 @@ fn lock(path: &Path) -> Result<File, ReportError> {
     Ok(file)
 }
 
-/// Who holds a lock, and for how long, in words.
+/// The holder of a lock, and for how long, in words.
 fn holder(lock: &mut File) -> String {
     let mut text = String::new();
     let name = match lock.read_to_string(&mut text) {
@@ -237,13 +236,13 @@ fn holder(lock: &mut File) -> String {
     }
 }
 
-/// Locks a file for this process alone; false if another holds it.
+/// Locks a file for this process only; false if another holds it.
 #[cfg(unix)]
 fn take(file: &File) -> std::io::Result<bool> {
     use rustix::fs::{FlockOperation, flock};
     use rustix::io::Errno;
     match flock(file, FlockOperation::NonBlockingLockExclusive) {
-        // A file system without locks is written to as before there were any.
+        // A file system without locks is written to without one.
         Ok(()) | Err(Errno::NOTSUP | Errno::NOLCK | Errno::NOSYS) => Ok(true),
         Err(Errno::WOULDBLOCK) => Ok(false),
         Err(e) => Err(e.into()),
@@ -271,7 +270,7 @@ fn take(_: &File) -> std::io::Result<bool> {
     Ok(true)
 }
 
-/// Moves results back to where they were set aside from; what is not there does not come back.
+/// Moves results back from where they were set aside; missing ones are skipped.
 fn bring_back(folder: &Path, previous: &Path, names: &[&str]) {
     for name in names {
         let _ = std::fs::rename(previous.join(name), folder.join(name));
@@ -279,7 +278,7 @@ fn bring_back(folder: &Path, previous: &Path, names: &[&str]) {
     let _ = std::fs::remove_dir(previous);
 }
 
-/// Moves the results in a folder to the next free `previous`, if there are any; where they are.
+/// Moves the results in a folder to the next free `previous`, if there are any; returns their place.
 fn set_aside(folder: &Path, also: &'static [&'static str]) -> Result<Option<PathBuf>, ReportError> {
     let old: Vec<&str> = results(also)
         .filter(|name| is_there(&folder.join(name)))
@@ -344,7 +343,7 @@ mod tests {
         assert!(previous.join("figures/event.png").exists());
         assert!(folder.join("notes.txt").exists());
 
-        // Every run is kept, each in a place of its own.
+        // Every run is kept, each in its own place.
         run(2, "other.png");
         prepare().expect("set aside");
         let second = folder.join("previous-2");
@@ -380,7 +379,7 @@ mod tests {
             "{said}"
         );
         assert!(!folder.join("previous").exists());
-        // A lock that nobody holds any more is none, whatever the file says.
+        // A lock without a holder does not count, whatever the file says.
         drop(first);
         assert!(folder.join(LOCK).exists());
         let _second = Folder::prepare(folder, &[], &[]).expect("free again");
@@ -394,7 +393,7 @@ mod tests {
         drop(Folder::prepare(&folder, &[], &[]).expect("prepared"));
         assert!(!temporary.path().join("runs").exists());
 
-        // A folder of somebody else's stays, with what is in it.
+        // Somebody else's folder stays, with its contents.
         fs::create_dir_all(&folder).expect("created");
         fs::write(folder.join("notes.txt"), "mine").expect("written");
         fs::write(folder.join("summary.json"), "earlier").expect("written");
@@ -405,7 +404,7 @@ mod tests {
         assert_eq!(kept.expect("it came back"), "earlier");
         assert!(folder.join("notes.txt").exists() && !folder.join("previous").exists());
 
-        // With a result all stays where it went.
+        // With a result, everything stays where it went.
         let held = Folder::prepare(&folder, &[], &[]).expect("prepared");
         fs::write(folder.join("log.mcap"), "new").expect("written");
         drop(held);
@@ -500,7 +499,7 @@ mod tests {
         let other = temporary.path().join("other");
         let elsewhere = result_in_place_of(&folder.join("axis.toml"), &other, also);
         assert_eq!(elsewhere, None);
-        // Whoever reads such a file gets no folder, and nothing is moved.
+        // A path to such a file gives no folder, and nothing is moved.
         fs::write(folder.join("summary.json"), "earlier").expect("written");
         let input = folder.join("figures/mine.toml");
         let refused = Folder::prepare(&folder, &[], &[Path::new("none"), &input]);

@@ -8,11 +8,10 @@ use crate::plain::acts_in_lines;
 use crate::plot::{Figure, PanelData};
 use crate::{ReportError, number, script};
 
-/// A page of the program from its own template, which extends `base.html`: frame,
-/// style sheet and figures are the same on all of them, and numbers are formatted there
-/// by the filters of [`number`]. A value that a template prints or goes through and
-/// nobody gives is an error, not an empty place; `if` may ask. What a text of somebody else's would
-/// tell a reader to do is taken out ([`acts_in_lines`]).
+/// A page of the program from its own template, which extends `base.html`: frame, style sheet and figures are
+/// the same on all of them, and the filters of [`number`] format numbers. A missing value that a template
+/// prints or loops over is an error, not an empty place; `if` may ask for it. Control characters in foreign
+/// texts are taken out ([`acts_in_lines`]).
 ///
 /// # Errors
 /// [`ReportError::Template`] if the template does not fit its values.
@@ -33,7 +32,7 @@ pub fn page(template: &str, values: impl Serialize) -> Result<String, ReportErro
     Ok(text.replace(acts_in_lines, "\u{fffd}"))
 }
 
-/// A text in which what stands between backticks is code.
+/// A text whose parts between backticks are code.
 fn code(text: &str) -> String {
     let mut out = String::new();
     for (i, part) in text.split('`').enumerate() {
@@ -67,8 +66,8 @@ struct PanelPicture {
     data: Option<String>,
 }
 
-/// Figures for a template. Their SVG text is what the files have; a page shows every panel with
-/// an axis of its own.
+/// Figures for a template. Their SVG text is as in the files; a page shows every panel with an axis of its
+/// own.
 pub fn pictures(figures: &[(Figure, String)]) -> Vec<Picture<'_>> {
     let pictures = figures.iter().map(|(figure, _)| Picture {
         id: &figure.id,
@@ -87,7 +86,7 @@ pub fn pictures(figures: &[(Figure, String)]) -> Vec<Picture<'_>> {
     pictures.collect()
 }
 
-/// A value as JSON that can stand in a `script` element: nothing in it ends the element.
+/// A value as JSON for a `script` element: nothing in it ends the element.
 ///
 /// # Panics
 /// If the value cannot be JSON, as a map whose keys are not texts.

@@ -1,7 +1,7 @@
-//! Texts of somebody else's, as they can be shown.
+//! Foreign texts, made safe to show.
 
-/// A text of somebody else's, without what would tell a terminal or a page to do something: control
-/// characters, and those that turn the direction of a text, become `�`.
+/// A foreign text, safe for a terminal or a page: control characters, and those that change the direction of
+/// a text, become `�`.
 #[must_use]
 pub fn plain(text: &str) -> String {
     text.chars()
@@ -15,7 +15,7 @@ pub fn plain(text: &str) -> String {
         .collect()
 }
 
-/// Whether a terminal or a page does something other than to show this character.
+/// Whether a terminal or a page acts on this character instead of showing it.
 #[must_use]
 pub fn acts(c: char) -> bool {
     let turns =
@@ -23,7 +23,7 @@ pub fn acts(c: char) -> bool {
     c.is_control() || turns
 }
 
-/// The same of a text of several lines, which ends of lines and tabs belong to.
+/// The same for a text of several lines, in which line ends and tabs are kept.
 #[must_use]
 pub fn acts_in_lines(c: char) -> bool {
     acts(c) && !matches!(c, '\n' | '\t')

@@ -1,14 +1,14 @@
-//! Names of the files and folders that a study writes into its folder, and of what other commands
-//! make of its log beside it. Whoever writes one, reads one or moves them all takes the name here.
+//! Names of the files and folders that a study writes into its folder, and of those that other commands make
+//! from its log. All code that writes, reads or moves them takes the names here.
 
 /// The recording.
 pub const LOG: &str = "log.mcap";
-/// What came of the study, as JSON.
+/// The result of the study, as JSON.
 pub const SUMMARY: &str = "summary.json";
 /// The report.
 pub const REPORT: &str = "report.html";
 /// Parameters of a board (`wheeleg tune`). A tuning that was stopped writes none, because not all of its
-/// tests were played, nor does one that made a move worse.
+/// tests were run, nor does one that made a move worse.
 pub const BOARD_PARAMETERS: &str = "node-parameters.toml";
 /// Folder of tables.
 pub const CSV: &str = "csv";
@@ -48,7 +48,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
-    /// Those that are made from the name of the log are made from this one.
+    /// Names derived from the log's name come from this one.
     #[test]
     fn what_is_made_of_the_log_is_among_them() {
         let log = Path::new(LOG);

@@ -1,10 +1,10 @@
-//! The modules of the page as one script, for a report that has everything in its one file.
+//! The modules of the page as one script, for a report in a single file.
 //!
-//! Modules in a file that was opened from a disk cannot import each other, so they are joined:
-//! each in its order, without its imports and the word `export`. `page/` is written so that this
-//! is enough: an import is one line, nothing is renamed, and no name is given twice.
+//! Modules in a file opened from a disk cannot import each other, so they are joined: each in its order,
+//! without its imports and the word `export`. `page/` is written so that this is enough: an import is one
+//! line, nothing is renamed, and no name is used twice.
 
-/// Modules in the order in which they need each other.
+/// Modules in the order of their dependencies.
 const MODULES: [(&str, &str); 11] = [
     ("dom.js", include_str!("../page/dom.js")),
     ("signal.js", include_str!("../page/signal.js")),

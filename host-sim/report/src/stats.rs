@@ -1,8 +1,8 @@
 //! Statistics, defined once for every study.
 //!
-//! A quantile is that of Hyndman and Fan's type 7 (the default of R, NumPy and Excel): the
-//! sorted values stand at equal distances from share 0 to share 1, and between two of them it
-//! is interpolated. So the median of an even number of values is the mean of the middle two.
+//! Quantiles are of Hyndman and Fan's type 7 (the default of R, NumPy and Excel): the sorted values are at
+//! equal distances from share 0 to share 1, with linear interpolation between them. So the median of an even
+//! number of values is the mean of the middle two.
 
 mod binomial;
 mod rank;
@@ -14,7 +14,7 @@ pub use binomial::{
 pub use rank::spearman;
 pub use resample::bootstrap;
 
-/// Quantile of a share from 0 to 1; `None` of no values. Not a number sorts last.
+/// Quantile of a share from 0 to 1; `None` without values. Not a number sorts last.
 ///
 /// # Panics
 /// If `share` is not from 0 to 1.
@@ -30,8 +30,8 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     Some(low + (high - low) * at.fract())
 }
 
-/// A quantile with its upper bound, one-sided 95 %, whatever the distribution is: the order statistic that the quantile
-/// does not exceed. `None` where there are too few values for either.
+/// A quantile with its upper bound, one-sided 95 %, for any distribution: the order statistic that the
+/// quantile does not exceed. `None` if there are too few values for either.
 #[must_use]
 pub fn bounded_quantile(values: &[f64], share: f64) -> [Option<f64>; 2] {
     let mut sorted = values.to_vec();
@@ -41,27 +41,26 @@ pub fn bounded_quantile(values: &[f64], share: f64) -> [Option<f64>; 2] {
     [quantile(values, share), bound]
 }
 
-/// Median; `None` of no values.
+/// Median; `None` without values.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Arithmetic mean; `None` of no values.
+/// Arithmetic mean; `None` without values.
 #[must_use]
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Largest value; `None` of no values.
+/// Largest value; `None` without values.
 #[must_use]
 pub fn largest(values: &[f64]) -> Option<f64> {
     values.iter().copied().reduce(f64::max)
 }
 
-/// Upper bound of a failure probability after `failures` in `trials`: one-sided 95 %, exact
-/// (Clopper and Pearson 1934): the p at which so few failures have a probability of 5 %. 1 of no
-/// trials.
+/// Upper bound of a failure probability after `failures` in `trials`: one-sided 95 %, exact (Clopper and
+/// Pearson 1934): the p at which this few failures have a probability of 5 %. 1 without trials.
 ///
 /// # Panics
 /// If there are more failures than trials.
@@ -110,7 +109,7 @@ mod tests {
         assert_eq!((mean(&values), largest(&values)), (Some(2.5), Some(4.0)));
     }
 
-    /// 0.99^299 < 5 % < 0.99^298, and 0.999^2995 < 5 %: from so many values on the largest bounds the quantile.
+    /// 0.99^299 < 5 % < 0.99^298, and 0.999^2995 < 5 %: then the largest value bounds the quantile.
     #[test]
     fn a_quantile_is_bounded_by_an_order_statistic() {
         let bound = |n: u32, share: f64| {

@@ -1,4 +1,4 @@
-//! Numbers behind a picture as CSV.
+//! Numbers of a picture as CSV.
 
 use std::path::Path;
 

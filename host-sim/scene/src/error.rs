@@ -1,4 +1,4 @@
-//! What can go wrong with the tree of the robot.
+//! Errors of the robot's tree.
 
 use miette::Diagnostic;
 use thiserror::Error;
@@ -17,7 +17,7 @@ pub enum SceneError {
     Leg {
         /// Left or right.
         side: &'static str,
-        /// What does not close.
+        /// Which loop does not close.
         reason: String,
     },
 

@@ -1,4 +1,4 @@
-//! Where every link is, and where every joint stands.
+//! Poses of all links, and positions of all joints.
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use wheeleg_config::RobotConfig;
@@ -21,9 +21,9 @@ pub(super) struct Pose {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct JointState {
     pub(super) position: f64,
-    /// None where nobody measures it.
+    /// None if it is not measured.
     pub(super) velocity: Option<f64>,
-    /// Force or torque of the drive; none where nothing drives.
+    /// Force or torque of the drive; none without a drive.
     pub(super) effort: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ pub(super) struct Frames {
     legs: [Leg; 2],
 }
 
-/// Length of the two other cylinders where they do not matter, m.
+/// Length of the two other cylinders when they do not matter, m.
 const ANY_M: f64 = 0.1;
 
 impl Leg {
@@ -90,7 +90,7 @@ impl Leg {
         })
     }
 
-    /// The yaw mechanism at a stroke; as before where its loop does not close.
+    /// The yaw mechanism at a stroke; unchanged if its loop does not close.
     fn follow(&mut self, yaw: &JointState) {
         let lengths = LegLengths::new(self.zero_m + yaw.position, ANY_M, ANY_M);
         let Ok(posture) = self.geometry.posture(&lengths) else {

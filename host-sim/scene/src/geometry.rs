@@ -17,7 +17,7 @@ pub(super) enum Solid {
 /// A solid on a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shape {
-    /// What it is.
+    /// Its shape.
     pub(super) solid: Solid,
     /// Its middle in the link frame (m).
     pub(super) xyz: [f64; 3],
@@ -60,7 +60,7 @@ pub(super) enum Motion {
         /// N m s/rad.
         damping: f64,
     },
-    /// About an axis between two angles (rad); nobody drives it.
+    /// About an axis between two angles (rad); not driven.
     Revolute {
         /// rad.
         lower: f64,
@@ -84,7 +84,7 @@ pub(super) enum Motion {
     },
 }
 
-/// What moves a joint.
+/// Drive of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Source {
     /// Nothing.

@@ -18,7 +18,7 @@ const HARD: Colour = [0.62, 0.62, 0.60, 1.0];
 const SOFT: Colour = [0.72, 0.62, 0.45, 1.0];
 const LINES: Colour = [0.35, 0.35, 0.35, 0.6];
 
-/// What a part is made of, in a word.
+/// Material of a part, in a word.
 pub(super) fn material(part: &Part) -> String {
     match (&part.material.soil, &part.shape) {
         (Some(soil), _) => {
@@ -51,7 +51,7 @@ pub(super) fn write(out: &mut Vec<u8>, t_ns: u64, terrain: &Terrain, world: &str
                 let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
                     .map(|[x, y]| at(x * PLANE_M, y * PLANE_M));
                 entity.triangles(&corners, &[0, 1, 2, 0, 2, 3], colour);
-                // Without lines nobody sees the robot move.
+                // Without lines the robot's motion would be invisible.
                 let metres = (-PLANE_M as i32..=PLANE_M as i32).map(f64::from);
                 let lines: Vec<_> = metres
                     .flat_map(|m| {

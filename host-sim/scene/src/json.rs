@@ -5,7 +5,7 @@ use wheeleg_telemetry::push_fixed;
 
 /// Digits after the point of lengths in a picture that is drawn once, m.
 pub(super) const ONCE: u8 = 4;
-/// The same of one that is drawn over and over.
+/// The same for an entity that is drawn over and over.
 pub(super) const OFTEN: u8 = 3;
 
 /// Red, green, blue, opacity.
@@ -31,7 +31,7 @@ fn put_point(out: &mut Vec<u8>, v: &Vector3<f64>, decimals: u8) {
     put(out, "}");
 }
 
-/// `"key":{"x":…,"y":…,"z":…,"w":…}`, the one of both signs with w ≥ 0.
+/// `"key":{"x":…,"y":…,"z":…,"w":…}`, with the sign for which w ≥ 0.
 pub(super) fn put_quaternion(out: &mut Vec<u8>, key: &str, q: &Quaternion<f64>, decimals: u8) {
     put(out, "\"");
     put(out, key);
@@ -104,7 +104,7 @@ impl Entity {
         array
     }
 
-    /// A line for the eye, shown where the entity is selected.
+    /// A line of text, shown when the entity is selected.
     pub(super) fn tell(&mut self, key: &str, value: &str) {
         let out = self.next(0);
         put(out, "\"key\":");
@@ -117,7 +117,7 @@ impl Entity {
     /// An arrow from a point, along a vector \[m\].
     pub(super) fn arrow(&mut self, from: &Vector3<f64>, along: &Vector3<f64>, colour: Colour) {
         let length = along.norm();
-        // What turns X to the vector; any half turn where they are opposite.
+        // Rotation of X to the vector; any half turn if they are opposite.
         let turn =
             nalgebra::UnitQuaternion::rotation_between(&Vector3::x(), along).unwrap_or_else(|| {
                 nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI)
@@ -205,8 +205,8 @@ impl Entity {
         put(out, "]}");
     }
 
-    /// Appends the entity: it stands in a frame, goes with it, and stays until one of the same name
-    /// takes its place.
+    /// Appends the entity: it belongs to a frame, moves with it, and stays until one of the same name
+    /// replaces it.
     pub(super) fn write(&self, out: &mut Vec<u8>, t_ns: u64, frame: &str, id: &str) {
         put(out, "{");
         put_time(out, t_ns);

@@ -7,9 +7,9 @@
 //! # Glossary
 //!
 //! * **link**: a rigid body of the URDF, or a massless frame
-//! * **joint**: what joins two links: a cylinder, a wheel, a passive hinge, or fixed
+//! * **joint**: connection of two links: a cylinder, a wheel, a passive hinge, or fixed
 //! * **tree**: all links and joints, the yaw mechanism's loop cut open
-//! * **frame**: where a link is
+//! * **frame**: pose of a link
 //! * **scene**: ground, shapes and forces, as primitives
 
 mod error;

@@ -1,4 +1,4 @@
-//! What goes with a log.
+//! The robot's scene for a log.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use wheeleg_config::{RobotConfig, Scenario};
@@ -38,7 +38,7 @@ pub struct Scene {
     pose: Pose,
     next_ns: u64,
     shown: bool,
-    /// Only what boards report is known of the robot.
+    /// Only the boards' reports of the robot are known.
     sensed: bool,
     entity: Entity,
     payload: Vec<u8>,
@@ -68,8 +68,8 @@ impl Scene {
         })
     }
 
-    /// The same of real boards: the robot as they sense it. Nobody measures where it is, nor the ground:
-    /// it stands on a level floor, where its wheels have brought it.
+    /// The same for real boards: the robot as they sense it. Nobody measures its place, nor the ground: it is
+    /// drawn on a level floor, where its wheels have brought it.
     #[must_use]
     pub fn of_boards(mut self) -> Self {
         self.sensed = true;
@@ -84,8 +84,8 @@ impl Scene {
         &self.urdf
     }
 
-    /// Ground and shapes: once, so that whoever opens the log in its middle finds it as the newest
-    /// message of its channel.
+    /// Ground and shapes: once, so that a viewer that opens the log in its middle finds them as the newest
+    /// message of their channel.
     fn show(&mut self, t_ns: u64, give: Put<'_>) {
         self.payload.clear();
         scene_update(&mut self.payload, |out| {
@@ -129,7 +129,7 @@ impl Scene {
         give(Derived::JointStates, t_ns, &self.payload);
     }
 
-    /// Draws a contact, the one of this number of its body.
+    /// Draws a contact, the `number`th of its body.
     fn draw(&mut self, number: usize, contact: &Contact) {
         let force = Vector3::from(contact.force_n);
         if force.norm() < LEAST_N {

@@ -74,7 +74,7 @@ pub(super) enum Level {
     Error = 4,
 }
 
-/// How much an event matters: a fault is an error, what was refused or begins to go wrong a warning.
+/// Severity of an event: a fault is an error, a refusal or a beginning problem a warning.
 pub(super) fn level(event: &EventSample) -> Level {
     use EventCode as Code;
     match (event.kind, event.code) {

@@ -183,7 +183,7 @@ fn sign(i: usize) -> f64 {
     if i == 0 { 1.0 } else { -1.0 }
 }
 
-/// What a cylinder can do: the pressure force of its larger side, and the slew limit of its board.
+/// Limits of a cylinder: the pressure force of its larger side, and the slew limit of its board.
 fn cylinder(robot: &RobotConfig, i: usize) -> Motion {
     let c = &robot.plant.cylinders[i];
     let gauge = robot.plant.supply.set_pressure_pa - robot.plant.gas.ambient_pressure_pa;
@@ -211,7 +211,7 @@ fn swing(
 ) -> Result<[Motion; 3], KinematicsError<f64>> {
     let p = geometry.parameters();
     let start = p.stroke_zero_m[0];
-    // The barrel turns back where the crank is across it (theta3 = 0): the one extreme inside.
+    // The barrel reverses its turn where the crank is across it (theta3 = 0): the only extreme inside.
     let reach = p.p4_m[0].hypot(p.p4_m[1]);
     let across = (reach * reach - p.crank_m * p.crank_m).sqrt();
     let mut points = vec![start, start + stroke];

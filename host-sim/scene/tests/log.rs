@@ -205,7 +205,7 @@ fn feet_are_where_the_plant_has_them() {
     assert_eq!(heard.count("/scene"), 1);
 }
 
-/// Real boards tell strokes and travel, and neither where the robot is nor what it stands on.
+/// Real boards report strokes and travel, but neither the robot's place nor its ground.
 #[test]
 fn real_boards_are_drawn_as_they_sense_themselves() {
     let robot = robot();
@@ -269,7 +269,7 @@ fn real_boards_are_drawn_as_they_sense_themselves() {
     for joint in joints.as_array().expect("a list") {
         let name = joint["name"].as_str().expect("a name");
         assert!(joint["position"].is_number() && joint["effort"].is_null());
-        // No board tells how fast a wheel turns.
+        // No board reports the speed of a wheel.
         assert_eq!(
             joint["velocity"].is_null(),
             name.contains("wheel"),

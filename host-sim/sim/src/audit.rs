@@ -1,5 +1,4 @@
-//! A listener that knows what was sent: whether a receiver can have accepted a
-//! frame that nobody sent.
+//! A listener that knows what was sent: it counts frames that a receiver accepts although nobody sent them.
 
 use std::collections::VecDeque;
 
@@ -19,7 +18,7 @@ pub struct LineAudit {
     pub wrong: u64,
 }
 
-/// Compares what is accepted with what was sent.
+/// Compares accepted frames with sent ones.
 #[derive(Debug, Default)]
 pub(super) struct Audit {
     memory: VecDeque<(Header, Vec<u8>)>,
@@ -28,7 +27,7 @@ pub(super) struct Audit {
 }
 
 impl Audit {
-    /// A transmission as its sender makes it.
+    /// A transmission as its sender sends it.
     pub(super) fn sent(&mut self, bytes: &[u8]) {
         let mut decoder = Decoder::new();
         for byte in bytes {
@@ -59,7 +58,7 @@ impl Audit {
         }
     }
 
-    /// What was counted.
+    /// The counts.
     pub(super) fn counts(&self) -> LineAudit {
         self.counts
     }

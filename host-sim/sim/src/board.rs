@@ -1,6 +1,5 @@
-//! One board of the simulation: its application with the hardware around it, its parameter
-//! memory, its clock and its power. Joint and wheel boards differ in what they read and drive,
-//! and in nothing else that the simulation asks of them.
+//! One board of the simulation: its application with the hardware around it, its parameter memory, its clock
+//! and its power. For the simulation, joint and wheel boards differ only in their inputs and outputs.
 
 use wheeleg_node::{NodeIdentity, Transmission};
 use wheeleg_protocol::{Node, ResetCause};
@@ -80,7 +79,7 @@ impl Application {
         either!(self, board => board.node.on_bus_bytes(bytes, t_end));
     }
 
-    /// What the application wants to send.
+    /// Takes the application's next transmission.
     pub(super) fn take_transmission(&mut self) -> Option<Transmission> {
         either!(self, board => board.node.take_transmission())
     }
@@ -90,7 +89,7 @@ impl Application {
         either!(self, board => board.node.driver_cut_off(at));
     }
 
-    /// What is to be stored now, if the board wants it: then it takes it as stored.
+    /// Takes the parameters that the board wants to store; it then takes them as stored.
     pub(super) fn take_save(&mut self, now: Micros) -> Option<Vec<(u16, i32)>> {
         let mut taken = Taken::default();
         either!(self, board => if board.node.save_is_due() {
@@ -140,7 +139,7 @@ impl Board {
         })
     }
 
-    /// It, if it is a joint board.
+    /// The joint board, if it is one.
     pub(super) fn joint(&self) -> Option<&JointBoard> {
         match &self.application {
             Application::Joint(board) => Some(board),
@@ -148,7 +147,7 @@ impl Board {
         }
     }
 
-    /// It, if it is a wheel board.
+    /// The wheel board, if it is one.
     pub(super) fn wheel(&self) -> Option<&WheelBoard> {
         match &self.application {
             Application::Joint(_) => None,
@@ -156,7 +155,7 @@ impl Board {
         }
     }
 
-    /// The application from a reset by `cause` on.
+    /// Restarts the application from a reset by `cause`.
     ///
     /// # Errors
     /// As [`Application::new`].
@@ -166,8 +165,8 @@ impl Board {
         Ok(())
     }
 
-    /// What acts on valves, bridge and dump valve from this edge on, if the board runs here.
-    /// Without power everything is off; a program that has stopped keeps its outputs.
+    /// Outputs to valves, bridge and dump valve from this edge on, if the board runs here. Without power
+    /// everything is off; a program that has stopped keeps its outputs.
     pub(super) fn outputs(&self) -> Outputs {
         if self.down.is_off() {
             Outputs::default()

@@ -74,7 +74,7 @@ fn feet(address: Address, foot: &[Line; 4]) -> Fitted<Feet> {
     Fitted(has_foot.then_some(FootSwitches(front, left, rear, right)))
 }
 
-/// A board of its own, in the same state: the two share no hardware.
+/// Makes a separate board in the same state: the two share no hardware.
 impl Clone for JointBoard {
     fn clone(&self) -> Self {
         let sensor = self.sensor.copy();
@@ -218,7 +218,7 @@ impl JointBoard {
         self.node.on_bus_bytes(bytes, t_end);
     }
 
-    /// What the application wants to send.
+    /// Takes the application's next transmission.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
         self.node.take_transmission()
     }

@@ -1,12 +1,10 @@
 //! The half-duplex RS-485 line, at byte time.
 //!
-//! A transmission occupies the line from its start for ten bit times a byte
-//! (start bit, eight data bits, stop bit). Everybody but the sender receives
-//! it, whole, at the end of its last byte; the instant of that end is what a
-//! board's receiver time-stamps. Two drivers active at once corrupt each
-//! other's overlapping bytes (a wired AND of the two bytes) and are counted; such
-//! bytes are on the line once, and who drives at the same time hears nothing,
-//! because a transceiver's receiver is off while its driver is on.
+//! A transmission occupies the line from its start for ten bit times a byte (start bit, eight data bits, stop
+//! bit). Everybody but the sender receives it, whole, at the end of its last byte; a board's receiver
+//! time-stamps that instant. Two drivers active at once corrupt each other's overlapping bytes (a wired AND
+//! of the two bytes) and are counted; such bytes are on the line once, and a node that drives at the same
+//! time hears nothing, because a transceiver's receiver is off while its driver is on.
 //!
 //! Not modelled here: propagation (10 ns on two metres of cable, a thousandth
 //! of a byte), reflections, noise.
@@ -17,8 +15,8 @@ use std::collections::VecDeque;
 /// Bits on the line for one byte: start, eight data, stop.
 const BITS_PER_BYTE: u64 = 10;
 
-/// Who drives the line: a bus address (0 master, 1–8 nodes), or something else
-/// that is on it ([`super::rogue_nodes`]).
+/// The driver of the line: a bus address (0 master, 1–8 nodes), or another device on it
+/// ([`super::rogue_nodes`]).
 pub(super) type Driver = u8;
 
 /// How long the end of a transmission is remembered, ns: longer than any
@@ -59,10 +57,9 @@ pub(super) struct Bus {
     byte_ns: u64,
     under_way: VecDeque<Delivery>,
     counters: BusCounters,
-    /// Who drove from when to when, ns: the newest transmissions.
+    /// Drivers with the begin and end of their transmissions, ns: the newest ones.
     driven: VecDeque<(Driver, u64, u64)>,
-    /// What was delivered and boards outside of this process still have to hear,
-    /// if there are any.
+    /// Deliveries that boards outside of this process still have to hear, if there are any.
     delivered: Option<Vec<Delivery>>,
 }
 
@@ -128,8 +125,7 @@ impl Bus {
         );
     }
 
-    /// What `listener` hears of a delivery, and when the last byte of that ended,
-    /// ns; nothing of its own.
+    /// The part of a delivery that `listener` hears, and the end of its last byte, ns; none of its own bytes.
     #[must_use]
     pub(super) fn heard_by<'a>(
         &self,
@@ -183,12 +179,12 @@ impl Bus {
         delivery
     }
 
-    /// Keeps what is delivered until [`Self::forget_delivered`], for [`Self::heard`].
+    /// Keeps deliveries until [`Self::forget_delivered`], for [`Self::heard`].
     pub(super) fn keep_delivered(&mut self) {
         self.delivered.get_or_insert_default();
     }
 
-    /// All boards have heard what ended at or before `heard_ns`.
+    /// All boards have heard the deliveries that ended at or before `heard_ns`.
     pub(super) fn forget_delivered(&mut self, heard_ns: u64) {
         if let Some(replayed) = &mut self.delivered {
             replayed.retain(|delivery| delivery.end_ns > heard_ns);
@@ -288,8 +284,8 @@ mod tests {
         assert_eq!(b.bytes, vec![0x00, 0x0F, 0x0F]);
     }
 
-    /// A third party hears the shared byte once, the drivers hear what the other
-    /// sent while they were silent themselves.
+    /// A third party hears the shared byte once; each driver hears what the other sent while it was silent
+    /// itself.
     #[test]
     fn who_drives_hears_nothing_and_a_shared_byte_is_heard_once() {
         let mut bus = Bus::new(1_000_000);

@@ -16,7 +16,7 @@ pub(super) enum Down {
     Starting {
         /// When its first tick begins at the earliest, ns; it hears the line a tick before.
         until_ns: u64,
-        /// What it finds as the cause of its reset.
+        /// The cause of its reset, as it finds it.
         cause: ResetCause,
     },
     /// It stores its parameters, which keeps its processor from everything else: its
@@ -25,7 +25,7 @@ pub(super) enum Down {
         /// When that is done, ns.
         until_ns: u64,
     },
-    /// Its program has stopped: its outputs stay as they are.
+    /// Its program has stopped: its outputs stay unchanged.
     Hung {
         /// When the watchdog bites, ns.
         until_ns: u64,

@@ -1,15 +1,14 @@
-//! When boards outside were down, as taken down in one run and kept to in another.
+//! Times at which boards outside were down: recorded in one run, replayed in another.
 //!
-//! How long a processor takes to start, and when exactly its watchdog bites, are
-//! properties of its hardware, which the simulator's own boards only take averages of.
-//! A native run that repeats one with emulated boards is given those times, and nothing
-//! else: whatever else differs between the two is a difference.
+//! How long a processor takes to start, and when exactly its watchdog bites, are properties of its hardware,
+//! of which the simulator's own boards have only averages. A native run that repeats one with emulated boards
+//! gets those times, and nothing else: anything else that differs between the two counts as a difference.
 
 use std::collections::VecDeque;
 
 use wheeleg_protocol::{Node, ResetCause};
 
-/// What became of a board outside.
+/// A change of a board outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Change {
     /// Its processor was reset: outputs off, memory lost.
@@ -28,12 +27,12 @@ struct Entry {
 /// Resets and starts of the boards that were outside in a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DownTimes {
-    /// Of each node that was outside, in the order in which they came. One
-    /// board's wait for what does not come keeps nobody else waiting.
+    /// Changes of each node that was outside, in the order in which they came. A board that waits for one
+    /// delays no other board.
     entries: [Option<VecDeque<Entry>>; 8],
 }
 
-/// What a board does next, of one that keeps to the times of another run.
+/// Next change of a board that keeps to the times of another run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Due {
     /// It is reset.
@@ -71,9 +70,9 @@ impl DownTimes {
         self.take_down(known_ns, node, Change::FirstEdge(edge_ns));
     }
 
-    /// The next change that is due at `now_ns`, of the lowest address that has one. A board
-    /// that nothing has brought `down` is not reset: a reset without a fault is no property
-    /// of the hardware, and the runs shall differ by it.
+    /// The next change that is due at `now_ns`, of the lowest address that has one. A board that nothing has
+    /// brought `down` is not reset: a reset without a fault is no property of the hardware, and must show as
+    /// a difference between the runs.
     pub(super) fn next(&mut self, now_ns: u64, down: impl Fn(Node) -> bool) -> Option<Due> {
         let mut all = Node::ALL.into_iter().zip(&mut self.entries);
         all.find_map(|(node, entries)| {

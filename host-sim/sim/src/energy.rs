@@ -1,5 +1,5 @@
-//! Account of the mechanical energy of a run: what the actuators, the ground and the bearings have
-//! given, beside what the robot has.
+//! Account of the mechanical energy of a run: the work of actuators, ground and bearings against the energy
+//! that the robot has gained.
 
 use wheeleg_plant::PlantError;
 use wheeleg_plant::body::Power;
@@ -8,19 +8,19 @@ use wheeleg_plant::robot::{Plant, PlantState};
 /// Longest stretch over which the power is taken as straight, ns: the plant's own step.
 const STRETCH_NS: u64 = 100_000;
 
-/// What has come of it since the account was opened.
+/// The balance since the account was opened.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyBalance {
     /// Kinetic and potential energy gained \[J\].
     pub gained_j: f64,
     /// Work of pistons, motors, ground and bearings on the robot \[J\].
     pub work_j: f64,
-    /// Work of pistons and motors, whichever its sign \[J\].
+    /// Work of pistons and motors, whatever its sign \[J\].
     pub actuators_j: f64,
 }
 
 impl EnergyBalance {
-    /// What is gained without any work \[J\]: 0 but for the error of the integration.
+    /// Energy gained without any work \[J\]: 0 except for the error of the integration.
     #[must_use]
     pub fn residual_j(&self) -> f64 {
         self.gained_j - self.work_j

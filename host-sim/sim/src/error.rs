@@ -1,4 +1,4 @@
-//! What ends a simulation early. Faults of the simulated robot are results, not errors.
+//! Errors that end a simulation early. Faults of the simulated robot are results, not errors.
 
 use miette::Diagnostic;
 use thiserror::Error;
@@ -19,7 +19,7 @@ pub enum SimError {
         help: String,
     },
 
-    /// The robot does not get ready: boards miss or differ, or it does not reach its start pose.
+    /// The robot does not get ready: boards are missing or differ, or it does not reach its start pose.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]
     NotReady {
@@ -33,9 +33,9 @@ pub enum SimError {
     #[error("{what}")]
     #[diagnostic(code(wheeleg::unphysical), help("{help}"))]
     Unphysical {
-        /// When, which part, and what was last known of it.
+        /// When, which part, and its last known values.
         what: String,
-        /// The parameters that most likely did it.
+        /// The parameters that are the likely cause.
         help: String,
     },
 

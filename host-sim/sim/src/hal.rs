@@ -1,5 +1,5 @@
-//! The simulated hardware that a board application is built on: converter
-//! results, switches, PWM channels and pins that the event loop can reach.
+//! The simulated hardware below a board application: converter results, switches, PWM channels and pins that
+//! the event loop can reach.
 //!
 //! A handle and its clone share one cell: the application owns one, the event
 //! loop the other. The cells are atomic so that a board can go to another thread;
@@ -27,7 +27,7 @@ impl Line {
         self.0.load(Relaxed)
     }
 
-    /// A line of its own at the same level.
+    /// A separate line at the same level.
     pub(super) fn copy(&self) -> Self {
         Self(Arc::new(self.level().into()))
     }
@@ -81,7 +81,7 @@ impl PwmChannel {
         }
     }
 
-    /// A channel of its own with the same compare value.
+    /// A separate channel with the same compare value.
     pub(super) fn copy(&self) -> Self {
         Self {
             compare: Arc::new(self.preloaded().into()),
@@ -117,7 +117,7 @@ impl SetDutyCycle for PwmChannel {
 pub(super) struct AdcInput(Arc<AtomicU16>);
 
 impl AdcInput {
-    /// An input of its own with the same code.
+    /// A separate input with the same code.
     pub(super) fn copy(&self) -> Self {
         Self(Arc::new(self.0.load(Relaxed).into()))
     }

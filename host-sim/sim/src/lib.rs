@@ -8,16 +8,15 @@
 //!
 //! # Glossary
 //!
-//! * **session**: one simulated robot that somebody drives
+//! * **session**: one simulated robot that a program drives
 //! * **board**: application, hardware model, memory and clock at one address
-//! * **operator**: the simulated person at the controls: arms the robot and gives the commands of the
+//! * **operator**: the simulated person at the controls, who arms the robot and gives the commands of the
 //!   scenario
-//! * **line**: a serial port or pipe between a master here and boards elsewhere, or the other way
-//!   round
+//! * **line**: a serial port or pipe between a master here and boards elsewhere, or the other way round
 //! * **observer**: samples the robot for the recorder; not the observer of `control`, which estimates
 //!   pressures
 //! * **rogue node**: a node on the bus that should not be there
-//! * **down**: a board without power, or one that hangs
+//! * **down**: without power, or with a stopped program (of a board)
 
 mod audit;
 mod board;
@@ -72,8 +71,7 @@ use wheeleg_telemetry::event::Cause;
 /// Longest time from power-up to the end of commissioning, s.
 const COMMISSION_S: f64 = 2.0;
 
-/// What a caller sees of one joint board and its cylinder after every tick, start-up
-/// included, when it asks to ([`run_watched`]).
+/// One joint board and its cylinder after a tick, start-up included, for a caller of [`run_watched`].
 #[derive(Debug, Clone, Copy)]
 pub struct JointProbe<'a> {
     /// Time since power-up, s.
@@ -82,23 +80,23 @@ pub struct JointProbe<'a> {
     pub joint: u8,
     /// The board's internals.
     pub board: &'a JointSnapshot,
-    /// What it makes of its piston.
+    /// Its account of the piston's motion.
     pub account: MotionAccount,
-    /// What the cylinder is.
+    /// The true state of the cylinder.
     pub cylinder: &'a CylinderOutputs,
 }
 
 /// Looks at every joint after every tick.
 pub type ProbeFn<'a> = &'a mut dyn FnMut(&JointProbe<'_>);
 
-/// Who is told of a run while it lasts.
+/// Callbacks during a run.
 pub struct Observers<'a> {
     progress: &'a mut dyn FnMut(f64) -> Control,
     watcher: Option<ProbeFn<'a>>,
 }
 
 impl<'a> Observers<'a> {
-    /// One who is told the time, and can stop the run.
+    /// An observer that gets the time, and can stop the run.
     pub fn new(progress: &'a mut dyn FnMut(f64) -> Control) -> Self {
         Self {
             progress,
@@ -106,7 +104,7 @@ impl<'a> Observers<'a> {
         }
     }
 
-    /// One more, who sees every joint board in every tick.
+    /// Adds one that sees every joint board in every tick.
     #[must_use]
     pub fn watching(self, watcher: ProbeFn<'a>) -> Self {
         Self {
@@ -116,7 +114,7 @@ impl<'a> Observers<'a> {
     }
 }
 
-/// Whether to go on, as the caller of [`run`] decides at every bus cycle.
+/// Whether to continue; the caller of [`run`] decides at every bus cycle.
 pub type Control = ControlFlow<()>;
 
 /// How a run ended.
@@ -128,10 +126,10 @@ pub struct RunOutcome {
     pub simulated_s: f64,
     /// The caller stopped the run before its end, or it failed.
     pub stopped: bool,
-    /// What ended the run early: the robot did not get ready, the plant left the range of its
-    /// model, a board elsewhere failed. What was simulated until then is recorded.
+    /// Why the run ended early: the robot did not get ready, the plant left the range of its model, a board
+    /// elsewhere failed. The time simulated until then is recorded.
     pub failure: Option<SimError>,
-    /// What boards outside of this process did, if there were any.
+    /// Summary of the boards outside of this process, if there were any.
     pub pil: Option<PilSummary>,
     /// Frames that were sent and accepted.
     pub line: LineAudit,
@@ -177,8 +175,7 @@ pub fn run_with(
     run_on(boards, scenario, robot, seed, recorder, observers)?.whole()
 }
 
-/// As [`run`], with `watcher` called for every joint after every tick, in the time of
-/// the start-up, too.
+/// As [`run`], with `watcher` called for every joint after every tick, also during start-up.
 ///
 /// # Errors
 /// As [`run`].
@@ -195,19 +192,19 @@ pub fn run_watched(
     run_on(boards, scenario, robot, seed, recorder, observers)?.whole()
 }
 
-/// What a run has in place of boards that find their own way.
+/// The boards of a run that do not simply run here.
 #[derive(Default)]
 pub struct Boards {
     /// Where each of them runs.
     nodes: Nodes,
     /// Those outside of this process; `None`: all are here.
     remote: Option<RemoteBoards>,
-    /// Of those here, when they are down after a fault, if not when they would be.
+    /// When boards here are down after a fault, if not at their own times.
     replayed: DownTimes,
 }
 
 impl Boards {
-    /// Connects those that are outside.
+    /// Connects the boards that are outside.
     ///
     /// # Errors
     /// As [`RemoteBoards::connect`].
@@ -225,7 +222,7 @@ impl Boards {
         self.remote.is_none()
     }
 
-    /// All here, and down when the boards of another run were.
+    /// All boards here, and down when those of another run were.
     pub fn native_with(replayed: DownTimes) -> Self {
         Self {
             nodes: Nodes::default(),
@@ -235,8 +232,8 @@ impl Boards {
     }
 }
 
-/// As [`run_with`], on boards that are connected already; a run that fails on its way is an
-/// outcome with what there is of it ([`RunOutcome::failure`]).
+/// As [`run_with`], on boards that are connected already; if the run fails on its way, its outcome holds what
+/// there is of it ([`RunOutcome::failure`]).
 ///
 /// # Errors
 /// [`SimError::Simulation`] when a part refuses its parameters.
@@ -261,7 +258,7 @@ pub fn run_on(
     })
 }
 
-/// Simulates to the end of the scenario, or until an observer breaks it off.
+/// Simulates to the end of the scenario, or until an observer stops it.
 fn drive(
     session: &mut Session,
     recorder: &mut Recorder,
@@ -298,8 +295,8 @@ impl RunOutcome {
     }
 }
 
-/// Powers the robot up and takes its boards over for the commissioned ones; gives
-/// their unique ids, addresses 1 to 8.
+/// Powers the robot up and accepts its boards as the commissioned ones; gives their unique ids, addresses 1
+/// to 8.
 ///
 /// # Errors
 /// [`SimError::Simulation`] with the reason if a board is missing, doubled, of
@@ -323,7 +320,7 @@ pub fn commission(
     let limit_ns = (robot.start_up.limit_s.min(COMMISSION_S) * 1e9) as u64;
     while world.now_ns() < limit_ns {
         world.step()?;
-        // Every board has been asked who it is by then, more than once.
+        // By then every board has been asked for its identity more than once.
         if !asked && world.now_ns() >= limit_ns / 2 {
             asked = true;
             world

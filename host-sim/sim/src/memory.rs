@@ -1,5 +1,5 @@
-//! The parameter memory of a board: two pages of flash that keep their contents
-//! without power, take their time, and stop where the power does.
+//! The parameter memory of a board: two pages of flash that keep their contents without power, take time to
+//! write, and stop when the power does.
 
 use std::convert::Infallible;
 
@@ -13,7 +13,7 @@ const PROGRAM_NS: u64 = 81_690;
 /// An erased word.
 const BLANK: Option<u64> = Some(u64::MAX);
 
-/// Two pages; a word that a power cut has torn cannot be read.
+/// Two pages; a word torn by a power cut cannot be read.
 #[derive(Debug, Clone)]
 struct Pages {
     words: [[Option<u64>; WORDS]; PAGES],
@@ -89,8 +89,8 @@ impl Memory {
         memory
     }
 
-    /// The newest whole set, in the order in which it was stored, or that of a blank memory;
-    /// `None` if what it holds is damaged.
+    /// The newest complete set, in the order in which it was stored, or that of a blank memory; `None` if the
+    /// contents are damaged.
     pub(super) fn records(&self) -> Option<Vec<(u16, i32)>> {
         let mut pages = self.pages.clone();
         let store = Store::new(&mut pages);
@@ -103,16 +103,16 @@ impl Memory {
         set.map(|(records, _)| records.into_iter().flatten().collect())
     }
 
-    /// Writes a set; the power fails after `left_ns`. Gives the time it took, ns.
+    /// Writes a set; the power fails after `left_ns`. Returns the time it took, ns.
     fn write(&mut self, records: &[(u16, i32)], left_ns: u64) -> u64 {
         self.pages.took_ns = 0;
         self.pages.fails_ns = left_ns;
-        // Whether it went well is seen in the pages.
+        // The pages show whether it succeeded.
         let _ = ParameterStore::save(&mut Store::new(&mut self.pages), records.iter().copied());
         self.pages.took_ns
     }
 
-    /// A save begins; the processor stands still until the time this gives, ns.
+    /// Begins a save; the processor stands still until the returned time, ns.
     pub(super) fn begin(&mut self, records: Vec<(u16, i32)>, begin_ns: u64) -> u64 {
         let before = self.pages.clone();
         let took_ns = self.write(&records, u64::MAX);
@@ -138,7 +138,7 @@ impl Memory {
     }
 }
 
-/// Takes what a board stores, before the time for it has passed.
+/// Takes the parameters that a board stores, before the time for it has passed.
 #[derive(Debug, Default)]
 pub(super) struct Taken(pub(super) Option<Vec<(u16, i32)>>);
 
@@ -191,7 +191,7 @@ mod tests {
             assert!(new || found == set(7), "after {cut_ns} ns: {found:?}");
             assert_eq!(new, cut_ns >= ERASE_NS + 22 * PROGRAM_NS, "{cut_ns}");
             news += u32::from(new);
-            // What the cut left behind does not spoil the next save.
+            // The remains of the cut save do not spoil the next one.
             memory.begin(set(300), 0);
             memory.end();
             assert_eq!(memory.records(), Some(set(300)), "after {cut_ns} ns");
@@ -199,8 +199,8 @@ mod tests {
         assert!(news > 0);
     }
 
-    /// Without an old set there is nothing to go back to: what the cut leaves is damaged, from the
-    /// first word of the save on, which voids the other page.
+    /// Without an old set there is nothing to go back to: a cut save leaves a damaged memory, from its first
+    /// word on, which voids the other page.
     #[test]
     fn a_power_cut_in_the_first_save_leaves_a_damaged_memory_or_the_set() {
         let mut left = [0; 3];

@@ -1,5 +1,5 @@
-//! Samples of the running world for the recorder: what was commanded, what the
-//! boards sensed, what physically is.
+//! Samples of the running world for the recorder: commands, the boards' measurements, and the true physical
+//! state.
 
 mod line;
 
@@ -25,7 +25,7 @@ pub(super) use line::UNMEASURED;
 
 const PA_PER_BAR: f64 = 1e5;
 
-/// Turns the world into samples; remembers what it needs for differences.
+/// Turns the world into samples; remembers earlier values for differences.
 #[derive(Debug, Default)]
 pub(super) struct Observer {
     modes: [Option<Mode>; 8],
@@ -38,7 +38,7 @@ pub(super) struct Observer {
     step: u16,
 }
 
-/// Way of a wheel's rim for one count of its encoder, mm.
+/// Travel of a wheel's rim for one count of its encoder, mm.
 pub(super) fn rim_mm_per_count(params: &PlantParams, wheel: usize) -> f64 {
     let motor = &params.motors[wheel];
     let counts_per_turn = 4.0 * f64::from(motor.encoder_lines) * motor.reduction;
@@ -234,8 +234,8 @@ impl Observer {
         }
     }
 
-    /// Touchdowns and lifts as they physically are become events; what the master made of
-    /// its switches stands beside them.
+    /// Records true touchdowns and lifts as events; the master's own view, from its switches, is logged
+    /// beside them.
     fn record_contact(
         &mut self,
         foot: usize,
@@ -252,7 +252,7 @@ impl Observer {
         recorder.event(t_ns, Cause::Contact { side, switches });
     }
 
-    /// Changes of mode and fault become events; `index` is 0 to 7 for addresses 1 to 8.
+    /// Records changes of mode and fault as events; `index` is 0 to 7 for addresses 1 to 8.
     fn record_mode(
         &mut self,
         index: usize,
@@ -281,8 +281,7 @@ impl Observer {
         }
     }
 
-    /// Passes over a bus cycle of the start-up, so that the first sample shows
-    /// the traffic of its own cycle alone.
+    /// Skips a bus cycle of the start-up, so that the first sample shows only the traffic of its own cycle.
     pub(super) fn pass(&mut self, world: &World) {
         let line = world.bus().counters();
         (self.bus_bytes, self.bus_busy_ns) = (line.bytes, line.busy_ns);

@@ -17,8 +17,8 @@ use wheeleg_telemetry::event::{Answer, Cause};
 use wheeleg_telemetry::messages::reject;
 use wheeleg_telemetry::{Event as Recorded, EventKind, LinkSample, Recorder};
 
-/// What to do about a robot that does not get ready, where no board is to blame: its file, and the
-/// values there that decide whether its air moves it in time.
+/// Remedy for a robot that does not get ready, if no board is to blame: its file, and the values there that
+/// decide whether its air moves it in time.
 fn remedy(robot: &RobotConfig) -> String {
     let plant = &robot.plant;
     let told = robot.told_otherwise();
@@ -47,8 +47,8 @@ fn remedy(robot: &RobotConfig) -> String {
     )
 }
 
-/// What each joint is asked for before a run in which `leg` steps, with the fields that say so: that leg is
-/// drawn back, the other held.
+/// The move of each joint before a run in which `leg` steps, with the fields that set it: that leg is drawn
+/// back, the other held.
 fn moves(robot: &RobotConfig, leg: LegChoice) -> [String; 6] {
     let gait = &robot.gait;
     let drawn = [
@@ -77,10 +77,10 @@ fn moves(robot: &RobotConfig, leg: LegChoice) -> [String; 6] {
     })
 }
 
-/// Between two looks at a reservoir that is not full yet, ns.
+/// Time between two checks of a reservoir that is not full yet, ns.
 const FILLING_NS: u64 = 100_000_000;
 
-/// How far the start-up has come.
+/// Stage of the start-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Enumerating,
@@ -119,15 +119,15 @@ pub(super) struct Operator {
     start_up: Vec<(u64, Cause)>,
     next_event: usize,
     flood_refused: bool,
-    /// What to do where it does not get ready.
+    /// Remedy if the robot does not get ready.
     remedy: String,
-    /// What each joint is asked for.
+    /// The move of each joint.
     moves: [String; 6],
-    /// What to do where the time is not enough.
+    /// Remedy if the time is not enough.
     late_remedy: String,
-    /// The same where a board refuses to be armed.
+    /// Remedy if a board refuses to be armed.
     arming_remedy: String,
-    /// The same where the reservoir does not fill.
+    /// Remedy if the reservoir does not fill.
     air_remedy: String,
 }
 
@@ -177,8 +177,7 @@ impl Operator {
         }
     }
 
-    /// One look at the robot during start-up; true once it stands at rest in
-    /// its start pose.
+    /// Checks the robot once during start-up; true once it stands at rest in its start pose.
     ///
     /// # Errors
     /// [`SimError::NotReady`] with the reason if it does not get there.
@@ -190,7 +189,7 @@ impl Operator {
             if self.waits_for_air(event, now_ns) {
                 continue;
             }
-            // Counters and logs are no part of the story, but for what is to be mended.
+            // Counters and logs are no part of the story, unless something is to be mended.
             let routine = matches!(event, Event::Link { .. } | Event::Log { .. });
             if !routine || cause.kind() == EventKind::Fault {
                 self.start_up.push((time_us, cause));
@@ -242,7 +241,7 @@ impl Operator {
             Stage::Homing | Stage::Settling { .. } if now_ns > self.limit_ns => {
                 return Err(self.not_ready(now_ns, &self.late_remedy));
             }
-            // Of boards that are not found, or not armed, time may not be what they lack.
+            // Boards that are not found, or not armed, may lack something other than time.
             _ if now_ns > self.limit_ns => {
                 let help = format!("{}; or {}", self.late_remedy, self.remedy);
                 return Err(self.not_ready(now_ns, &help));
@@ -257,7 +256,7 @@ impl Operator {
         Ok(false)
     }
 
-    /// Whether arming is refused for want of air, which the reservoir may get: it is asked for again.
+    /// Whether arming is refused for want of air, which may still come: it is asked for again.
     fn waits_for_air(&mut self, event: Event, now_ns: u64) -> bool {
         let no_air = matches!(
             event,
@@ -274,7 +273,7 @@ impl Operator {
         waits
     }
 
-    /// The remedy, with what the joint is asked for that reported last, or with what leads a wheel.
+    /// The remedy, with the move of the joint that reported last, or with the fields that lead a wheel.
     fn remedy_of_pose(&self) -> String {
         let mut faults = self.start_up.iter().rev().map(|(_, cause)| cause);
         let fault = faults.find(|cause| cause.kind() == EventKind::Fault);
@@ -417,7 +416,7 @@ pub(super) fn record_answer(
     answer
 }
 
-/// Writes the master's events into the record, and tells them on.
+/// Writes the master's events into the record, and passes them on.
 pub(super) fn listen(
     master: &mut Master,
     t_ns: u64,

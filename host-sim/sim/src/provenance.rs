@@ -1,4 +1,4 @@
-//! What goes into a run, as the head of its record.
+//! The inputs of a run, as the head of its record.
 
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_telemetry::Recorder;
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
     use wheeleg_config::builtin;
 
-    /// A scenario is what it says, however it says it; another height is another run.
+    /// A scenario counts by its values, not by its wording; another height is another run.
     #[test]
     fn the_spelling_of_the_ground_is_no_part_of_the_hash() {
         let robot = builtin::robot(builtin::DEFAULT_ROBOT).expect("built in");

@@ -1,6 +1,5 @@
-//! What is on the line beside the master and its eight boards: a second board
-//! with the address straps of another one, and a service tool that writes
-//! parameters.
+//! Other devices on the line besides the master and its eight boards: a second board with the address straps
+//! of another one, and a service tool that writes parameters.
 
 use wheeleg_node::Transmission;
 use wheeleg_protocol::frame::{VERSION, encode};
@@ -30,12 +29,11 @@ pub(super) const AUDITOR: Driver = 0xFE;
 
 /// Potentiometer of a board that lies on the bench: mid travel.
 const BENCH_CODE: u16 = 0x8000;
-/// Longest exchange of the service tool on the line, and some: it must end
-/// before the next SYNC, ns.
+/// Longest exchange of the service tool on the line, with a margin: it must end before the next SYNC, ns.
 const EXCHANGE_NS: u64 = 700_000;
 /// How long the tool waits for an answer, µs.
 const PATIENCE_US: u64 = 20_000;
-/// First number of the tool's requests: none of the master's.
+/// First number of the tool's requests: not used by the master.
 const FIRST_SEQUENCE: u16 = 0xF000;
 /// A parameter that no board has.
 const NO_PARAMETER: u16 = 0x7FFF;
@@ -50,8 +48,7 @@ pub(super) struct RogueNodes {
 }
 
 impl RogueNodes {
-    /// Another board with the straps of another is plugged in, on the bench
-    /// side of its sensors and valves.
+    /// Plugs in another board with the straps of `node`, on the bench side of its sensors and valves.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the board refuses its parameters.
@@ -62,7 +59,7 @@ impl RogueNodes {
         Ok(())
     }
 
-    /// It is unplugged.
+    /// Unplugs it.
     pub(super) fn unplug(&mut self, node: Node) {
         self.boards.retain(|(own, _)| *own != node);
     }
@@ -108,7 +105,7 @@ impl RogueNodes {
         }
     }
 
-    /// What a second board wants to send.
+    /// Takes the next transmission of a second board.
     pub(super) fn take_transmission(&mut self) -> Option<(Driver, Transmission)> {
         let boards = self.boards.iter_mut();
         let mut sent = boards
@@ -125,7 +122,7 @@ impl RogueNodes {
         self.service.as_mut()?.request(now_us)
     }
 
-    /// What came of the service tool's requests; each once.
+    /// The outcomes of the service tool's requests; each once.
     pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         std::mem::take(&mut self.notes)
     }
@@ -260,8 +257,7 @@ impl Service {
         }))
     }
 
-    /// What the tool says of a value that it has read: after the last one, whether the
-    /// parameter has kept it.
+    /// The tool's note about a value that it has read: after the last one, whether the parameter has kept it.
     fn value_read(&mut self, answer: &Message) -> Option<Cause> {
         let Message::ParamValue(ParamValue { value: raw, .. }) = *answer else {
             return Some(self.cause(ServiceOutcome::NotGiven));

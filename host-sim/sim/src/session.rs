@@ -1,5 +1,5 @@
-//! A simulated robot that somebody drives: step by step, to a time, with commands and faults
-//! given from outside. [`run`](crate::run) is its first caller.
+//! A simulated robot that a program drives: step by step, to a time, with commands and faults from outside.
+//! [`run`](crate::run) is its first caller.
 
 use std::collections::VecDeque;
 use wheeleg_config::faults::FaultSpec;
@@ -20,11 +20,11 @@ use crate::operator::{Operator, listen, record_answer};
 use crate::world::{Happened, World};
 use crate::{Boards, EnergyBalance, JointProbe, RunOutcome, SimError, setup};
 
-/// One robot, from power-up on: boards, bus, master and plant on one clock, the operator who
-/// gets it ready and carries the scenario out, and the observer who samples it.
+/// One robot, from power-up on: boards, bus, master and plant on one clock, the operator who gets it ready
+/// and carries out the scenario, and the observer that samples it.
 ///
-/// The same scenario, robot, seed and inputs at the same times give the same recording, however
-/// the time is cut into calls.
+/// The same scenario, robot, seed and inputs at the same times give the same recording, however the time is
+/// divided into calls.
 pub struct Session {
     world: World,
     operator: Operator,
@@ -35,7 +35,7 @@ pub struct Session {
     nodes: Nodes,
     cycle_ns: u64,
     duration_ns: u64,
-    /// Simulated time at which the scenario began, once it has.
+    /// Simulated time at which the scenario began, if it has.
     start_ns: Option<u64>,
     over: bool,
     /// The master's record of the last cycle.
@@ -47,7 +47,7 @@ pub struct Session {
 /// Most ends of requests that wait for their console; then the oldest goes.
 const OUTCOMES: usize = 256;
 
-/// Keeps the end of a request for its console, and what a board has told for it.
+/// Keeps the end of a request for its console, and values that a board has reported for it.
 pub(crate) fn keep_outcome(outcomes: &mut VecDeque<(u64, Event)>, time_us: u64, event: &Event) {
     let ends = matches!(event, Event::Done(_) | Event::Refused { .. });
     if ends || matches!(event, Event::Parameter { .. }) {
@@ -58,7 +58,7 @@ pub(crate) fn keep_outcome(outcomes: &mut VecDeque<(u64, Event)>, time_us: u64, 
     }
 }
 
-/// The faults of a scenario that are there from the power on.
+/// The faults of a scenario that are present from power-up on.
 fn built_in(scenario: &Scenario) -> Vec<FaultSpec> {
     let faults = scenario.faults.iter();
     faults.filter(|f| f.kind.is_built_in()).copied().collect()
@@ -68,8 +68,8 @@ impl Session {
     /// Powers the robot up in the start pose of the scenario.
     ///
     /// # Errors
-    /// [`SimError`] if the robot cannot do what the scenario asks for, a part refuses its parameters, or
-    /// a fault that is built in cannot be.
+    /// [`SimError`] if the robot cannot do what the scenario asks for, a part refuses its parameters, or a
+    /// built-in fault is impossible.
     pub fn new(
         boards: Boards,
         scenario: &Scenario,
@@ -79,7 +79,7 @@ impl Session {
         Self::build(boards, scenario, robot, seed, false)
     }
 
-    /// Built in one piece: a session is large, and is not moved about on the stack.
+    /// Built in place: a session is large, and should not be moved about on the stack.
     fn build(
         boards: Boards,
         scenario: &Scenario,
@@ -116,9 +116,9 @@ impl Session {
         })
     }
 
-    /// Powers a robot up for somebody at a console: nobody arms it, nothing moves by itself, and
-    /// it lasts as long as it is stepped. The record begins with the power; of the scenario are
-    /// ground, pose and the faults that are built in.
+    /// Powers a robot up for a person at a console: it is not armed, nothing moves by itself, and it lasts as
+    /// long as it is stepped. The record begins with the power; ground, pose and the built-in faults come
+    /// from the scenario.
     ///
     /// # Errors
     /// As [`Session::new`].
@@ -142,8 +142,7 @@ impl Session {
         self.world.now_ns()
     }
 
-    /// Time of the scenario, s: from the instant at which the robot stood at rest in its start
-    /// pose. `None` during the start-up.
+    /// Time of the scenario, s: since the robot stood at rest in its start pose. `None` during the start-up.
     #[must_use]
     pub fn scenario_s(&self) -> Option<f64> {
         self.scenario_ns().map(|ns| ns as f64 * 1e-9)
@@ -171,7 +170,7 @@ impl Session {
         Ok(())
     }
 
-    /// Keeps account of the mechanical energy from now on. The run takes about twice as long, and is
+    /// Keeps account of the mechanical energy from now on. The run takes about twice as long; its results are
     /// the same.
     ///
     /// # Errors
@@ -188,15 +187,15 @@ impl Session {
         self.world.energy()
     }
 
-    /// A user command, now. A refusal is an event of the recording, as on the real console.
+    /// Gives a user command, now. A refusal is an event of the recording, as on the real console.
     pub fn submit(&mut self, command: Command, recorder: &mut Recorder) -> Answer {
         let t_ns = self.scenario_ns().unwrap_or(0);
         self.operator
             .submit(&mut self.world, command, t_ns, recorder)
     }
 
-    /// A request of a client of the master, now. `None`: the master is dead and says nothing.
-    /// How it ends comes from [`take_outcome`](Self::take_outcome).
+    /// Takes a request of a client of the master, now. `None`: the master is dead and does not answer.
+    /// [`take_outcome`](Self::take_outcome) gives its end.
     pub fn request(
         &mut self,
         request: Request,
@@ -219,7 +218,7 @@ impl Session {
         self.world.master().beat(seen_us, now_us);
     }
 
-    /// A client of the master connects anew.
+    /// A client of the master reconnects.
     pub fn open_session(&mut self, client: u8) {
         self.world.master().open_session(client);
     }
@@ -242,13 +241,13 @@ impl Session {
         self.world.master_alive()
     }
 
-    /// The master, to look at.
+    /// The master, read only.
     #[must_use]
     pub fn master(&self) -> &Master {
         self.world.master_ref()
     }
 
-    /// A fault begins, or ends, now; its own times are not looked at.
+    /// Begins or ends a fault, now; its own times are ignored.
     ///
     /// # Errors
     /// [`SimError::Simulation`] if the fault cannot begin beside those under way, or is to end
@@ -278,12 +277,12 @@ impl Session {
         Ok(())
     }
 
-    /// The simulated world, for who leads its boards over a line.
+    /// The simulated world, for a caller that leads its boards over a line.
     pub(crate) fn world(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// Shows every joint board and its cylinder as they are after a tick.
+    /// Shows every joint board and its cylinder after a tick.
     pub(crate) fn show(&self, watcher: &mut dyn FnMut(&JointProbe<'_>)) {
         let world = &self.world;
         for ((joint, board), cylinder) in (1..).zip(world.joints()).zip(&world.outputs().cylinders)
@@ -298,12 +297,12 @@ impl Session {
         }
     }
 
-    /// Simulates to the next thing that happens.
+    /// Simulates to the next event.
     pub(crate) fn advance(&mut self) -> Result<Happened, SimError> {
         self.world.step()
     }
 
-    /// What operator, observer and scenario make of it.
+    /// Lets operator, observer and scenario act on it.
     pub(crate) fn handle(
         &mut self,
         happened: Happened,
@@ -392,8 +391,8 @@ impl Session {
         self.submit(command, recorder);
     }
 
-    /// What ended the session goes into the record. Of a plant that has left its range the last
-    /// sound values are there, too, also if that was in the start-up, which has no samples else.
+    /// Records why the session ended. If a plant has left its range, also its last sound values, even during
+    /// the start-up, which has no other samples.
     pub(crate) fn fail(&mut self, error: &SimError, recorder: &mut Recorder) {
         if matches!(error, SimError::Unphysical { .. }) && self.start_ns.is_none() {
             self.observer.tick(&self.world, 0, recorder);
@@ -402,7 +401,7 @@ impl Session {
         recorder.event(t_ns, Cause::Failed(error.to_string()));
     }
 
-    /// Ends the session; `stopped` says that its driver wanted that before the scenario's end.
+    /// Ends the session; `stopped`: its driver ended it before the scenario's end.
     pub fn finish(mut self, stopped: bool, recorder: &mut Recorder) -> RunOutcome {
         let now_ns = self.now_ns();
         let link = self.observer.link();

@@ -1,5 +1,5 @@
-//! From a robot and a scenario to the configuration of plant and master: the
-//! one place where the two files' SI values become the master's units.
+//! The configuration of plant and master from a robot and a scenario: the one place where the two files' SI
+//! values become the master's units.
 
 use std::f64::consts::TAU;
 
@@ -19,8 +19,8 @@ use super::world::LEFT_WHEEL;
 use crate::SimError;
 use wheeleg_config::{LegChoice, Motion, RobotConfig, Scenario};
 
-/// Stroke of b5 with which a walk begins, m: almost as far out as a foothold can be, so that the
-/// feet carry as much as they can.
+/// Stroke of b5 with which a walk begins, m: almost as far out as a foothold can be, so that the feet carry
+/// as much load as they can.
 const WALK_S5_M: f64 = 0.165;
 /// Places of a leg's cylinders.
 const YAW: usize = 0;
@@ -44,10 +44,9 @@ fn sums(robot: &RobotConfig) -> [Option<u32>; 8] {
 
 /// The plant of the robot, standing on the scenario's ground in the start pose of the gait.
 ///
-/// Powering up in the start pose, chambers at their initial pressures, is the
-/// paper's home position; the start-up then arms and settles there. For a walk
-/// it is set down with both feet far out and the nose where the walk wants it:
-/// with one leg drawn back and the nose up it falls on its tail on steep ground.
+/// Powering up in the start pose, chambers at their initial pressures, is the paper's home position; the
+/// start-up then arms and settles there. For a walk the robot is set down with both feet far out and the nose
+/// at its walking height: with one leg drawn back and the nose up it falls on its tail on steep ground.
 pub(super) fn plant(scenario: &Scenario, robot: &RobotConfig) -> PlantParams {
     let gait = &robot.gait;
     let home = [gait.yaw_s2_m, 0.0, gait.stroke_m];
@@ -105,7 +104,7 @@ pub(super) fn master(scenario: &Scenario, robot: &RobotConfig) -> MasterConfig {
             WheelDrive::Profile
         },
         walk: robot.walk_geometry(),
-        // The plant's soles name left and right as the robot looks, on both legs.
+        // The plant's soles name left and right in the robot's frame, on both legs.
         switch_frame: SwitchFrame::Robot,
         behaviours: scenario.behaviours,
         commissioned: robot.commissioned,

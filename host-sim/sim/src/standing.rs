@@ -1,4 +1,4 @@
-//! A start place on which the robot cannot stand: what it could stand on.
+//! A start place on which the robot cannot stand, and ground on which it could.
 
 use std::ops::Range;
 
@@ -11,10 +11,10 @@ use wheeleg_plant::terrain::{Material, Part, Plane, Shape, Terrain};
 
 use crate::SimError;
 
-/// Beyond this slope nobody looks, degrees.
+/// Steeper slopes are not tried, degrees.
 const STEEPEST_DEG: u32 = 60;
 
-/// Whether the robot stands in its start pose where it starts.
+/// Whether the robot can stand in its start pose at its start place.
 fn stands(params: &PlantParams) -> bool {
     Plant::new(params).is_ok_and(|plant| plant.initial_state(0).is_ok())
 }
@@ -32,8 +32,8 @@ fn steepest_deg(params: &PlantParams, material: &Material) -> Option<u32> {
     (0..=STEEPEST_DEG).take_while(on_slope).last()
 }
 
-/// What is wrong with a part of the ground on which the robot would stand if it were rough, and what is
-/// allowed with its friction.
+/// The problem of ground on which the robot would stand if it were rough, and the slope that its friction
+/// allows.
 fn slips(params: &PlantParams, parts: Range<usize>) -> Option<[String; 2]> {
     let material = params.terrain.parts.get(parts.start)?.material;
     let mut rough = params.clone();
@@ -53,11 +53,11 @@ fn slips(params: &PlantParams, parts: Range<usize>) -> Option<[String; 2]> {
     ])
 }
 
-/// Sections of the ground that are tried, nearest to the begin of the file first.
+/// Sections of the ground that are tried, those nearest to the start of the file first.
 const MOST_TRIED: usize = 200;
 
-/// The section of the scenario's ground without which the robot stands; of a plane or a map, with level
-/// ground in its place.
+/// The section of the scenario's ground without which the robot stands; a plane or a map is replaced by level
+/// ground.
 fn culprit(ground: &Ground, params: &PlantParams) -> Option<(usize, Range<usize>)> {
     let without = |parts: &Range<usize>| {
         let mut without = params.clone();
@@ -107,7 +107,7 @@ fn places(params: &PlantParams) -> Option<String> {
     ))
 }
 
-/// The refusal, with the section that is in the way, if it is one; or the steepest plane on which this
+/// The refusal, with the section that is in the way, if there is one; or the steepest plane on which this
 /// robot stands in this pose.
 pub(crate) fn refused(
     scenario: &Scenario,
@@ -166,7 +166,7 @@ mod tests {
         assert!(high < low, "{high} {low}");
     }
 
-    /// What is wrong with a scenario on whose ground the robot falls.
+    /// The problem of a scenario on whose ground the robot falls.
     fn refused_on(text: &str) -> Problem {
         let scenario = Scenario::parse("my.toml", text).expect("sound");
         let mut plant = builtin::robot("wheeleg").expect("built in").plant;
@@ -181,7 +181,7 @@ mod tests {
         problem.clone()
     }
 
-    /// Of several parts of the ground the one is named that is in the way, with its line.
+    /// Of several parts of the ground, the one in the way is named, with its line.
     #[test]
     fn the_part_of_the_ground_that_is_in_the_way_is_named() {
         const TEXT: &str = "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"1 s\"\n\
@@ -202,7 +202,7 @@ mod tests {
         assert!(help.contains("wheels are at x = 0 and y = ±0.2"), "{help}");
     }
 
-    /// Ground that is too steep is found beside another part, without which there is no ground at the start.
+    /// Ground that is too steep is found beside another part, the only ground at the start.
     #[test]
     fn a_slope_that_is_too_steep_is_named_beside_other_parts() {
         const FAR: &str = "[[terrain]]\nkind = \"block\"\nx = { value = [3.0, 4.0], unit = \"m\" }\n\
@@ -225,7 +225,7 @@ mod tests {
         }
     }
 
-    /// What slips is told of its friction, and of the slope that this friction holds.
+    /// The error for a slipping robot gives the friction, and the slope that this friction holds.
     #[test]
     fn ground_that_is_too_smooth_is_named_by_its_material() {
         for (material, slope, allowed) in [

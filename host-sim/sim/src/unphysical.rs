@@ -1,5 +1,5 @@
-//! A plant that has left the range of its model: when, which part, what most likely did it, and
-//! what was last known of the part.
+//! A plant that has left the range of its model: when, which part, the likely cause, and the last known
+//! values of the part.
 
 use wheeleg_plant::PlantError;
 use wheeleg_plant::dynamics::floating::state::{LEG, WHEEL};
@@ -18,7 +18,7 @@ enum Part {
     Chassis,
     /// The reservoir.
     Supply,
-    /// Not one of them.
+    /// None of these.
     Robot,
 }
 
@@ -48,7 +48,7 @@ impl Part {
         }
     }
 
-    /// What was last known of it.
+    /// Its last known values.
     fn last(self, o: &Outputs) -> String {
         match self {
             Self::Joint(i) => {
@@ -78,7 +78,7 @@ impl Part {
     }
 }
 
-/// Parameters of the robot's file that most likely make a state variable explode.
+/// Parameters of the robot's file that are the likely cause if a state variable explodes.
 fn likely(name: &str, part: Part) -> &'static str {
     match (name, part) {
         ("bristle_m", _) => "`friction.bristle_damping`, `friction.bristle_stiffness`",
@@ -104,7 +104,7 @@ fn likely(name: &str, part: Part) -> &'static str {
     }
 }
 
-/// What the user is told; `last` are the plant's values of the last tick that was sound.
+/// The error for the user; `last` are the plant's values of the last tick that was sound.
 pub(crate) fn failed(now_ns: u64, error: &PlantError, last: &Outputs) -> SimError {
     let (name, part) = match error {
         PlantError::NonFinite { name, index, .. } | PlantError::OutOfBounds { name, index, .. } => {
@@ -183,7 +183,7 @@ mod tests {
         names
     }
 
-    /// Whatever leaves its range is told by fields that a robot's file has.
+    /// A quantity that leaves its range is reported by fields that a robot's file has.
     #[test]
     fn every_state_of_the_plant_has_fields_of_the_file_to_blame() {
         let robot = wheeleg_config::builtin::robot("wheeleg").expect("built in");

@@ -59,7 +59,7 @@ pub(super) enum Happened {
 pub(super) struct World {
     pub(super) plant: Plant,
     pub(super) state: PlantState,
-    /// Where the energy is accounted for.
+    /// Account of the energy, if one is kept.
     pub(super) energy: Option<EnergyMeter>,
     pub(super) inputs: Inputs,
     pub(super) outputs: Outputs,
@@ -71,7 +71,7 @@ pub(super) struct World {
     pub(super) audit: Audit,
     pub(super) master: Master,
     pub(super) master_alive: bool,
-    /// Of a master that is not here, but at the other end of the line.
+    /// State of a master at the other end of the line, if it is not here.
     pub(super) elsewhere: Option<Elsewhere>,
     pub(super) cycle_ns: u64,
     pub(super) now_ns: u64,
@@ -88,7 +88,7 @@ pub(super) struct World {
     pub(super) remote: Option<RemoteBoards>,
     /// When boards outside were down in this run.
     pub(super) down_times: DownTimes,
-    /// When boards here are down after a fault, of those that do not find it themselves.
+    /// When boards here are down after a fault, if they take those times from another run.
     pub(super) replayed: DownTimes,
     pub(super) stored: NodeParams,
 }
@@ -96,13 +96,13 @@ pub(super) struct World {
 /// A master at the other end of the line.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Elsewhere {
-    /// What it would hear, until that is taken.
+    /// Bytes for it to hear, until they are taken.
     said: Vec<u8>,
-    /// When the last byte of it has passed, ns.
+    /// When the last of these bytes has passed, ns.
     until_ns: u64,
 }
 
-/// Valve on-times of the tick that has just begun, and how many edges all commands made so far.
+/// Valve on-times of the tick that has just begun, and the number of edges commanded so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TickInputs {
     /// On-times, µs, per joint `[fill A, vent A, fill B, vent B]`.
@@ -279,7 +279,7 @@ impl World {
         advanced.map_err(|e| unphysical::failed(self.now_ns, &e, &self.outputs))
     }
 
-    /// What acts from this edge on: the outputs of the board elsewhere, or of the one here.
+    /// Outputs that act from this edge on: those of the board elsewhere, or of the one here.
     fn active_outputs(&self, node: Node) -> link::Outputs {
         let remote = self.remote.as_ref().and_then(|o| o.outputs(node));
         remote.unwrap_or_else(|| self.board(node).outputs())
@@ -303,8 +303,8 @@ impl World {
         self.advance_plant()?;
         self.faults.sink(self.now_ns, &mut self.plant);
         self.bring_up()?;
-        // A board outside answers with the outputs that act from this edge on
-        // when it is told the inputs of the edge. Neither depends on the other.
+        // A board outside gets the inputs of the edge, and answers with the outputs that act from this edge
+        // on. Neither depends on the other.
         let sensed = if self.remote.is_some() {
             self.outputs = self.plant.outputs(&self.state);
             let sensed = self.sense();
@@ -339,7 +339,7 @@ impl World {
         Ok(())
     }
 
-    /// The tick of a board's application that starts now, if the board runs.
+    /// Runs the tick of a board's application that starts now, if the board runs.
     fn tick_board(&mut self, node: Node, inputs: &BoardInputs) {
         let now = self.clock(node, self.now_ns);
         if self.runs(node) {
@@ -348,7 +348,7 @@ impl World {
         }
     }
 
-    /// What a wheel board reads now: encoder edges and the supply switch.
+    /// Inputs of a wheel board now: encoder edges and the supply switch.
     pub(super) fn wheel_inputs(&mut self, wheel: usize) -> BoardInputs {
         let core = &self.state.core;
         let mechanics = &self.plant.assembly.mechanics;
@@ -375,7 +375,7 @@ impl World {
         self.inputs.bridge_duty[wheel] = match remote {
             Some(outputs) => duty(&outputs),
             None if !drives => 0.0,
-            // The program hands its newest output over at the next edge; stopped, it does not.
+            // A running program outputs its newest value at the next edge; a stopped one does not.
             None if self.hangs(node) => self.inputs.bridge_duty[wheel],
             None => duty(&self.board(node).application.active_outputs()),
         };
@@ -396,7 +396,7 @@ impl World {
         self.remote.as_mut()
     }
 
-    /// A fault begins, or ends.
+    /// Begins or ends a fault.
     ///
     /// # Errors
     /// [`SimError`] if a board outside refuses it, or one that restarts.
@@ -418,12 +418,12 @@ impl World {
         self.inject_power(fault, begin)
     }
 
-    /// What happened on the line beside the boards' own doing; each once.
+    /// Incidents on the line that are not the boards' own doing; each once.
     pub(super) fn take_notes(&mut self) -> Vec<Cause> {
         self.rogue_nodes.take_notes()
     }
 
-    /// What a listener says that knows what was sent.
+    /// Counts of a listener that knows what was sent.
     pub(super) fn audit(&self) -> LineAudit {
         self.audit.counts()
     }
@@ -433,7 +433,7 @@ impl World {
         &self.faults
     }
 
-    /// The master dies: it never sends or hears again.
+    /// Kills the master: it never sends or hears again.
     pub(super) fn kill_master(&mut self) {
         self.master_alive = false;
     }
@@ -448,12 +448,12 @@ impl World {
         &mut self.master
     }
 
-    /// The master, to look at.
+    /// The master, read only.
     pub(super) fn master_ref(&self) -> &Master {
         &self.master
     }
 
-    /// A command of the user's program.
+    /// Gives a command of the user's program.
     ///
     /// # Errors
     /// See [`Reject`].

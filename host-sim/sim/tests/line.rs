@@ -1,4 +1,4 @@
-//! A master and boards that only a line joins: as on a serial port, but by a clock of the test.
+//! A master and boards joined only by a line: as on a serial port, but with a clock of the test.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -36,7 +36,7 @@ struct Pipe {
     boards: LineBoards,
     recorder: Recorder<'static>,
     rng: Pcg64,
-    /// Bytes on their way to the boards, and from them; so many of them for one look already.
+    /// Bytes on their way to the boards, and from them, with the number that are due at the next look.
     there: (Vec<u8>, usize),
     back: (Vec<u8>, usize),
     cut: bool,
@@ -162,7 +162,7 @@ impl Robot {
     }
 }
 
-/// True strokes of the simulator's three steps, every millisecond from the gait's begin.
+/// True strokes of the simulator's three steps, every millisecond from the start of the gait.
 fn simulated(scenario: &Scenario, robot: &RobotConfig) -> Vec<[f64; 6]> {
     let mut recorder = Recorder::in_memory();
     let mut session = Session::new(Boards::default(), scenario, robot, 1).expect("it starts");
@@ -178,7 +178,7 @@ fn simulated(scenario: &Scenario, robot: &RobotConfig) -> Vec<[f64; 6]> {
     strokes.collect()
 }
 
-/// Largest distance of two courses of strokes, mm, the second `late` samples behind the first.
+/// Largest distance of two series of strokes, mm, the second `late` samples behind the first.
 fn apart_mm(first: &[[f64; 6]], second: &[[f64; 6]], late: usize) -> f64 {
     let pairs = first.iter().zip(&second[late..]);
     let distances = pairs.flat_map(|(a, b)| (0..6).map(move |i| (a[i] - b[i]).abs()));
@@ -199,7 +199,7 @@ fn three_steps_over_a_line_are_those_of_the_simulator() {
                 split.strokes_mm()
             })
             .collect();
-        // The gait begins with a bus cycle, and the two know of each other's only that it is of 10 ms.
+        // The gait begins with a bus cycle; the two runs share only its period of 10 ms.
         let shifts = (0..=10).flat_map(|late| {
             [
                 apart_mm(&expected, &strokes, late),

@@ -1,5 +1,5 @@
-//! Random states of the robot with a floating chassis, and what our dynamics says about them, as
-//! JSON for a comparison with other rigid-body programs.
+//! Random states of the robot with a floating chassis, and the results of our dynamics for them, as JSON for
+//! a comparison with other rigid-body programs.
 //!
 //!     cargo run --example floating_states -- [ROBOT] [SEED] [COUNT] > states.json
 //!

@@ -1,5 +1,5 @@
-//! What went wrong first: the faults of a run or a log, and where the robot gave up, without those that
-//! only follow from one.
+//! First causes of failures: the faults of a run or a log, and where the robot gave up, without those that
+//! only follow from another.
 
 use serde::Serialize;
 use wheeleg_master::event::HoldReason;
@@ -8,16 +8,16 @@ use wheeleg_telemetry::event::{hold_name, hold_words_of};
 use wheeleg_telemetry::messages::within;
 use wheeleg_telemetry::{Event, EventCode, EventKind, finding_of_name};
 
-/// What comes so soon after a fault may follow from it, ns.
+/// An event this soon after a fault may follow from it, ns.
 const FOLLOWS_NS: u64 = 1_000_000_000;
-/// Reasons of the master to hold that a fault of a board gives.
+/// The master's reasons to hold that follow from a fault of a board.
 const HOLDS_THAT_FOLLOW: [&str; 3] = [
     hold_name(&HoldReason::NodeFault { node: 0, faults: 0 }),
     hold_name(&HoldReason::NodeLost(0)),
     hold_name(&HoldReason::NodeDisarmed(0)),
 ];
 
-/// Whether an event says that something went wrong: a fault, or a robot that gives up.
+/// Whether an event is a failure: a fault, or a robot that gives up.
 pub(crate) fn goes_wrong(kind: Option<EventKind>, code: Option<EventCode>) -> bool {
     match code {
         Some(EventCode::Stuck) => true,
@@ -26,22 +26,22 @@ pub(crate) fn goes_wrong(kind: Option<EventKind>, code: Option<EventCode>) -> bo
     }
 }
 
-/// An event of which [`goes_wrong`] holds.
+/// An event for which [`goes_wrong`] holds.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FaultEvent {
     pub(crate) t_ns: u64,
-    /// None of a later version.
+    /// `None` for a code of a later version.
     pub(crate) code: Option<EventCode>,
     pub(crate) detail: String,
     pub(crate) fault: Option<Fault>,
-    /// Boards that it is about.
+    /// Boards concerned.
     pub(crate) boards: Vec<Address>,
     /// For a person.
     pub(crate) text: String,
 }
 
 impl FaultEvent {
-    /// That of an event of a run, if it goes wrong after the start-up.
+    /// From an event of a run, if it is a failure after the start-up.
     pub(crate) fn of(t_ns: u64, event: &Event) -> Option<Self> {
         let (kind, code) = (event.cause.kind(), event.cause.code());
         let is_wrong = goes_wrong(Some(kind), Some(code)) && event.start_up_us.is_none();
@@ -55,8 +55,8 @@ impl FaultEvent {
         })
     }
 
-    /// Whether it is no more than what comes of `cause`: the master holds, a board says why, other
-    /// boards report the same.
+    /// Whether it only follows from `cause`: the master holds, a board says why, other boards report the
+    /// same.
     fn follows(&self, cause: &Self) -> bool {
         self.t_ns.abs_diff(cause.t_ns) <= FOLLOWS_NS
             && match self.code {
@@ -67,24 +67,24 @@ impl FaultEvent {
     }
 }
 
-/// Names of boards in a row.
+/// Names of boards as a list.
 pub(crate) fn names(boards: &[Address]) -> String {
     let names: Vec<String> = boards.iter().map(Address::to_string).collect();
     names.join(", ")
 }
 
-/// What went wrong, with what to do about it.
+/// A failure, with its remedy.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) t_s: f64,
-    /// What happened, to whom.
+    /// What happened, and to which board.
     pub(crate) headline: String,
-    /// What the robot does because of it, where that is not what every fault of a board does.
+    /// The robot's reaction, if it is not the usual one to a fault of a board.
     pub(crate) consequence: Option<&'static str>,
     pub(crate) remedy: Option<String>,
 }
 
-/// What the robot does when the master holds.
+/// The robot's reaction when the master holds.
 const ALL_HOLD: &str = "all axes hold";
 
 impl Cause {
@@ -107,7 +107,7 @@ impl Cause {
             }
             Some(EventCode::Hold) => {
                 let words = hold_words_of(&event.detail);
-                // What a board reports is in the text.
+                // A board's own report is in the text.
                 if let Some(words) = words.filter(|_| event.fault.is_none()) {
                     let consequence = Some(words.consequence.unwrap_or(ALL_HOLD));
                     return told(of_boards(words.cause), consequence, Some(words.way_on()));
@@ -129,7 +129,7 @@ impl Cause {
         told(headline, None, row.map(|(_, remedy)| remedy.to_owned()))
     }
 
-    /// In a sentence without its end; `count`: how many there are.
+    /// As a sentence without its full stop; `count`: the number of causes.
     pub(crate) fn sentence(&self, count: usize) -> String {
         let Self { t_s, headline, .. } = self;
         let first = match count {
@@ -144,7 +144,7 @@ impl Cause {
     }
 }
 
-/// A text with a capital at its begin.
+/// A text with a capital first letter.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next();
@@ -153,12 +153,11 @@ pub(crate) fn capital(text: &str) -> String {
     })
 }
 
-/// Causes of what went wrong; events in their order. Most runs have none, and what they have is told
-/// one by one.
+/// Causes of failures, from events in their order. Most runs have none; the others are listed one by one.
 pub(crate) fn causes(events: impl Iterator<Item = FaultEvent>) -> Vec<Cause> {
     let mut causes: Vec<FaultEvent> = Vec::new();
     for event in events {
-        // What is latched again within the second is the same.
+        // A fault latched again within the second is the same.
         if !causes.iter().any(|cause| event.follows(cause)) {
             causes.push(event);
         }
@@ -169,7 +168,7 @@ pub(crate) fn causes(events: impl Iterator<Item = FaultEvent>) -> Vec<Cause> {
 /// Most causes in the list of a page.
 pub(crate) const LISTED: usize = 10;
 
-/// Something that went wrong, for a template.
+/// A failure, for a template.
 #[derive(Serialize)]
 pub(crate) struct Wrong {
     /// Time on the clock of the page, s.
@@ -178,7 +177,7 @@ pub(crate) struct Wrong {
     remedy: Option<String>,
 }
 
-/// The first causes, for the list of a page; `clock`: from their time to that of the page.
+/// The first causes, for the list of a page; `clock` converts their time to that of the page.
 pub(crate) fn listed(causes: &[Cause], clock: impl Fn(f64) -> f64) -> Vec<Wrong> {
     let listed = causes.iter().take(LISTED);
     let wrong = listed.map(|cause| Wrong {
@@ -189,7 +188,7 @@ pub(crate) fn listed(causes: &[Cause], clock: impl Fn(f64) -> f64) -> Vec<Wrong>
     wrong.collect()
 }
 
-/// The first of some causes, in a sentence without its end.
+/// The first of some causes, as a sentence without its full stop.
 pub(crate) fn first_sentence(causes: &[Cause]) -> Option<String> {
     causes.first().map(|first| first.sentence(causes.len()))
 }
@@ -255,7 +254,7 @@ mod tests {
             first_sentence(&found).expect("a cause"),
             "Joint 3: the position sensor reads outside its range at 3.00 s"
         );
-        // The operator is lost for a reason of their own; what comes later, too.
+        // A lost operator has a reason of its own; so have later events.
         for (another, expected) in [
             (hold(3_100, HoldReason::OperatorLost), 2),
             (latched(3_100, 4, fault), 1),
@@ -273,7 +272,7 @@ mod tests {
         assert!(first_sentence(&causes(std::iter::empty())).is_none());
     }
 
-    /// A board that has lost its supply gives no fault: the master's reason is told, as typed.
+    /// A board that has lost its supply gives no fault: the master's reason is reported, as typed.
     #[test]
     fn a_hold_is_told_by_its_reason_with_the_remedy_apart() {
         let told = |reason: HoldReason| {
@@ -315,7 +314,7 @@ mod tests {
         );
     }
 
-    /// It is no fault of a board, but what the run failed of.
+    /// It is not a fault of a board, but the reason why the run failed.
     #[test]
     fn a_robot_that_gives_up_has_gone_wrong() {
         let stuck = event(

@@ -1,4 +1,4 @@
-//! What can go wrong with a study, and what to do about it.
+//! Errors of studies, with their remedies.
 
 use std::path::PathBuf;
 
@@ -61,7 +61,7 @@ pub enum StudyError {
     )]
     Stdout(std::io::Error),
 
-    /// The study cannot be made, or its result is not what was asked for.
+    /// The study is impossible, or its result is not the requested one.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::simulation), help("{help}"))]
     Refused {

@@ -1,4 +1,4 @@
-//! What a person asks of the simulator, one module a question.
+//! Studies with the simulator, one module per question.
 //!
 //! * [`run`]: one scenario with log, targets and report; [`analysis`] judges it;
 //! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
@@ -8,11 +8,11 @@
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: the parts that all of them share;
 //! * [`view`]: a log, or two, as a page;
-//! * [`check`], [`export`]: the model against others' numbers, and for others' programs.
+//! * [`check`], [`export`]: the model against independent numbers, and for other programs.
 //!
 //! # Glossary
 //!
-//! * **target**: one number of a run with the band it must lie in, and whether it is required
+//! * **target**: one number of a run with its allowed band, and whether it is required
 //! * **row**: one fault of the matrix, with its instant and the required response
 //! * **case**: one move of one controller on one cylinder
 //! * **baseline**: the same run without the fault

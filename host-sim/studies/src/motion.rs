@@ -1,4 +1,4 @@
-//! What the page's robot plays: geometry and state over time, as data for `page/report.js`.
+//! Data for the robot animation of a page: geometry and state over time, for `page/report.js`.
 
 use serde::Serialize;
 use wheeleg_config::Drawing;
@@ -32,19 +32,19 @@ pub(crate) struct Motion {
     pub(crate) blind: Vec<Blind>,
 }
 
-/// A time in which a board reported that its sensor gives no reading.
+/// A time in which a board reported that its sensor has no reading.
 #[derive(Serialize)]
 pub(crate) struct Blind {
-    /// Which of the six, from 0.
+    /// Joint, from 0.
     pub(crate) joint: usize,
     pub(crate) from: f64,
     pub(crate) to: f64,
 }
 
-/// When the joints had no reading, from the events of their boards in their order.
+/// Times without a reading of the joints, from the events of their boards in order.
 #[derive(Default)]
 pub(crate) struct Readings {
-    /// Begin and end, s; the last time may not be over.
+    /// Begin and end, s; the last one may not have ended.
     missing: [Vec<(f64, Option<f64>)>; 6],
 }
 
@@ -105,23 +105,23 @@ pub(crate) struct Phase {
     pub(crate) air: bool,
 }
 
-/// What happened to the robot.
+/// An event of the robot.
 #[derive(Serialize)]
 pub(crate) struct Mark {
     pub(crate) t: f64,
     pub(crate) text: String,
 }
 
-/// What the robot stands on.
+/// The ground below the robot.
 #[derive(Serialize)]
 pub(crate) struct GroundPicture {
-    /// Where the heights begin, and their distance.
+    /// Start of the heights, and their distance.
     pub(crate) from_mm: f64,
     pub(crate) step_mm: f64,
     /// Heights along the tracks of the left and the right wheel at the start.
     pub(crate) left_mm: Vec<f64>,
     pub(crate) right_mm: Vec<f64>,
-    /// Middle, half length and half width, heading in degrees of what is seen of each rock.
+    /// Middle, half length and half width, heading in degrees of the visible part of each rock.
     pub(crate) rocks: Vec<[f64; 5]>,
     /// Corners of each block.
     pub(crate) blocks: Vec<[[f64; 2]; 4]>,
@@ -131,14 +131,14 @@ pub(crate) struct GroundPicture {
 pub(crate) const MOST_ROCKS: usize = 3000;
 
 impl GroundPicture {
-    /// Whether it is no more than the floor at height 0.
+    /// Whether it is only the floor at height 0.
     pub(crate) fn is_level(&self) -> bool {
         let heights = self.left_mm.iter().chain(&self.right_mm);
         heights.copied().all(|z| z == 0.0) && self.rocks.is_empty() && self.blocks.is_empty()
     }
 }
 
-/// Places in a line ahead at which heights are told.
+/// Places in a line ahead at which heights are given.
 pub(crate) struct Strip {
     /// The first, m.
     pub(crate) from_m: f64,
@@ -148,9 +148,9 @@ pub(crate) struct Strip {
 impl Strip {
     /// Distance between places, m.
     pub(crate) const STEP_M: f64 = 0.01;
-    /// What is drawn behind and ahead of the robot, m.
+    /// Length drawn behind and ahead of the robot, m.
     const ROUND_M: [f64; 2] = [1.6, 1.6];
-    /// Longest strip that is drawn, m.
+    /// Longest strip drawn, m.
     const LONGEST_M: f64 = 60.0;
 
     /// Around all places of a robot, m ahead of the start.
@@ -187,7 +187,7 @@ pub(crate) fn mm(metres: f64) -> f64 {
 }
 
 impl Motion {
-    /// Whether there is anything to play.
+    /// Whether there is nothing to play.
     pub(crate) fn is_empty(&self) -> bool {
         self.t.len() < 2
     }

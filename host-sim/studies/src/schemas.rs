@@ -1,4 +1,4 @@
-//! The published forms of all summaries.
+//! The published schemas of all summaries.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! Identification: the truth is known, because the measurements are the plant's own.
+//! Identification: the truth is known, because the plant itself made the measurements.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use wheeleg_studies::study::{Progress, Settings, Signal, Stop};
 const OUT: [u16; 4] = [1000, 0, 0, 1000];
 const BACK: [u16; 4] = [0, 1000, 1000, 0];
 
-/// A rest, then strokes of many lengths, pulses, and chambers by themselves.
+/// A rest, then strokes of many lengths, pulses, and single chambers.
 fn rich(t: usize) -> [u16; 4] {
     let Some(t) = t.checked_sub(200) else {
         return [0; 4];
@@ -42,7 +42,7 @@ fn config() -> AxisConfig {
     AxisConfig::load("bench-vq110u").expect("built in")
 }
 
-/// What a bench with these parameters writes: position by its converter, and pressures if asked.
+/// The table of a bench with these parameters: position from its converter, and pressures if requested.
 fn measured(
     axis: &AxisParams,
     seed: u64,
@@ -81,7 +81,7 @@ fn measured(
     text
 }
 
-/// A cylinder that is not what its data sheet says.
+/// A cylinder that differs from its data sheet.
 fn truth(seed: u64) -> Logs {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     std::array::from_fn(|i| 0.5 * trust(i) * rng.random_range(-1.0..1.0))
@@ -118,7 +118,7 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
     for i in (0..COUNT).filter(|i| intervals[*i].determined) {
         let off = (fit.logs[i] - truth[i]).abs();
         let name = FREE[i].name;
-        // Three standard deviations, and a bar of its own for a mistake in the intervals.
+        // Three standard deviations, with a separate bar for mistakes in the intervals.
         assert!(
             off < 3.0 * intervals[i].deviation + 0.01,
             "{name}: {off} of {}",
@@ -126,13 +126,13 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         );
         assert!(off < 0.25, "{name}: {off}");
     }
-    // The truth is about as likely as the fit: a model that has got stuck is not.
+    // The truth is about as likely as the fit, unless the model is stuck in a local minimum.
     let residuals = problem(&config, &lab).residuals(&truth).expect("a plant");
     assert!(fit.residuals.norm() < 1.1 * residuals.norm());
     assert!(undetermined(&information).len() <= COUNT - found);
 }
 
-/// A valve that never shuts has no closing delay that could be seen.
+/// A valve that never shuts shows no closing delay.
 #[test]
 fn what_the_valves_never_did_is_not_determined() {
     let config = config();
@@ -154,7 +154,7 @@ fn what_the_valves_never_did_is_not_determined() {
         words.iter().any(|w| w.starts_with("closing delay")),
         "{words:?}"
     );
-    // One stroke: far from everything is known, and the intervals say so.
+    // One stroke: far from everything is determined, and the intervals say so.
     assert!(intervals.iter().filter(|t| t.determined).count() < COUNT - 2);
 }
 
@@ -194,7 +194,7 @@ fn the_study_writes_an_axis_that_meets_what_it_has_not_seen_and_notices_a_leak()
     assert!((kg(&axis.axis) / kg(&real) - 1.0).abs() < 0.3);
     assert!(out.join("next-experiment.csv").exists() && out.join("report.html").exists());
 
-    // A second identification keeps what somebody has made of the first.
+    // A second identification keeps a user's changes of the first result.
     std::fs::write(out.join("axis.toml"), "mine").expect("written");
     let short = measured(&real, 2, 400, rich, false);
     let summary = study(&short, folder.path()).expect("it ends");
@@ -211,7 +211,7 @@ fn the_study_writes_an_axis_that_meets_what_it_has_not_seen_and_notices_a_leak()
     assert_eq!(summary["explained"], false, "{summary}");
 }
 
-/// Whether the axis of a study is sound, and says of each value where it is from; how many the data do
+/// Checks that the axis of a study is sound, and gives the source of each value; returns how many the data do
 /// not determine.
 fn written_axis_says_what_is_found(summary: &str, out: &Path) -> usize {
     let summary: serde_json::Value = serde_json::from_str(summary).expect("JSON");
@@ -247,8 +247,8 @@ fn written_axis_says_what_is_found(summary: &str, out: &Path) -> usize {
     count
 }
 
-/// 0.6 s of the very axis of the file: the fit takes noise for friction, and meets what it has not seen
-/// worse than the file does. That is no news of the bench, and nothing to build on.
+/// 0.6 s of the very axis of the file: the fit takes noise for friction, and predicts the held-out part worse
+/// than the file does. That says nothing new about the bench, and is no basis for further work.
 #[test]
 fn a_fit_that_is_worse_than_the_file_is_not_written() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -276,7 +276,7 @@ fn a_fit_that_is_worse_than_the_file_is_not_written() {
     assert!(out.join("report.html").exists() && !out.join("axis.toml").exists());
 }
 
-/// A single stroke shuts no valve: what the file had for that delay stands beside what is assumed now.
+/// A single stroke shuts no valve: the file's value for that delay is given beside the assumed one.
 #[test]
 fn what_the_data_do_not_determine_is_marked_with_the_value_of_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -287,7 +287,7 @@ fn what_the_data_do_not_determine_is_marked_with_the_value_of_the_file() {
     assert!(count > 0, "{summary}");
 }
 
-/// A supply that measures less than the pressure at which its contact closes.
+/// A measured supply below the pressure at which its contact closes.
 #[test]
 fn an_axis_that_the_program_would_refuse_is_not_written() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -342,7 +342,7 @@ fn an_output_that_is_an_input_is_refused_and_both_stay() {
     }
 }
 
-/// A stop is looked at between two simulations, of which a step of the fit needs some 25.
+/// A stop is checked between two simulations; a step of the fit needs some 25.
 #[test]
 fn a_fit_that_is_stopped_ends_within_a_step_and_is_told_as_stopped() {
     let config = config();
@@ -369,7 +369,7 @@ fn a_fit_that_is_stopped_ends_within_a_step_and_is_told_as_stopped() {
     assert_eq!(stopped.map(|stopped| stopped.done), Some(0));
 }
 
-/// Blank lines and the line ends of another system count as an editor counts them.
+/// Blank lines and other systems' line ends are counted as in an editor.
 #[test]
 fn a_wrong_line_after_blank_lines_is_told_by_its_own_number() {
     let config = config();
@@ -400,12 +400,12 @@ fn a_wrong_line_after_blank_lines_is_told_by_its_own_number() {
     }
 }
 
-/// A table with names, units and columns of its own, of which one tells two valves, is the same
-/// measurement; what is wrong in it is told by its own names.
+/// A table with other names, units and columns, where one column may drive two valves, is the same
+/// measurement; errors in it use its own names.
 #[test]
 fn a_table_of_a_users_own_is_read_by_its_map() {
     let config = config();
-    // Two valves of a chamber are never on together here, so that one is what the other is not.
+    // Two valves of a chamber are never on together here, so that one is the inverse of the other.
     let sound = "time_s,position_mm,fill_a,vent_a,fill_b,vent_b,pressure_a_bar,pressure_b_bar\n";
     let own = "n,t (ms),x [m],V1,V2,pA,pB\n";
     let (mut plain, mut mine) = (sound.to_owned(), own.to_owned());
@@ -513,7 +513,7 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
         lines[line - 1] = text;
         lines.join("\n")
     };
-    // What the plant itself can have is a pressure.
+    // A pressure within the plant's own range is accepted.
     assert_eq!(told(&with(7, "0.005,40,0,0,0,1000,44.1,0.011")), "");
     let cases = [
         (
@@ -592,7 +592,7 @@ fn a_wrong_measurement_is_told_with_file_line_column_value_and_range() {
     assert!(told(&metres.join("\n")).contains("less than 2 % of the stroke"));
 }
 
-/// What spreadsheets of other countries write, and clocks that jitter, are read as what they mean.
+/// Tables in other countries' style, and from clocks with jitter, are understood.
 #[test]
 fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
     let config = config();
@@ -610,7 +610,7 @@ fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
         let other = read(&text).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(other, plain);
     }
-    // Up to 0.2 ms beside the ms, the second row as well.
+    // Up to 0.2 ms off the ms, also in the second row.
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let jitter = rows.lines().enumerate().map(|(k, row)| {
         let (time, rest) = row.split_once(',').expect("a time");
@@ -624,7 +624,7 @@ fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
     });
     let jitter: String = jitter.collect();
     assert_eq!(read(&format!("{head}\n{jitter}")).expect("read"), plain);
-    // Thousands are none, and what has another name is told with those that there are.
+    // Thousands separators are refused, and the error for an unknown name lists the known ones.
     let told = |text: &str| read(text).expect_err("refused").to_string();
     let thousands = commas(&sound).replacen("\n0", "\n1.000,5", 1);
     assert!(
@@ -640,8 +640,8 @@ fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
     );
 }
 
-/// Random cylinders, and how often an interval has the truth: one in the suite, 100 in
-/// `cargo xtask deep identify`. Of few cylinders the share says nothing.
+/// Random cylinders, and how often an interval contains the truth: one in the suite, 100 in `cargo xtask deep
+/// identify`. For few cylinders the share means nothing.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn intervals_have_the_truth_about_as_often_as_they_say() {
@@ -673,7 +673,7 @@ fn intervals_have_the_truth_about_as_often_as_they_say() {
     assert!(20 * close >= 19 * count, "{close} of {count}");
 }
 
-/// A table of a million rows is read, and judged, in time that grows as the rows do.
+/// The time to read and judge a table of a million rows grows linearly with the rows.
 #[test]
 fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
     use std::fmt::Write as _;
@@ -701,7 +701,7 @@ fn a_million_rows_are_read_in_time_that_grows_as_they_do() {
     let (large_s, large) = seconds(LARGE);
     assert_eq!(small.expect("sound").samples.len(), SMALL);
     assert_eq!(large.expect("sound").samples.len(), LARGE);
-    // 8 times as many: 64 times as long if each looked at all others.
+    // 8 times as many: 64 times as long if each were compared with all others.
     assert!(large_s < 24.0 * small_s, "{small_s} s, then {large_s} s");
     let (million_s, million) = seconds(1_000_000);
     let said = million.expect_err("17 minutes").to_string();

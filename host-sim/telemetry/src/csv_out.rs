@@ -8,7 +8,7 @@ use super::samples::channels;
 use super::sink::{Sink, Taken};
 use crate::LogError;
 
-/// Channels without a table: what the log alone is asked for, and what no run to its end has.
+/// Channels without a table: those that only the log needs, and those that no complete run has.
 const WITHOUT: [&str; 4] = ["/state", "/run", "/server", "/session"];
 
 struct Table {

@@ -1,11 +1,11 @@
-//! Channels of a log that follow from what is recorded: the same robot in the words of other
+//! Channels of a log that are computed from the recorded ones: the same robot in the formats of other
 //! programs. They are no part of the hash, of the tables or of the console.
 
 use super::contact::Contact;
 use super::registry::{Written, rate};
 use super::sink::Taken;
 
-/// A channel that follows from others.
+/// A channel that is computed from others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Derived {
     /// Every link of the robot against its parent.
@@ -52,9 +52,9 @@ impl DerivedDef {
     }
 }
 
-/// Messages per second of what moves. A drawing between two of them errs by less than its line.
+/// Messages per second for moving things. A drawing between two messages errs by less than its line.
 pub const DERIVED_HZ: u32 = 50;
-/// The same of forces: they take most room, and are for the eye.
+/// The same for forces: they take most room, and are only looked at.
 pub const CONTACTS_HZ: u32 = 25;
 /// Its period, ns.
 pub(crate) const CONTACTS_PERIOD_NS: u64 = 1_000_000_000 / CONTACTS_HZ as u64;
@@ -161,7 +161,7 @@ pub struct Attached {
 /// Takes a message of a derived channel: time in ns and JSON.
 pub type Put<'a> = &'a mut dyn FnMut(Derived, u64, &[u8]);
 
-/// Makes derived channels of what goes into a log.
+/// Makes derived channels from the samples of a log.
 pub trait Derive {
     /// Files for the log.
     fn attached(&self) -> Vec<Attached>;

@@ -1,4 +1,4 @@
-//! Where two logs part.
+//! Finds where two logs first differ.
 
 use std::path::Path;
 
@@ -17,8 +17,8 @@ struct Logged {
     payload: Vec<u8>,
 }
 
-/// The messages of a log in the order in which they were written, without what follows from others,
-/// and without what a live robot alone has.
+/// The messages of a log in the order in which they were written, without derived channels and without those
+/// that only a live robot has.
 fn messages<'a>(
     path: &'a Path,
     bytes: &'a [u8],

@@ -1,4 +1,4 @@
-//! What can go wrong with a log or a table.
+//! Errors of logs and tables.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ pub enum LogError {
         help("choose another place with --out, or make this one writable")
     )]
     Output {
-        /// What was tried, for example "create the folder".
+        /// The attempted action, for example "create the folder".
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
@@ -51,7 +51,7 @@ pub enum LogError {
         reason: mcap::McapError,
     },
 
-    /// A log made from another one, which stays as it is, could not be written.
+    /// A log made from another one, which stays unchanged, could not be written.
     #[error("cannot write the log `{}`: {}", path.display(), message(.reason))]
     #[diagnostic(
         code(wheeleg::output),
@@ -64,7 +64,7 @@ pub enum LogError {
         reason: mcap::McapError,
     },
 
-    /// Tables that could not be written to their end.
+    /// Tables that could not be completed.
     #[error("cannot finish {count} of the tables, the first is `{}`: {reason}", path.display())]
     #[diagnostic(
         code(wheeleg::output),
@@ -92,7 +92,7 @@ pub enum LogError {
         reason: mcap::McapError,
     },
 
-    /// A file that is no MCAP log.
+    /// A file that is not an MCAP log.
     #[error("`{}` is not an MCAP log: it does not start like one", path.display())]
     #[diagnostic(
         code(wheeleg::log),
@@ -114,7 +114,7 @@ pub enum LogError {
         path: PathBuf,
     },
 
-    /// A log of which nothing can be read.
+    /// A log without a readable message.
     #[error("there is no message in `{}` that can be recovered", path.display())]
     #[diagnostic(
         code(wheeleg::log),
@@ -141,7 +141,7 @@ pub enum LogError {
     },
 }
 
-/// What went wrong, without a word of the layers between.
+/// What went wrong, without the messages of the layers between.
 fn message(error: &mcap::McapError) -> String {
     match error {
         mcap::McapError::Io(reason) => reason.to_string(),

@@ -1,4 +1,4 @@
-//! Events: what happened in a run, as data. Its text is made last, by [`messages`](crate::messages).
+//! Events of a run, as data. [`messages`](crate::messages) makes their text, last of all.
 
 pub(crate) mod code;
 mod holds;
@@ -30,7 +30,7 @@ pub struct Event {
     pub start_up_us: Option<u64>,
 }
 
-/// What happened, by who tells of it.
+/// What happened, by its source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cause {
     /// The master reports something.
@@ -42,8 +42,8 @@ pub enum Cause {
         /// How.
         change: BoardChange,
     },
-    /// A foot touches the ground, or leaves it, as it physically is; what the master makes of its
-    /// switches stands beside it.
+    /// A foot really touches the ground, or leaves it; the state that the master derives from its switches is
+    /// logged beside it.
     Contact {
         /// Which foot.
         side: Side,
@@ -66,22 +66,22 @@ pub enum Cause {
     },
     /// The scenario acts.
     Scenario(Act),
-    /// A service tool asks a board for what it must refuse.
+    /// A service tool sends a board a request that it must refuse.
     Service {
         /// Which board.
         board: Address,
         /// Number of the parameter.
         parameter: u16,
-        /// What comes of it.
+        /// The outcome.
         outcome: ServiceOutcome,
     },
     /// The master has heard broken frames: its counts at the end of the run.
     LineErrors(LinkQuality),
-    /// The line to boards elsewhere is broken; what the operating system says.
+    /// The line to boards elsewhere is broken; the operating system's reason.
     LineBroken(String),
-    /// It is there again. All axes are disarmed.
+    /// It works again. All axes are disarmed.
     LineMended,
-    /// What ended the run before its end, in words.
+    /// Why the run ended early, in words.
     Failed(String),
 }
 
@@ -101,7 +101,7 @@ pub enum BoardChange {
     FaultsCleared,
 }
 
-/// What a user hears when giving a command.
+/// The answer to a user's command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     /// It is queued.
@@ -125,7 +125,7 @@ pub enum Act {
     FaultEnds(FaultSpec),
 }
 
-/// What comes of a service tool's requests.
+/// Outcome of a service tool's requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ServiceOutcome {
     /// The board refuses.
@@ -135,7 +135,7 @@ pub enum ServiceOutcome {
         /// Why.
         reason: NackReason,
     },
-    /// The board takes what it must refuse.
+    /// The board accepts a request that it must refuse.
     Taken(BadRequest),
     /// The parameter has kept its value.
     Unchanged {
@@ -185,7 +185,7 @@ impl Event {
         }
     }
 
-    /// As it stands in the log.
+    /// As written in the log.
     #[must_use]
     pub fn sample(&self) -> EventSample {
         let cause = &self.cause;
@@ -260,9 +260,9 @@ impl Cause {
         }
     }
 
-    /// What tells events of one [`code`](Self::code) apart, in snake case: the mode entered, the
-    /// reason, the finding, the record of a board's log, the side of a foot, the parameter, the
-    /// fault injected. Empty where there is nothing to tell apart.
+    /// Distinguishes events of one [`code`](Self::code), in snake case: the mode entered, the reason, the
+    /// finding, the record of a board's log, the side of a foot, the parameter, the fault injected. Empty if
+    /// the code is enough.
     #[must_use]
     pub fn detail(&self) -> String {
         match self {
@@ -293,7 +293,7 @@ impl Cause {
         }
     }
 
-    /// The board that it is about, by its address 1 to 8.
+    /// The board concerned, by its address 1 to 8.
     #[must_use]
     pub fn board(&self) -> Option<Address> {
         match self {
@@ -303,8 +303,7 @@ impl Cause {
         }
     }
 
-    /// Number of the fault or warning that it is about, in the protocol's tables; of several, the
-    /// first.
+    /// Number of the fault or warning, in the protocol's tables; of several, the first.
     #[must_use]
     pub fn fault_code(&self) -> Option<u8> {
         let first = |bits: u16| FaultBits::from_raw(bits).iter().next().map(Fault::code);
@@ -350,13 +349,13 @@ impl Cause {
         }
     }
 
-    /// Whether all axes were told to hold.
+    /// Whether all axes were commanded to hold.
     #[must_use]
     pub const fn is_hold(&self) -> bool {
         matches!(self, Self::Master(MasterEvent::Hold(_)))
     }
 
-    /// Whether a command of a user, or a request of a service tool, came to nothing.
+    /// Whether a command of a user, or a request of a service tool, failed.
     #[must_use]
     pub const fn is_refusal(&self) -> bool {
         matches!(
@@ -446,7 +445,7 @@ mod tests {
             (logged.kind(), logged.fault_code()),
             (EventKind::Log, Some(1))
         );
-        // A record that somebody should act on is no mere record.
+        // A record that requires action is more than a log record.
         let late = entry(LogEvent::PrechargeLate, 0);
         assert_eq!(late.kind(), EventKind::Fault);
         assert_eq!(

@@ -2,14 +2,13 @@
 
 use super::registry::Sample;
 
-/// BLAKE3 over (channel name, time, field values) of every sample of every channel, in the
-/// order in which the loop gives them and at the rate at which it gives them. Left out are the
-/// channels of a live robot's server: what it was given, and how it keeps pace with the wall.
+/// BLAKE3 over (channel name, time, field values) of every sample of every channel, in the order and at the
+/// rate in which the loop gives them. It leaves out the channels of a live robot's server: its inputs, and
+/// how it keeps pace with the wall clock.
 ///
-/// It does not depend on what is written: a run without a log file, or with another encoding,
-/// decimation or compression, has the same hash. The same binary, scenario, robot and seed give
-/// the same hash in any folder and at any time of day, so nothing in it may come from the
-/// computer's clock.
+/// It does not depend on the output: a run without a log file, or with another encoding, decimation or
+/// compression, has the same hash. The same binary, scenario, robot and seed give the same hash in any folder
+/// and at any time of day, so nothing in it may come from the computer's clock.
 ///
 /// Byte layout per sample: length of the channel name (u8), name, simulated time in nanoseconds
 /// (u64, little-endian), then the fields as [`Sample::bytes`] lays them out. The name fixes the

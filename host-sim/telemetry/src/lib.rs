@@ -5,7 +5,7 @@
 //! channels with their JSON schemas, the CSV headers, the plots' labels and
 //! `wheeleg channels`.
 //!
-//! [`event`] says what happened as data, [`messages`] makes text of it.
+//! [`event`] represents events as data, [`messages`] turns them into text.
 //!
 //! A [`Recorder`] takes the samples of a run and hands them to [`Sink`]s: a log file
 //! ([`LogFile`]), tables ([`Tables`]), and memory ([`Keep`]).
@@ -15,10 +15,10 @@
 //! * **channel**: a named stream of samples of one kind, such as `/joint/3`
 //! * **sample**: the values of a channel at one instant
 //! * **event**: something that happened, with cause and time
-//! * **sink**: a place where samples go
+//! * **sink**: a destination of samples
 //! * **provenance**: origin of a run: program, robot, scenario, seed
-//! * **derived channel**: a channel of the log that is computed from others, in a format that other
-//!   programs know
+//! * **derived channel**: a channel of the log that is computed from others, in a format that other programs
+//!   know
 //! * **hash**: BLAKE3 over channel, time and value of all samples at full rate, except `/server`,
 //!   `/session` and the texts of the terrain in `/run`
 

@@ -18,12 +18,12 @@ use crate::LogError;
 
 /// Largest chunk before compression. A quarter of a second has about 0.4 MB.
 const CHUNK_BYTES: u64 = 4 * 1024 * 1024;
-/// A chunk is closed and handed to the operating system after this much simulated time: no more
-/// is lost with a killed process.
+/// A chunk is closed and handed to the operating system after this much simulated time: a killed process
+/// loses no more than that.
 const FLUSH_PERIOD_NS: u64 = 250_000_000;
 
-/// How our logs are written. The fastest level of zstd makes a ninth of the JSON (lz4: a fifth)
-/// in 3 ms per simulated second, here and not in threads, for the same bytes on any computer.
+/// How our logs are written. The fastest level of zstd compresses the JSON to a ninth (lz4: a fifth) in 3 ms
+/// per simulated second; on this thread, so that the bytes are the same on any computer.
 pub(crate) fn options() -> mcap::WriteOptions {
     mcap::WriteOptions::new()
         .compression(Some(Compression::Zstd))
@@ -36,8 +36,7 @@ pub(crate) fn options() -> mcap::WriteOptions {
 /// Opens a log to read it.
 ///
 /// # Errors
-/// [`LogError::Read`] if it cannot be opened or is no file: a pipe may have no writer, a device no
-/// end.
+/// [`LogError::Read`] if it cannot be opened or is not a file: a pipe may have no writer, a device no end.
 pub(crate) fn opened(path: &Path) -> Result<File, LogError> {
     let failed = |e| LogError::read(path, e);
     if path.is_dir() {
@@ -46,10 +45,10 @@ pub(crate) fn opened(path: &Path) -> Result<File, LogError> {
     open_file(path).map_err(failed)
 }
 
-/// Takes the first bytes of a log.
+/// Checks the first bytes of a log.
 ///
 /// # Errors
-/// [`LogError::NotALog`] if they are others, [`LogError::Read`] if they cannot be read.
+/// [`LogError::NotALog`] if they are wrong, [`LogError::Read`] if they cannot be read.
 pub(crate) fn begins_as_log(source: &mut impl Read, path: &Path) -> Result<(), LogError> {
     let mut magic = Vec::new();
     let mut begin = source.take(MAGIC.len() as u64);
@@ -69,7 +68,7 @@ pub struct LogFile {
     payload: Vec<u8>,
 }
 
-/// The file and what it takes to write into it.
+/// The file and the state for writing into it.
 struct OpenLog {
     path: PathBuf,
     /// `None` once it has failed.
@@ -79,7 +78,7 @@ struct OpenLog {
     flushed_ns: u64,
 }
 
-/// Takes away a log that has no whole head: there is nothing in it. A device stays.
+/// Removes a log without a complete head: there is nothing in it. A device stays.
 fn discard(path: &Path) {
     if path.is_file() {
         let _ = std::fs::remove_file(path);
@@ -87,7 +86,7 @@ fn discard(path: &Path) {
 }
 
 impl LogFile {
-    /// Creates the log with all its channels. Of one whose head cannot be written nothing stays.
+    /// Creates the log with all its channels. If its head cannot be written, no file is left.
     ///
     /// # Errors
     /// [`LogError::Output`] if the file cannot be created, [`LogError::Log`] if its header
@@ -160,7 +159,7 @@ impl LogFile {
         Ok(self)
     }
 
-    /// Why nothing more is written, as soon as that is so.
+    /// Why writing has stopped, if it has.
     #[must_use]
     pub fn failure(&self) -> Option<&LogError> {
         self.file.failed.as_ref()
@@ -283,7 +282,7 @@ fn rate(rate_hz: u32) -> String {
     }
 }
 
-/// Channel metadata: the units at a glance and per field, rate and meaning.
+/// Channel metadata: the units in brief and per field, rate and meaning.
 fn metadata(def: &ChannelDef) -> BTreeMap<String, String> {
     let mut metadata = BTreeMap::new();
     let units: Vec<String> = def

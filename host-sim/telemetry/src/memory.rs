@@ -26,7 +26,7 @@ impl<S> Row<S> {
     }
 }
 
-/// What was kept in memory: everything at full rate, unless [`Keep`] says otherwise.
+/// The samples kept in memory: everything at full rate, unless [`Keep`] says otherwise.
 #[derive(Debug, Clone, Default)]
 pub struct Recording {
     /// Joints 1 to 6 (index = number − 1).
@@ -45,7 +45,7 @@ pub struct Recording {
     pub master: Vec<Row<MasterSample>>,
     /// Legs and behaviours of a walk.
     pub behaviours: Vec<Row<BehaviourSample>>,
-    /// Bus as each board has heard it, addresses 1 to 8.
+    /// Bus as heard by each board, addresses 1 to 8.
     pub links: [Vec<Row<LinkSample>>; 8],
     /// Events.
     pub events: Vec<Row<Event>>,
@@ -66,9 +66,9 @@ pub struct Recording {
 pub struct Keep {
     /// Bit i: the channel with index i in the registry.
     channels: u64,
-    /// Every so many milliseconds of the channels that have 1 kHz.
+    /// Period of the rows kept from 1 kHz channels, ms.
     period_ms: u64,
-    /// Times in which they are kept whole, ns.
+    /// Times in which every row is kept, ns.
     whole_ns: Vec<Range<u64>>,
     /// Most events.
     events: usize,
@@ -104,9 +104,9 @@ impl Keep {
         }
     }
 
-    /// Rows of a bounded number, however long the run: up to a minute every sample, beyond it
-    /// one of so many that as many rows are kept, and all of those around the times `near_s`;
-    /// the first 20,000 events.
+    /// Rows of a bounded number, however long the run: up to a minute every sample; beyond it one of every
+    /// few, so that the number of rows stays the same, and all of those around the times `near_s`; the first
+    /// 20,000 events.
     ///
     /// The period of the rows shares no factor with the PWM periods (10 and 20 ms), so that rows
     /// meet the pulses in all phases.
@@ -186,9 +186,9 @@ impl Memory {
                 }
                 push(&mut data.links[number], t_ns, v);
             }
-            // Events come typed, by a way of their own.
+            // Events come typed, through their own method.
             SampleRef::Event(_) | SampleRef::Provenance(_) | SampleRef::State(_) => {}
-            // No analysis is of a server.
+            // No analysis uses a server's samples.
             SampleRef::Server(_) | SampleRef::Session(_) => {}
         }
     }

@@ -1,5 +1,4 @@
-//! Events as a person reads them: the one place that makes text of what happened. Nothing decides
-//! by these texts.
+//! Text of events for people: the one place that turns events into text. Nothing decides by these texts.
 
 mod refusal;
 
@@ -89,7 +88,7 @@ impl fmt::Display for BoardChange {
     }
 }
 
-/// A fault that somebody injects in a run begins when it does: its time is that of the event.
+/// A fault injected during a run begins at once: its time is that of the event.
 fn injected(fault: &FaultSpec) -> String {
     if fault.from_s <= 0.0 && fault.until_s.is_none() {
         fault.untimed()
@@ -349,7 +348,7 @@ fn hold_reason(reason: &HoldReason) -> String {
     )
 }
 
-/// A sentence as it stands behind a colon; what is all in capitals, or a symbol, stays so.
+/// A sentence for use after a colon; words all in capitals, and symbols, stay so.
 #[must_use]
 pub fn within(sentence: &str) -> String {
     let mut letters = sentence.chars();
@@ -366,7 +365,7 @@ pub fn within(sentence: &str) -> String {
     }
 }
 
-/// What is wrong with a board of another interface, and where it begins to differ.
+/// The problem of a board with another interface, and the first difference.
 fn other_interface(node: u8, master: u64, theirs: u64) -> String {
     let here = Side {
         name: "the master",
@@ -431,7 +430,7 @@ mod tests {
     use wheeleg_interface::archive;
     use wheeleg_protocol::{FaultCode, LimitBits, ResetCause, SCHEMA_HASH};
 
-    /// Whoever is told of a fault is told what happened and what to do.
+    /// A message about a fault says what happened and what to do.
     #[test]
     fn faults_and_findings_are_told_with_their_remedies() {
         let board = Address::joint(3).expect("a joint");

@@ -1,4 +1,4 @@
-//! Phases of a motion: their names, and their codes in the log. One table for all who show them.
+//! Phases of a motion: their names, and their codes in the log. One table for all outputs.
 
 use wheeleg_master::setpoint::Phase;
 
@@ -45,19 +45,18 @@ pub const fn code(phase: Phase) -> u8 {
     line(phase).1
 }
 
-/// What a log's code says.
+/// Meaning of a code in the log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Logged {
     /// The phases' names.
     pub name: String,
     /// Whether a foot is in the air.
     pub in_air: bool,
-    /// The phase ends a step, whose number belongs to it.
+    /// The phase ends a step, and belongs to its number.
     pub numbered: bool,
 }
 
-/// The phases behind a code of the log. None outside of steps and walks, and for a code of a
-/// later version.
+/// The phases for a code of the log. None outside of steps and walks, and for a code of a later version.
 #[must_use]
 pub fn logged(code: u8) -> Option<Logged> {
     let mut phases = LOGGED.into_iter().filter(|phase| line(*phase).1 == code);

@@ -2,7 +2,7 @@
 
 use wheeleg_protocol::Address;
 
-/// What is at boards 1 to 8: of a joint its cylinder, of a wheel its side.
+/// The place of boards 1 to 8: of a joint its cylinder, of a wheel its side.
 pub const PLACES: [&str; 8] = [
     "left yaw",
     "left horizontal",
@@ -14,7 +14,7 @@ pub const PLACES: [&str; 8] = [
     "right",
 ];
 
-/// A board by its name in events, and where it is: "joint 3 (left vertical)".
+/// A board by its name in events, and its place: "joint 3 (left vertical)".
 #[must_use]
 pub fn placed(board: Address) -> String {
     let index = usize::from(board.raw()).checked_sub(1);

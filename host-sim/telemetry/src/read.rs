@@ -1,5 +1,5 @@
-//! A log, message by message. What is read may be anybody's: a file that breaks off, that is of
-//! another program, or that is made to do harm.
+//! Reads a log, message by message. The file may come from anybody: it may break off, be another program's,
+//! or be made to do harm.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -40,14 +40,14 @@ pub struct Logged<'a> {
 pub struct Read {
     /// Messages of channels of this program.
     pub messages: u64,
-    /// Messages that are none of this program's, or too long.
+    /// Messages that are not this program's, or too long.
     pub others: u64,
     /// The log has its end; false where its writer was killed or its disk was full.
     pub whole: bool,
 }
 
-/// A long log is cut into parts, each a log by itself: `log.mcap`, `log.2.mcap`, `log.3.mcap`. The path
-/// of a part, from 1 on, of the log whose first part is `path`.
+/// The path of a part, from 1 on, of the log whose first part is `path`. A long log is split into parts, each
+/// a log by itself: `log.mcap`, `log.2.mcap`, `log.3.mcap`.
 #[must_use]
 pub fn part(path: &Path, number: u32) -> PathBuf {
     match (number, path.file_stem(), path.extension()) {
@@ -76,9 +76,9 @@ pub fn parts(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
 /// Reads `path` with the parts that follow it, and gives the messages in their order, until `take` breaks.
 ///
 /// # Errors
-/// [`LogError::Read`] if a file cannot be read, [`LogError::NotALog`] if `path` is no MCAP log,
-/// [`LogError::Foreign`] if it has messages, and none of a channel of this program,
-/// [`LogError::Empty`] if it has none.
+/// [`LogError::Read`] if a file cannot be read, [`LogError::NotALog`] if `path` is not an MCAP log,
+/// [`LogError::Foreign`] if it has messages, but none of a channel of this program, [`LogError::Empty`] if it
+/// has none.
 pub fn read(
     path: &Path,
     take: &mut dyn FnMut(Logged<'_>) -> ControlFlow<()>,
@@ -91,7 +91,7 @@ pub fn read(
     for part in parts(path) {
         let is_first = all.is_none();
         let read = read_from(BufReader::new(opened(&part)?), &part, &mut |logged| {
-            // What stands at the head of every part is given once.
+            // The messages at the head of every part are given once.
             if !is_first && Some(logged.channel) == head {
                 return ControlFlow::Continue(());
             }
@@ -100,7 +100,7 @@ pub fn read(
             next
         });
         let read = match read {
-            // A part that had just begun when its writer was killed.
+            // A part that had just been started when its writer was killed.
             Err(LogError::Empty { .. } | LogError::NotALog { .. }) if !is_first => Read {
                 messages: 0,
                 others: 0,
@@ -123,7 +123,7 @@ pub fn read(
     all.ok_or_else(|| LogError::Empty { path: path.into() })
 }
 
-/// The same of any source; `path` is its name for errors.
+/// The same from any source; `path` is its name for errors.
 ///
 /// # Errors
 /// As [`read`].
@@ -136,7 +136,7 @@ pub fn read_from(
     let (mut messages, mut others) = (0, 0);
     let whole = each(&mut source, path, &mut |message| {
         let topic = message.topic;
-        // What follows from the others.
+        // Derived channels.
         if derived().iter().any(|def| def.topic == topic) {
             return ControlFlow::Continue(());
         }
@@ -170,7 +170,7 @@ pub type TakeDerived<'a> = dyn FnMut(Derived, u64, &[u8]) -> ControlFlow<()> + '
 /// their order, until `take` breaks. True: the log has its end.
 ///
 /// # Errors
-/// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is no MCAP log.
+/// [`LogError::Read`] if the file cannot be read, [`LogError::NotALog`] if it is not an MCAP log.
 pub fn read_derived(path: &Path, take: &mut TakeDerived<'_>) -> Result<bool, LogError> {
     let (mut whole, mut broke) = (true, false);
     for part in parts(path) {
@@ -201,8 +201,8 @@ struct Passing<'a> {
     data: &'a [u8],
 }
 
-/// Gives every message until `take` breaks, or to the place where the log breaks off: false then.
-/// Of a channel only its topic is kept, which bounds what a log can make grow.
+/// Gives every message until `take` breaks, or until the log breaks off: false then. Of a channel only its
+/// topic is kept, which bounds the memory that a log can take.
 fn each(
     source: &mut dyn std::io::Read,
     path: &Path,
@@ -262,7 +262,7 @@ fn each(
     Ok(true)
 }
 
-/// Reads once, whatever signals come.
+/// Reads once, retrying after signals.
 pub(super) fn uninterrupted(
     source: &mut dyn std::io::Read,
     buffer: &mut [u8],
@@ -285,8 +285,8 @@ pub enum Scalar {
 }
 
 impl Logged<'_> {
-    /// Gives the fields whose names `wanted` has, with their place in it. What else stands in the
-    /// message is passed over, and so is the rest of one that is no JSON.
+    /// Gives the fields named in `wanted`, with their place in it. Skips all other fields of the message, and
+    /// the rest of a message that is not JSON.
     pub fn fields(&self, wanted: &[&str], take: &mut dyn FnMut(usize, Scalar)) {
         let mut json = serde_json::Deserializer::from_slice(self.payload);
         let _ = json.deserialize_map(Fields { wanted, take });

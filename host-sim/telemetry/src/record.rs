@@ -1,4 +1,4 @@
-//! One record of a log, which may be anybody's: a length in it is compared with what there is before
+//! Parses one record of a log, which may come from anybody: a length in it is checked against the data before
 //! memory is reserved for it.
 
 use mcap::records::{Record, op};
@@ -23,24 +23,24 @@ fn channel(rest: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// What follows so many parts.
+/// Skips `count` parts.
 fn parts(rest: &[u8], count: usize) -> Option<&[u8]> {
     (0..count).try_fold(rest, |rest, _| Some(part(rest)?.1))
 }
 
-/// A part that begins with its length, and what follows it.
+/// A part that begins with its length, and the data after it.
 fn part(rest: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = rest.split_first_chunk()?;
     rest.split_at_checked(u32::from_le_bytes(*length) as usize)
 }
 
-/// Bytes that a log may swell to, whatever its size.
+/// Bytes that a log may always swell to, whatever its size.
 const FREE: u64 = 64 << 20;
-/// How many times its size it may swell to beyond. Ours swell to 10 times theirs, zeros to
+/// Largest growth beyond that, as a multiple of its size. Our logs swell to 10 times their size, zeros to
 /// 10,000 times: a small file would be read for hours.
 const MOST: u64 = 500;
 
-/// How much a log swells as it is read.
+/// How much a log grows when decompressed.
 #[derive(Debug, Default)]
 pub(crate) struct Swelling {
     read: u64,
@@ -53,7 +53,7 @@ impl Swelling {
         self.read += bytes as u64;
     }
 
-    /// A record with so many bytes; false: it is too much for a file of that size.
+    /// Counts a record of `bytes` bytes; false: it is too much for a file of that size.
     pub(crate) fn give(&mut self, bytes: usize) -> bool {
         const HEAD: u64 = 9;
         self.given += HEAD + bytes as u64;
@@ -77,7 +77,7 @@ mod tests {
         let sound = [vec![7, 0, 0, 0], text("/joint/1"), text("json"), list].concat();
         let read = parse(op::CHANNEL, &sound);
         assert!(matches!(read, Some(Record::Channel(c)) if c.id == 7 && c.metadata.len() == 1));
-        // Each length of it, as large as it can be; in the list before the whole list as well.
+        // Each length of it, as large as possible; in the list before the whole list as well.
         for at in [4, 16, 24, 28, 33] {
             let mut long = sound.clone();
             long[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());

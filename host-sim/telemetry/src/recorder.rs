@@ -20,10 +20,10 @@ use crate::{Event, LogError};
 /// Corner of the low-pass on force and acceleration signals, Hz
 /// (`docs/decisions/0024-forces-in-plots.md`).
 pub const PLOT_CUTOFF_HZ: f64 = 20.0;
-/// Period of the samples that [`Recorder::joint`] is given, s.
+/// Period of the samples that [`Recorder::joint`] takes, s.
 const SAMPLE_PERIOD_S: f64 = 1e-3;
 
-/// When the log is due of a channel.
+/// When a channel is due in the log.
 #[derive(Debug, Clone)]
 struct Channel {
     def: &'static ChannelDef,
@@ -76,7 +76,7 @@ mod index {
 }
 
 impl<'a> Recorder<'a> {
-    /// A recorder that hashes, and keeps what it is told to.
+    /// A recorder that hashes, and keeps what `keep` asks for.
     #[must_use]
     pub fn new(keep: Keep) -> Self {
         let filters = JointFilters {
@@ -200,8 +200,7 @@ impl<'a> Recorder<'a> {
         t_ns >= self.next_contacts_ns && self.sinks.iter().any(|sink| sink.wants_contacts())
     }
 
-    /// Shows all contacts with the ground to the sinks that draw them: no samples, and no part of
-    /// the hash.
+    /// Passes all contacts with the ground to the sinks that draw them: no samples, and no part of the hash.
     pub fn contacts(&mut self, t_ns: u64, contacts: &[Contact]) {
         self.next_contacts_ns = (t_ns / CONTACTS_PERIOD_NS + 1) * CONTACTS_PERIOD_NS;
         for sink in self.sinks.iter_mut().filter(|sink| sink.wants_contacts()) {
@@ -217,13 +216,12 @@ impl<'a> Recorder<'a> {
         self.put(index::LINK, node, t_ns, &sample);
     }
 
-    /// Records how the server of a live robot keeps pace: no part of the hash, as no replay has the
-    /// same.
+    /// Records how the server of a live robot keeps pace: no part of the hash, as it differs in every replay.
     pub fn server(&mut self, t_ns: u64, sample: &ServerSample) {
         self.hand_on(index::SERVER, 0, t_ns, sample);
     }
 
-    /// Records what a live robot was given: no part of the hash, which is of what came of it.
+    /// Records the inputs of a live robot: no part of the hash, which covers their effect.
     pub fn session(&mut self, t_ns: u64, sample: &SessionSample) {
         self.hand_on(index::SESSION, 0, t_ns, sample);
     }
@@ -248,8 +246,8 @@ impl<'a> Recorder<'a> {
         self.put(index::RUN, 0, 0, &sample);
     }
 
-    /// Records a line of provenance as it was written, beside one that says the same in values: no part of
-    /// the hash, so that `1.0 m` and `1000 mm` are one.
+    /// Records a line of provenance as it was written, beside one with the same values: no part of the hash,
+    /// so that `1.0 m` and `1000 mm` are one.
     pub fn wording(&mut self, kind: &str, text: impl Into<String>) {
         let sample = ProvenanceSample {
             kind: kind.to_owned(),
@@ -258,8 +256,8 @@ impl<'a> Recorder<'a> {
         self.hand_on(index::RUN, 0, 0, &sample);
     }
 
-    /// A disk that takes nothing more, or takes again: a fault of the run, not of
-    /// this computer. What is not written is counted; memory and hash go on.
+    /// A disk that is full, or has room again: a fault of the run, not of this computer. Samples that are not
+    /// written are counted; memory and hash go on.
     pub fn set_disk_full(&mut self, full: bool) {
         self.disk_full = full;
     }
@@ -270,7 +268,7 @@ impl<'a> Recorder<'a> {
         self.hash.hex()
     }
 
-    /// Finishes the sinks and hands over what was kept.
+    /// Finishes the sinks and hands over the recording.
     ///
     /// # Errors
     /// The first error of the first sink that had one.
@@ -279,8 +277,7 @@ impl<'a> Recorder<'a> {
         failed.into_iter().next().map_or(Ok(recording), Err)
     }
 
-    /// Finishes the sinks and hands over what was kept, with the first error of each sink that
-    /// had one.
+    /// Finishes the sinks and hands over the recording, with the first error of each sink that had one.
     #[must_use]
     pub fn close(mut self) -> (Recording, Vec<LogError>) {
         let sinks = self.sinks.iter_mut();
@@ -328,7 +325,7 @@ impl<'a> Recorder<'a> {
             due,
             lost: self.disk_full,
         };
-        // A line of provenance is no event of the run.
+        // A line of provenance is not an event of the run.
         if first != index::RUN {
             self.memory.take(&taken);
         }

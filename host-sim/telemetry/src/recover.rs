@@ -1,4 +1,4 @@
-//! A whole log from one whose writer was killed.
+//! Makes a complete log from one whose writer was killed.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -16,20 +16,20 @@ use super::read::uninterrupted;
 use super::record::{self, Swelling};
 use crate::LogError;
 
-/// What [`recover`] made.
+/// The result of [`recover`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Recovered {
     /// Messages in the new file.
     pub messages: u64,
     /// Time of the last, ns.
     pub last_ns: u64,
-    /// Whether the old file was whole already.
+    /// Whether the old file was complete already.
     pub was_whole: bool,
-    /// Bytes of the old file behind the end of its log, such as another log; nothing of them is taken.
+    /// Bytes of the old file behind the end of its log, such as another log; they are not copied.
     pub behind: u64,
 }
 
-/// Largest chunk that is believed, bytes: where a file breaks off, its lengths are anything.
+/// Largest accepted chunk, bytes: where a file breaks off, its lengths can be anything.
 const MAX_CHUNK: usize = 1 << 30;
 
 /// Every chunk is checked before a message of it is given.
@@ -39,17 +39,15 @@ fn checked() -> LinearReaderOptions {
         .with_record_length_limit(MAX_CHUNK)
 }
 
-/// Writes everything that can be read in `from`, a log that has no end because its writer was
-/// killed or its disk was full, to the new file `to`, and reads that once more with all checks.
-/// Memory is bounded by a chunk. `None` if `stop` said so before the end; `to` is not left behind
-/// then, either.
+/// Copies everything that can be read from `from`, a log that has no end because its writer was killed or its
+/// disk was full, to the new file `to`, and reads that once more with all checks. Memory is bounded by a
+/// chunk. `None` if `stop` asked for it before the end; `to` is not left behind then, either.
 ///
 /// # Errors
 /// [`LogError::Output`] if `to` exists or cannot be written, [`LogError::Read`] if `from` cannot be read;
-/// [`LogError::NotALog`] if `from` is none, [`LogError::Empty`] if it has no whole chunk;
-/// [`LogError::Made`] if the new file cannot be written, [`LogError::Unreadable`] and
-/// [`LogError::Unsound`] if it cannot be read back. `to` is not
-/// left behind then, and `from` is never changed.
+/// [`LogError::NotALog`] if `from` is not a log, [`LogError::Empty`] if it has no whole chunk;
+/// [`LogError::Made`] if the new file cannot be written, [`LogError::Unreadable`] and [`LogError::Unsound`]
+/// if it cannot be read back. `to` is not left behind then, and `from` is never changed.
 pub fn recover(
     from: &Path,
     to: &Path,
@@ -156,7 +154,7 @@ fn copy(
     Ok(Some(recovered))
 }
 
-/// A log as it is written anew.
+/// A rewritten log.
 struct Copy {
     log: mcap::Writer<BufWriter<File>>,
     /// Numbers of schemas and channels there, by those of the old log.
@@ -166,7 +164,7 @@ struct Copy {
 }
 
 impl Copy {
-    /// Takes a record of the old log. A damaged one, such as a picture, costs nothing but itself.
+    /// Takes a record of the old log. If one is damaged, such as a picture, only that one is lost.
     fn take(&mut self, opcode: u8, data: &[u8]) -> Result<(), McapError> {
         match record::parse(opcode, data) {
             Some(Record::Schema { header, data }) => {

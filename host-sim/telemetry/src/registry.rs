@@ -1,4 +1,4 @@
-//! What a signal is, and the list of all of them.
+//! Definition of a signal, and the list of all of them.
 
 /// Which layer of the machine a signal belongs to (ARCHITECTURE.md).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,7 +121,7 @@ pub enum Written {
 }
 
 impl Written {
-    /// As the channel's metadata and the list of channels have it.
+    /// As in the channel's metadata and in the list of channels.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

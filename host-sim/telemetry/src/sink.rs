@@ -1,4 +1,4 @@
-//! Where samples go.
+//! Destinations of samples.
 
 use super::contact::Contact;
 use super::registry::Sample;
@@ -107,7 +107,7 @@ pub struct Taken<'a> {
     pub number: usize,
     /// Simulated time, ns.
     pub t_ns: u64,
-    /// The sample, with what the recorder computes.
+    /// The sample, with the values that the recorder computes.
     pub sample: SampleRef<'a>,
     /// Due in the log at the channel's declared rate.
     pub due: bool,
@@ -117,9 +117,8 @@ pub struct Taken<'a> {
 
 /// Takes every sample of every channel at full rate, in the order of the loop.
 ///
-/// It cannot fail in the middle of a run: a sink that can no longer write keeps its first
-/// error for [`Sink::finish`] and ignores what follows, so that neither the loop nor another
-/// sink suffers.
+/// It cannot fail in the middle of a run: a sink that can no longer write keeps its first error for
+/// [`Sink::finish`] and ignores later samples, so that neither the loop nor another sink suffers.
 pub trait Sink {
     /// Takes one sample.
     fn take(&mut self, taken: &Taken<'_>);
@@ -129,8 +128,8 @@ pub trait Sink {
         false
     }
 
-    /// Takes all contacts with the ground at one instant. They are no samples: no part of the hash.
-    /// `lost`: kept from the log by a fault of the run.
+    /// Takes all contacts with the ground at one instant. They are not samples: no part of the hash. `lost`:
+    /// kept from the log by a fault of the run.
     fn contacts(&mut self, _t_ns: u64, _contacts: &[Contact], _lost: bool) {}
 
     /// Takes an event as data; its sample comes by [`take`](Self::take), too.

@@ -112,7 +112,7 @@ fn every_channel_has_name_unit_and_schema_and_every_message_fits_it() {
             }
         }
     }
-    // A run is not served: what a server alone has is not there.
+    // A run is not served: it lacks the channels that only a server has.
     let declared = channels().iter().filter(|c| c.written != Written::Live);
     let declared: BTreeSet<String> = declared.map(|c| c.topic.to_owned()).collect();
     assert_eq!(topics, declared);
@@ -142,8 +142,8 @@ fn log_is_thinned_to_the_declared_rates_and_memory_is_not() {
     }
 }
 
-/// A killed process leaves a file without its end; at whatever byte it is cut,
-/// everything up to the last whole chunk is there.
+/// A killed process leaves a file without its end; wherever it is cut, everything up to the last whole chunk
+/// is there.
 #[test]
 fn cut_log_is_readable_up_to_the_last_chunk() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -159,7 +159,7 @@ fn cut_log_is_readable_up_to_the_last_chunk() {
     };
     let whole = last_time(&bytes).expect("messages");
     assert_eq!(whole, 2_998_000_000);
-    // Behind the last chunk the index begins.
+    // The index begins behind the last chunk.
     let index = mcap::Summary::read(&bytes).expect("a summary section");
     let chunks = index.expect("a summary section").chunk_indexes;
     let last = chunks.last().expect("chunks");
@@ -176,8 +176,8 @@ fn cut_log_is_readable_up_to_the_last_chunk() {
     }
 }
 
-/// From whatever byte it was cut at, a log is made that the strict reader opens, with every
-/// message that the other reader finds in the cut one.
+/// Wherever it was cut, the recovered log opens in the strict reader, with every message that the other
+/// reader finds in the cut one.
 #[test]
 fn a_cut_log_is_recovered_as_a_whole_one() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -204,7 +204,7 @@ fn a_cut_log_is_recovered_as_a_whole_one() {
     }
 }
 
-/// What follows a log, as where two were joined, is told.
+/// Data after the end of a log, as if two were joined, is reported.
 #[test]
 fn what_follows_the_end_of_a_log_is_told() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -224,7 +224,7 @@ fn what_follows_the_end_of_a_log_is_told() {
     }
 }
 
-/// A damaged file in a log, such as the robot's picture, costs nothing but itself.
+/// A damaged file in a log, such as the robot's picture, loses nothing but itself.
 #[test]
 fn a_log_with_a_damaged_attachment_keeps_every_message() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -252,8 +252,8 @@ fn a_log_with_a_damaged_attachment_keeps_every_message() {
     assert!(attachments(&path("new.mcap")).expect("a log").is_empty());
 }
 
-/// A damaged schema says no longer what a message means, and costs none of them: in a log without chunks,
-/// as other programs write it, whose records stand by themselves.
+/// A damaged schema no longer describes its messages, but none of them is lost: in a log without chunks, as
+/// other programs write it, whose records stand alone.
 #[test]
 fn a_log_with_a_damaged_schema_keeps_every_message() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -289,7 +289,7 @@ fn a_log_with_a_damaged_schema_keeps_every_message() {
     }
     writer.finish().expect("finished");
     let mut bytes = std::fs::read(path("log.mcap")).expect("written");
-    // No text any more; the first is the record, a later one that of the index.
+    // No longer text; the first is the record, a later one that of the index.
     let name = b"schema of /one";
     let at = bytes.windows(name.len()).position(|part| part == name);
     bytes[at.expect("its name")] = 0xff;
@@ -340,14 +340,14 @@ fn what_is_no_log_is_refused_and_no_file_is_overwritten() {
     assert_eq!(std::fs::read(path("notes.txt")).expect("kept"), b"notes");
 }
 
-/// A sink that fails keeps its error; the others and the hash go on.
+/// A sink that fails keeps its error; the others and the hash continue.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_takes_nothing_else_with_it() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let tables = Tables::create(folder.path(), 100).expect("writable");
     let full = LogFile::create(Path::new("/dev/full"));
-    // The device takes nothing from the first byte on.
+    // The device refuses every byte.
     assert!(full.is_err());
     let link = folder.path().join("joint-1.csv");
     drop(tables);
@@ -369,7 +369,7 @@ fn a_full_disk_takes_nothing_else_with_it() {
     assert_eq!(recording.joints[0].len(), 3000);
 }
 
-/// What is on disk while the process still runs, without any clean-up.
+/// The file on disk while the process still runs, without any clean-up.
 #[test]
 fn log_is_on_disk_before_the_recorder_is_closed() {
     let folder = tempfile::tempdir().expect("temporary folder");
@@ -442,8 +442,8 @@ impl Derive for Echo {
     }
 }
 
-/// What follows from a log changes neither its hash nor what is read of it, survives a cut, and
-/// shares a full disk.
+/// Derived channels of a log change neither its hash nor what is read of it, survive a cut, and share a full
+/// disk.
 #[test]
 fn derived_channels_stand_beside_and_change_nothing() {
     let folder = tempfile::tempdir().expect("temporary folder");

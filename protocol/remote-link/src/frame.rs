@@ -32,8 +32,7 @@ impl fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Writes the frame of `message` for the board with index `board` into
-/// `buffer`; gives the bytes to send.
+/// Writes the frame of `message` for the board with index `board` into `buffer`; returns the bytes to send.
 ///
 /// # Errors
 /// [`FrameError::TooLong`] if the buffer is too short ([`MAX_FRAME`] is enough).
@@ -63,7 +62,7 @@ pub fn decode<T: DeserializeOwned>(frame: &mut [u8]) -> Result<(u8, T), FrameErr
     let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
     let content = frame.get(..length).ok_or(FrameError::Damaged)?;
     match postcard::take_from_bytes_crc32(content, CRC.digest()) {
-        // Nothing may stand behind the checksum, which does not cover it.
+        // Nothing may follow the checksum, which would not cover it.
         Ok((message, [])) => Ok(message),
         _ => Err(FrameError::Damaged),
     }
@@ -95,13 +94,12 @@ impl Deframer {
         }
     }
 
-    /// Takes bytes from the front of `input`, which is shortened by what was
-    /// taken; gives the next message once it is complete, `None` when the
-    /// input is used up. Empty frames are passed over, so zeros may be sent
-    /// to resynchronise a line.
+    /// Takes bytes from the front of `input`, which is shortened by them; returns the next message once it is
+    /// complete, `None` when the input is used up. Empty frames are skipped, so zeros may be sent to
+    /// resynchronise a line.
     ///
     /// # Errors
-    /// A frame that cannot be read; the next call goes on behind it.
+    /// A frame that cannot be read; the next call continues behind it.
     pub fn next<T: DeserializeOwned>(
         &mut self,
         input: &mut &[u8],

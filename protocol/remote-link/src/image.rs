@@ -1,4 +1,4 @@
-//! What an ELF file says of the image in it, and whether that is what is wanted.
+//! Reads which image an ELF file holds, and checks that it is the wanted one.
 
 use std::fmt;
 use std::format;
@@ -13,16 +13,16 @@ pub use wheeleg_identity::{Digest, Identity, Kind};
 
 use crate::LINK_VERSION;
 
-/// An image that is not what is wanted.
+/// An image that is not the wanted one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WrongImage {
     /// The file.
     pub path: PathBuf,
-    /// What it is.
+    /// Its description.
     pub what: String,
-    /// What is wanted.
+    /// The wanted one.
     pub wanted: String,
-    /// What builds one that is wanted.
+    /// How to build the wanted one.
     pub build: &'static str,
 }
 
@@ -79,7 +79,7 @@ pub fn identify(
     }
 }
 
-/// The record, or what the file is instead.
+/// The record, or a description of the file.
 fn read(path: &Path) -> Result<Identity, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("cannot be read ({e})"))?;
     let elf: ElfFile32 = ElfFile32::parse(&*bytes)

@@ -1,10 +1,9 @@
-//! What the simulator and a board outside of it say to each other.
+//! Messages between the simulator and a board outside of it.
 //!
-//! A board outside is the firmware image on an emulated processor, the same
-//! application on another emulator, or a bench board whose sensors and valves
-//! travel over a serial line. The simulator asks, the board answers; exactly
-//! one [`Reply`] follows every [`Request`], in order. A program that hosts
-//! several boards tells them apart by the index in the frame.
+//! A board outside is the firmware image on an emulated processor, the same application on another emulator,
+//! or a bench board whose sensors and valves travel over a serial line. The simulator asks, the board
+//! answers; exactly one [`Reply`] follows every [`Request`], in order. A program that hosts several boards
+//! distinguishes them by the index in the frame.
 //!
 //! # Course of a session
 //!
@@ -13,11 +12,9 @@
 //! 3. [`Request::PowerUp`]: straps and unique id are set, the processor leaves
 //!    reset and runs its start-up code. The simulator's time zero is the first
 //!    edge of the board's tick timer.
-//! 4. [`Request::Run`] at every event that concerns the board: bytes that have
-//!    arrived, or a tick edge with the inputs latched at it. The board runs to
-//!    the instant named and answers with its outputs from then on (after an
-//!    edge: those that the tick before prepared) and with what it has
-//!    scheduled to send.
+//! 4. [`Request::Run`] at every event that concerns the board: arrived bytes, or a tick edge with the inputs
+//!    latched at it. The board runs to the given instant and answers with its outputs from then on (after an
+//!    edge: those that the tick before it prepared) and with the transmissions that it has scheduled.
 //! 5. [`Request::Hook`] for fault injection, [`Request::Bye`] at the end.
 //!
 //! In one `Run`, bytes come before the edge: a byte whose end falls on the
@@ -28,8 +25,8 @@
 //!
 //! # Framing
 //!
-//! `COBS(index, postcard(message), CRC-32C) 0x00`, see [`frame`]. The stream
-//! can be joined anywhere: what stands before the first zero is dropped.
+//! `COBS(index, postcard(message), CRC-32C) 0x00`, see [`frame`]. The stream can be joined anywhere: bytes
+//! before the first zero are dropped.
 //!
 //! # Glossary
 //!
@@ -86,7 +83,7 @@ pub const MAX_TEXT: usize = 192;
 /// A short text.
 pub type Text = heapless::String<MAX_TEXT>;
 
-/// A text cut to what fits, at a character boundary.
+/// A text cut to the available length, at a character boundary.
 #[must_use]
 pub fn text(text: &str) -> Text {
     let mut out = Text::new();

@@ -5,22 +5,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Inputs, MAX_SENT, MAX_TRANSMISSIONS, Nonvolatile, Text};
 
-/// What a board answers.
+/// A board's answer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[expect(
     clippy::large_enum_variant,
     reason = "a message is built where it is sent; boxes need a heap that a board lacks"
 )]
 pub enum Reply {
-    /// Who answers.
+    /// The board's identity.
     Hello(Hello),
-    /// Done, nothing to tell.
+    /// Done, nothing to report.
     Done,
     /// The board ran.
     Ran(Ran),
     /// Contents of the parameter store.
     Nonvolatile(Nonvolatile),
-    /// The request cannot be carried out; the board goes on as before.
+    /// The request cannot be carried out; the board continues as before.
     Refused(Text),
     /// The emulation has come to an end, with the reason: an access that no
     /// model knows, a hard fault, a frame that cannot be read. Nothing but
@@ -35,7 +35,7 @@ pub struct Hello {
     pub version: u16,
     /// The image.
     pub image: Image,
-    /// What it runs on, for the report: "STM32G431, Unicorn 2.1.5".
+    /// Its host, for the report: "STM32G431, Unicorn 2.1.5".
     pub host: String<48>,
     /// The valves of this board can never be real ones.
     pub outputs_are_virtual: bool,
@@ -46,30 +46,27 @@ pub struct Hello {
 pub struct Image {
     /// Name: `joint` or `wheel`.
     pub name: String<24>,
-    /// First 16 bytes of a digest over the image's bytes, zero where the
-    /// board does not know it.
+    /// First 16 bytes of a digest over the image's bytes, zero if the board does not know it.
     pub digest: [u8; 16],
-    /// Processor clock \[Hz\], 0 where unknown.
+    /// Processor clock \[Hz\], 0 if unknown.
     pub clock_hz: u32,
 }
 
 /// State after a [`crate::Run`] or power-up.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ran {
-    /// Outputs as they act now. After a `Run` with an edge that is: from this
-    /// edge on, as the tick *before* it prepared them, so that a board need
-    /// not have worked off the new tick when it answers.
+    /// Outputs that act now. After a `Run` with an edge these are: from this edge on, as the tick *before* it
+    /// prepared them, so that a board need not have finished the new tick when it answers.
     pub outputs: Outputs,
-    /// Inputs as the application read them in the last tick that was worked
-    /// off, which may be the one before the newest edge. Equal to what was
-    /// latched unless the board support is wrong.
+    /// Inputs as the application read them in the last finished tick, which may be the one before the newest
+    /// edge. Equal to the latched ones unless the board support is wrong.
     pub seen: Inputs,
     /// Edge of the tick that `seen` and `figures` belong to \[ns\].
     pub seen_at_ns: u64,
     /// Period of the tick timer from now on \[µs\]: 1000 on a joint board, the
     /// sample time on a wheel board, 0 while no tick timer runs.
     pub period_us: u32,
-    /// What the board has scheduled to send since the last reply.
+    /// Transmissions that the board has scheduled since the last reply.
     pub sent: Vec<Sent, MAX_TRANSMISSIONS>,
     /// Measurements.
     pub figures: Figures,
@@ -108,7 +105,7 @@ pub struct Figures {
     pub tick_instructions: u32,
     /// Most instructions between two sleeps so far, whatever caused them.
     pub longest_awake: u32,
-    /// Instructions since the last reply, all told.
+    /// Total instructions since the last reply.
     pub instructions: u32,
     /// Deepest stack so far \[bytes\].
     pub stack_used: u32,

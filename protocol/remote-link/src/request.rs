@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{MAX_NONVOLATILE, MAX_RECEIVED, Text};
 
-/// What the simulator asks of a board.
+/// A request of the simulator to a board.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
     /// Opens the session; answered with [`crate::Reply::Hello`] whatever the version.
@@ -21,8 +21,8 @@ pub enum Request {
     PowerUp(Straps),
     /// Runs the board; answered with [`crate::Reply::Ran`].
     Run(Run),
-    /// Provokes a fault; answered with [`crate::Reply::Done`], or
-    /// [`crate::Reply::Refused`] where the board cannot.
+    /// Provokes a fault; answered with [`crate::Reply::Done`], or [`crate::Reply::Refused`] if the board
+    /// cannot.
     Hook(Hook),
     /// Asks for contents of the parameter store; answered with
     /// [`crate::Reply::Nonvolatile`].
@@ -37,7 +37,7 @@ pub enum Request {
     Bye,
 }
 
-/// A stretch of the parameter store, as it stands in the flash memory.
+/// A stretch of the parameter store, as it is in the flash memory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Nonvolatile {
     /// First byte, from the beginning of the store.
@@ -46,7 +46,7 @@ pub struct Nonvolatile {
     pub bytes: Vec<u8, MAX_NONVOLATILE>,
 }
 
-/// What is wired to a board for good.
+/// Fixed wiring of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Straps {
     /// Bus address, 1 to 8.
@@ -61,13 +61,11 @@ pub struct Straps {
 /// One stretch of the board's life.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Run {
-    /// Run to this instant \[ns\]. With an edge, the edge's inputs are latched
-    /// and the outputs prepared for it act; the tick itself may be worked off
-    /// later. Without an edge, run on until all that was received is worked
-    /// off, so that the reply holds the transmissions it has led to.
+    /// Run to this instant \[ns\]. With an edge, the edge's inputs are latched and the outputs prepared for
+    /// it act; the tick itself may be executed later. Without an edge, run on until all received bytes are
+    /// processed, so that the reply holds the resulting transmissions.
     pub until_ns: u64,
-    /// A tick edge falls on `until_ns`, with these inputs latched. Without an
-    /// edge the inputs stay as they are.
+    /// A tick edge falls on `until_ns`, with these inputs latched. Without an edge the inputs stay unchanged.
     pub edge: Option<Inputs>,
     /// State of the supply: failing, from the end of the last run on; back, from the end
     /// of this one on.
@@ -121,7 +119,7 @@ impl Switches {
         ]
     }
 
-    /// The supply-pressure switch alone.
+    /// Only the supply-pressure switch.
     #[must_use]
     pub const fn from_supply(present: bool) -> Self {
         Self(if present { Self::SUPPLY } else { 0 })
@@ -140,8 +138,8 @@ pub enum Power {
     /// In range.
     #[default]
     Good,
-    /// Below the brown-out threshold: the processor is held in reset, all
-    /// outputs are off, RAM is lost, the store stays.
+    /// Below the brown-out threshold: the processor is held in reset, all outputs are off, RAM is lost, the
+    /// store is kept.
     BrownOut,
 }
 
@@ -149,12 +147,12 @@ pub enum Power {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "as for `Reply`")]
 pub enum Hook {
-    /// The main loop stops for good, interrupts go on: the watchdog must bite.
+    /// The main loop stops for good, interrupts still run: the watchdog must bite.
     /// Acts until the next reset.
     StopMainLoop,
     /// The processor stops altogether, its timers go on. Acts until the next reset.
     StopProcessor,
-    /// The program jumps to where nothing is, once it has done its tick: the processor faults.
+    /// The program jumps to an unmapped address, once it has finished its tick: the processor faults.
     FaultProcessor,
     /// One bit of RAM flips now.
     FlipBit {
@@ -172,8 +170,8 @@ pub enum Hook {
         /// Units still completed.
         after: u16,
     },
-    /// The bus transmitter takes this many times as long for each byte, as one whose
-    /// clock is wrong; 1 is sound. Acts until the next reset.
+    /// The bus transmitter takes this many times as long for each byte, as with a wrong clock; 1 is sound.
+    /// Acts until the next reset.
     StretchTransmission {
         /// At least 1.
         times: u8,

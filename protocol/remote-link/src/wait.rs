@@ -1,5 +1,5 @@
-//! How two processes wait for each other that take turns on cores of their own: to wake
-//! a process takes longer than most of what it is asked.
+//! How two processes that take turns on separate cores wait for each other: waking a process takes longer
+//! than most requests.
 
 use std::os::fd::AsFd;
 

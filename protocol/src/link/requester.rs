@@ -138,7 +138,7 @@ impl Requester {
         }
     }
 
-    /// Opens a request; gives its sequence.
+    /// Opens a request; returns its sequence.
     ///
     /// # Errors
     /// [`Refusal`]: one is open already, or this is no request to a node.
@@ -165,7 +165,7 @@ impl Requester {
         Ok(sequence)
     }
 
-    /// What to do at `now_us`. Giving up is said once and closes the request.
+    /// What to do at `now_us`. Giving up is reported once and closes the request.
     pub fn poll(&mut self, now_us: u64) -> Step {
         let Some(open) = &self.open else {
             return Step::Idle;
@@ -192,8 +192,8 @@ impl Requester {
         }
     }
 
-    /// Says that the request of [`Step::Send`] went out at `now_us`. Until then
-    /// [`Self::poll`] keeps asking: a request may have to wait for room in the cycle.
+    /// Records that the request of [`Step::Send`] went out at `now_us`. Until then [`Self::poll`] keeps
+    /// asking: a request may have to wait for room in the cycle.
     pub fn sent(&mut self, now_us: u64) {
         if let Some(open) = &mut self.open {
             open.sent = open.sent.saturating_add(1);
@@ -201,8 +201,8 @@ impl Requester {
         }
     }
 
-    /// Takes a message from the bus; gives the outcome if it answers the open
-    /// request. Everything else (late answers, other nodes, other types) is `None`.
+    /// Takes a message from the bus; returns the outcome if it answers the open request. For everything else
+    /// (late answers, other nodes, other types) `None`.
     pub fn on_message(&mut self, envelope: Envelope, message: &Message) -> Option<Outcome> {
         let open = self.open.as_mut()?;
         let request_type = open.request.message_type();

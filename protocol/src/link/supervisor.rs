@@ -38,9 +38,9 @@ impl Default for WatchdogCycles {
     }
 }
 
-/// Largest step of the counter that is an advance: the longest watchdog, and one more. A master
-/// that starts again counts from 1; with a window of half the range half of all restarts would
-/// look as if the old one went on, with this one those within 11 counts before the wrap.
+/// Largest step of the counter that is an advance: the longest watchdog, and one more. A restarted master
+/// counts from 1; with a window of half the range half of all restarts would look as if the old one went on,
+/// with this one only those within 11 counts before the wrap.
 pub const ADVANCE_MOST: u16 = 11;
 
 /// Why a link was declared lost.
@@ -133,8 +133,8 @@ impl LinkSupervisor {
             }
         } else {
             self.stale_since_advance = true;
-            // A master that started again counts from anew: follow it once the link
-            // is not in use, so that it can be cleared.
+            // A restarted master counts from the start: follow it once the link is not in use, so that it can
+            // be cleared.
             if self.state != LinkState::Up {
                 self.counter = Some(cycle);
             }
@@ -158,7 +158,7 @@ impl LinkSupervisor {
         None
     }
 
-    /// Ends the latch of a lost link, on an explicit command alone.
+    /// Clears the latch of a lost link, only on an explicit command.
     ///
     /// # Errors
     /// [`ClearError`] while no SYNC with an advancing counter arrives.
@@ -192,7 +192,7 @@ impl LinkSupervisor {
         self.watchdog = watchdog;
     }
 
-    /// The end of the time does not wrap; that of a damaged instant does, and is past.
+    /// The end of the time does not wrap; that of a damaged instant does, and lies in the past.
     fn is_fresh(&self, now_us: u64) -> bool {
         self.advanced_at_us
             .is_some_and(|at| now_us <= at.wrapping_add(self.watchdog.timeout_us()))
@@ -314,8 +314,8 @@ mod tests {
         assert_eq!(link.poll(1_100_001), None);
     }
 
-    /// A new master counts from 1. Just before the wrap the counter cannot tell it from the old
-    /// one; the master itself finds that a board is armed that it has not armed.
+    /// A new master counts from 1. Just before the wrap the counter cannot distinguish it from the old one;
+    /// the master itself finds a board armed that it has not armed.
     #[test]
     fn a_master_that_starts_again_is_stale_but_for_eleven_counts_before_the_wrap() {
         for last in 65_526..=u16::MAX {

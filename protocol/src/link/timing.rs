@@ -1,7 +1,7 @@
 //! Who may send when, and what share of the line the cyclic traffic takes.
 //!
-//! All of it follows from message sizes at compile time: COBS costs one byte
-//! for every frame, so a frame's time on the line depends on its type alone.
+//! All of it follows from message sizes at compile time: COBS costs one byte for every frame, so a frame's
+//! time on the line depends only on its type.
 
 use crate::address::{Address, NODES};
 use crate::message::{Message, MessageType};
@@ -12,13 +12,12 @@ pub const BAUD: u32 = 1_000_000;
 const BITS_PER_BYTE: u32 = 10;
 /// Bus cycle, µs.
 pub const CYCLE_US: u32 = 10_000;
-/// From the end of a frame to the start of the answer to it, µs: driver
-/// switching, and the work of the board. The worst case is the SYNC, which ends
-/// 20 µs after a tick edge: the conversion of that edge (23 µs), its tick and
-/// the SYNC itself come first, then the answer must stand ready in hardware.
+/// From the end of a frame to the start of the answer to it, µs: driver switching, and the work of the board.
+/// The worst case is the SYNC, which ends 20 µs after a tick edge: the conversion of that edge (23 µs), its
+/// tick and the SYNC itself come first, then the answer must be ready in hardware.
 pub const TURNAROUND_US: u32 = 100;
-/// The same to the answer to [`MessageType::ParamSet`], µs: the board first works out
-/// anew what follows from its parameters, which takes up to a third of it.
+/// The same to the answer to [`MessageType::ParamSet`], µs: the board first recalculates everything that
+/// follows from its parameters, which takes up to a third of it.
 pub const SETTING_US: u32 = 1000;
 /// Idle line between slots, µs.
 pub const GAP_US: u32 = 20;
@@ -26,7 +25,7 @@ pub const GAP_US: u32 = 20;
 const MAX_SHARE_PERMILLE: u32 = 400;
 /// A motion command may lie at most this many bus cycles ahead of its deadline.
 pub const MAX_DEADLINE_CYCLES: u16 = 200;
-/// A repeated request is known as such for this long, µs.
+/// A repeated request is recognized for this long, µs.
 pub const DUPLICATE_WINDOW_US: u64 = 500_000;
 
 /// Slots for the answers to [`MessageType::Discover`]; a power of two.
@@ -109,10 +108,9 @@ impl SlotTiming {
         self.cyclic_us().saturating_mul(1000).div_ceil(CYCLE_US)
     }
 
-    /// Start of a board's answer to [`MessageType::Discover`], µs after the end of
-    /// the request: one of [`DISCOVERY_SLOTS`] slots, chosen by the unique id and
-    /// the newest bus cycle. Two boards meet in one slot in one of eight cycles,
-    /// and in the next choose anew.
+    /// Start of a board's answer to [`MessageType::Discover`], µs after the end of the request: one of
+    /// [`DISCOVERY_SLOTS`] slots, chosen by the unique id and the newest bus cycle. Two boards meet in one
+    /// slot in one of eight cycles, and choose again in the next.
     #[must_use]
     pub fn discovery_us(self, unique_id: &[u8; 12], cycle: u16) -> u32 {
         // FNV-1a, 32 bit, over the cycle's low byte and the id; its upper bits. (With a
@@ -198,9 +196,9 @@ const _: () = {
     }
 };
 
-/// Whether a motion command may still take effect: `deadline_cycle` is the
-/// present cycle or at most [`MAX_DEADLINE_CYCLES`] ahead of it, modulo 2^16.
-/// So a command that was kept in a queue over a broken link is refused.
+/// Whether a motion command may still take effect: `deadline_cycle` is the present cycle or at most
+/// [`MAX_DEADLINE_CYCLES`] ahead of it, modulo 2^16. So a command that was kept in a queue over a broken link
+/// is refused.
 #[must_use]
 pub const fn deadline_is_live(deadline_cycle: u16, present_cycle: u16) -> bool {
     deadline_cycle.wrapping_sub(present_cycle) <= MAX_DEADLINE_CYCLES

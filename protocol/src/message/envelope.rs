@@ -1,9 +1,9 @@
-//! Who sends a message to whom.
+//! Sender and receiver of a message.
 
 use crate::address::Address;
 use crate::frame::Header;
 
-/// Who sends a message to whom, and its sequence.
+/// Sender and receiver of a message, and its sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Envelope {
     /// Sender; never broadcast.

@@ -3,7 +3,7 @@
 
 use wheeleg_protocol::{Address, Envelope};
 
-/// A frame that must be accepted, and what it says.
+/// A frame that must be accepted, and its contents.
 pub(crate) struct Accepted {
     /// Bytes on the line.
     pub(crate) bytes: Vec<u8>,

@@ -43,7 +43,7 @@ loaded!(loaded_rpp_fd, RPP, Rpp, forward);
 loaded!(loaded_rpr_id, RPR, Rpr, inverse);
 loaded!(loaded_rpr_fd, RPR, Rpr, forward);
 
-/// Peer of the rows whose parameters are known at run time only.
+/// Peer of the rows whose parameters are known only at run time.
 const LOADED: &str = "_loaded";
 
 pub(crate) fn run() {
@@ -71,7 +71,7 @@ fn per_call(name: &str, detail: &str, states: &[LegState], call: Call, decimals:
     let took = timed(|| {
         for _ in 0..repetitions {
             for s in states {
-                // By reference: what matters is that it is computed, not copied.
+                // By reference: the value must be computed, not copied.
                 let _ = black_box(&call(&s.q, &s.v, &s.a, &gravity));
             }
         }

@@ -1,8 +1,8 @@
 //! What the comparison and the tests need besides the project's own code: a second engine of the
 //! dynamics, which no run steps, and the generator of the inputs.
 //!
-//! The engine is timed against the C references, and it is an oracle: it gives what the natural
-//! orthogonal complement of `wheeleg-plant` gives, in another way.
+//! The engine is timed against the C references. It is also an oracle: it computes the results of the natural
+//! orthogonal complement of `wheeleg-plant` in another way.
 //!
 //! # Glossary
 //!

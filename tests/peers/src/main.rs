@@ -19,7 +19,7 @@ mod terrain;
 
 use std::process::ExitCode;
 
-/// A group of cases and what runs it.
+/// A group of cases and its function.
 type Group = (&'static str, fn());
 
 const GROUPS: [Group; 7] = [

@@ -4,7 +4,7 @@ use std::env;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// What an interval took: processor time of this thread, and time on the wall (s).
+/// Duration of an interval: processor time of this thread, and wall time (s).
 #[derive(Clone, Copy)]
 pub(crate) struct Took {
     pub(crate) cpu_s: f64,

@@ -32,7 +32,7 @@ pub(crate) fn run() {
     plant("pneu_full", &full());
 }
 
-/// The plant at the reference's parameters with all that the reference has not: heat exchange, tubes,
+/// The plant at the reference's parameters plus the effects that the reference lacks: heat exchange, tubes,
 /// leaks.
 fn full() -> AxisParams {
     let mut axis = bench_axis();

@@ -1,5 +1,5 @@
-//! The whole plant on every kind of terrain, in steps of 100 µs, valves and wheels at work: what a
-//! run steps, without firmware, bus and log.
+//! The whole plant on every kind of terrain, in steps of 100 µs, with active valves and wheels: the steps of
+//! a run without firmware, bus and log.
 
 use std::hint::black_box;
 use std::sync::Arc;

@@ -144,7 +144,7 @@ fn draw<const N: usize>(random: &mut Pcg64Mcg, size: f64) -> [f64; N] {
 fn own_leg_agrees_with_the_natural_orthogonal_complement() {
     let p = RobotDynamicsParams::wheeleg_2003();
     let viscous = [20.0, 15.0, 12.0];
-    // Bodies of the robot, and bodies whose mass centres lie nowhere special.
+    // The robot's bodies, and bodies with mass centres in general positions.
     let mut skew = p.leg_bodies;
     for (i, body) in skew.iter_mut().enumerate() {
         let k = 0.01 * (i as f64 + 1.0);

@@ -37,7 +37,7 @@ proptest! {
     fn chain_engine(q in numbers::<3>(), v in numbers::<3>(), f in numbers::<3>(), g in numbers::<3>()) {
         let g = g.map(|x| 10.0 * x);
         for at in 0..4 {
-            // All of them odd, or one argument among ordinary ones.
+            // All of them odd, or one odd argument among ordinary ones.
             let pick = |k: usize, odd: [f64; 3]| if at == 0 || at == k { odd } else { [0.1, 0.3, -0.2] };
             let (q, v, f) = (pick(1, q), pick(2, v), pick(3, f));
             right(RPP.inverse(&q, &v, &f, &g))?;

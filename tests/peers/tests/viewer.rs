@@ -1,5 +1,5 @@
-//! The crate `foxglove`, which is Foxglove's own, as a peer of the console's socket for viewers: its types write what we are
-//! asked and read all that we answer. The crate has no client; the socket is tungstenite's.
+//! Foxglove's own crate `foxglove` as a peer of the console's socket for viewers: its types write our
+//! requests and read all our answers. The crate has no client; the socket is tungstenite's.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::TcpStream;
@@ -22,7 +22,7 @@ use wheeleg_console::keys::Keys;
 use wheeleg_console::{Live, Options, Protection, Server};
 
 const URDF: &str = "package://wheeleg/wheeleg.urdf";
-/// What is told at events alone, or once: a robot that stands may have no need of it.
+/// Channels that send only on events, or once: a standing robot may not need them.
 const SELDOM: [&str; 3] = ["/events", "/log", "/session"];
 
 /// One viewer.
@@ -46,7 +46,7 @@ impl Viewer {
         self.0.send(Message::Text(text.into())).expect("sent");
     }
 
-    /// Reads messages, each of which the crate must understand, until one is as wanted.
+    /// Reads messages, each of which the crate must understand, until one matches.
     fn until<T>(
         &mut self,
         what: &str,
@@ -77,8 +77,8 @@ fn of_schema<T: DeserializeOwned>(payload: &[u8]) -> T {
     })
 }
 
-/// Reads a message of a channel, by the crate's types where its schema is Foxglove's; frames and joints
-/// that it names.
+/// Reads a message of a channel, with the crate's types where its schema is Foxglove's; returns the frames
+/// and joints that it names.
 fn read(
     channel: &Channel<'_>,
     payload: &[u8],
@@ -207,7 +207,7 @@ fn the_crate_of_foxglove_reads_every_channel_and_all_that_is_answered() {
     let by_id: BTreeMap<u32, &Channel<'static>> =
         channels.iter().map(|c| (c.id as u32 + 1_000, c)).collect();
     let mut missing: BTreeSet<&str> = channels.iter().map(|c| &*c.topic).collect();
-    // Behaviours are those of a walk: a robot that stands tells nothing of them.
+    // Behaviours belong to a walk: a standing robot reports none.
     assert!(missing.remove("/behaviours"));
     let (mut frames, mut joints) = (BTreeSet::new(), BTreeSet::new());
     let mut last_time = 0;

@@ -1,4 +1,4 @@
-//! What has to hold in every built-in walk, with every behaviour on.
+//! Requirements of every built-in walk, with every behaviour on.
 
 use wheeleg_config::{Motion, builtin};
 use wheeleg_telemetry::{EventCode, Recording};

@@ -1,4 +1,4 @@
-//! What is measured of a run, each the metric of a behaviour.
+//! Metrics of a run, one per behaviour.
 
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::walk::WalkGeometry;
@@ -64,7 +64,7 @@ pub(super) fn onto_nothing(recording: &Recording) -> f64 {
     count as f64
 }
 
-/// Reaches of more than 1.5 s, and those that a joint's board ended because nothing moved.
+/// Reaches of more than 1.5 s, and those that a joint's board ended for lack of motion.
 pub(super) fn stalled_swings(recording: &Recording) -> f64 {
     let mut stalled = 0_u32;
     for codes in codes(recording) {
@@ -140,7 +140,7 @@ pub(super) fn drag_mm(recording: &Recording) -> f64 {
     drag_of(recording, &WalkGeometry::default())
 }
 
-/// The same of a robot of these dimensions.
+/// The same for a robot of these dimensions.
 pub(crate) fn drag_of(recording: &Recording, geometry: &WalkGeometry) -> f64 {
     let mut drag = 0.0;
     for (side, foot) in [Side::Left, Side::Right].into_iter().zip(&recording.feet) {

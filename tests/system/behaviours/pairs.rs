@@ -1,4 +1,4 @@
-//! The pairs: which robot walks where, and what is held against what.
+//! The pairs: which robot walks where, and which runs are compared.
 
 use wheeleg_master::behaviour::Behaviour;
 
@@ -24,7 +24,7 @@ fn level(_: u64) -> String {
     String::new()
 }
 
-/// Ground whose strip below the left foot is 60 mm deeper from a place on that the seed chooses.
+/// Ground whose strip below the left foot is 60 mm deeper from a place that the seed chooses.
 fn pits(seed: u64) -> String {
     let from = 1.0 + 0.01 * seed as f64;
     let mut text =
@@ -132,7 +132,7 @@ pub(super) const PAIRS: &[Pair] = &[
     },
     Pair {
         behaviour: Behaviour::LostContact,
-        // Its 10 mm would hide what this one does alone.
+        // Its 10 mm would hide the effect of this one alone.
         without: &[Behaviour::TipGuard],
         robot: "wheeleg",
         metric: "nose drop, mm",
@@ -192,7 +192,7 @@ pub(super) const PAIRS: &[Pair] = &[
         less: true,
         asked: 0.0,
         bracket: Some([0.0, 0.0]),
-        // The feet meet the wall after 3 s; 20 s are wanted until it gives up.
+        // The feet meet the wall after 3 s; the robot has 20 s to give up.
         duration_s: 23.0,
         walk: FLAT,
         rest: wall,

@@ -1,8 +1,7 @@
 //! One joint board on a bench: its cylinder, and a script in place of the master.
 //!
-//! The board is whatever answers requests of the board link, so that the same
-//! closed loop runs with the application in this process, on an emulator, or at
-//! the other end of a serial port.
+//! Any endpoint of the board link can be the board, so the same closed loop runs with the application in this
+//! process, on an emulator, or at the other end of a serial port.
 
 // Every test program uses another part of this module.
 #![allow(dead_code)]

@@ -149,7 +149,7 @@ fn clients(folder: &Path, all: &mut Vec<Driven>) {
     all.push(("SimError::Log", Box::new(log), vec!["none.mcap"]));
 }
 
-/// What ends a run of a scenario of a robot.
+/// The error that ends a run of a scenario of a robot.
 fn failure(scenario: &Scenario, robot: &RobotConfig, folder: &Path) -> SimError {
     match run_read(scenario, robot, 1, &Settings::new(folder)) {
         Ok(finished) => finished.result.failure.expect("it fails"),

@@ -15,7 +15,7 @@ use wheeleg_remote_link::FrameError;
 use wheeleg_studies::compare::{CaseId, UnknownVariation, Variation};
 use wheeleg_units::PositionMm;
 
-/// A reason with what must stand in it.
+/// A reason with the words it must contain.
 type Reason = (&'static str, Box<dyn Error>, Vec<&'static str>);
 
 /// One of each variant, under the name `Type::Variant`.

@@ -3,13 +3,13 @@
 
 use rand::{Rng, RngExt as _};
 
-/// A text with its lines changed, and what was done to it.
+/// A text with its lines changed, and the changes.
 pub(super) struct Mutant {
     pub(super) text: String,
     pub(super) what: String,
 }
 
-/// Units that people take for each other, most of them of the same quantity.
+/// Units that people confuse, most of them of the same quantity.
 const UNITS: [&[&str]; 11] = [
     &["m", "cm", "mm", "um", "s"],
     &["s", "ms", "us", "ns", "m"],
@@ -24,7 +24,7 @@ const UNITS: [&[&str]; 11] = [
     &["1", "%", "", "furlong"],
 ];
 
-/// What stands in the place of a number.
+/// Replacements for a number.
 const EDGES: [&str; 12] = [
     "0",
     "0.0",

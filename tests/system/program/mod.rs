@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::time::SystemTime;
 
-/// What the program is built from, seen from the root.
+/// Source folders of the program, relative to the root.
 const SOURCES: [&str; 3] = ["host-sim", "firmware", "protocol"];
 
 /// Path of the program.
@@ -69,7 +69,7 @@ fn build(root: &Path, profile: &Path) {
             "wheeleg-pil-unicorn",
             "--bin",
             "wheeleg",
-            // With a test, the features are those that the tests are built with.
+            // With a test, the features are those of the tests.
             "--test",
             "determinism",
         ])

@@ -1,4 +1,4 @@
-//! Every test asserts something, and none is switched off.
+//! Every test asserts something, and none is disabled.
 //!
 //! A test asserts if its body has a macro that can fail it (`assert…`, `prop_assert…`, `panic`), if it
 //! calls a function of its file or test program that does, or if a panic is what it expects. Functions
@@ -18,9 +18,9 @@ const LONG: &str = "ignore = \"long; `cargo xtask test` runs it\"";
 /// sees itself.
 #[derive(Default)]
 struct Functions {
-    /// Names that stand in the bodies of the functions of a name.
+    /// Names used in the bodies of the functions of a name.
     names: BTreeMap<String, BTreeSet<String>>,
-    /// Functions that assert, as far as is known.
+    /// Functions known to assert so far.
     asserting: BTreeSet<String>,
     /// File and name of each test.
     tests: Vec<(String, String)>,

@@ -1,8 +1,8 @@
 //! No import circles between the files of a crate.
 //!
-//! A file points at another when its code names something that stands there, directly or
-//! through re-exports. Between a module and its own ancestors arrows may point both ways, so
-//! those do not count; neither does code for tests alone.
+//! A file points at another when its code names an item defined there, directly or through re-exports.
+//! Between a module and its own ancestors arrows may point both ways, so those do not count; neither does
+//! code for tests alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,11 +14,11 @@ use syn::{Attribute, Item, UseTree};
 
 use super::{packages, root, text};
 
-/// Circles that are known, by the names of their files from the root. A circle that is gone
-/// must leave the list; one that grew or is new fails the test.
+/// Known circles, by the names of their files from the root. A circle that is gone must leave the list; a
+/// larger or new one fails the test.
 const KNOWN: [&[&str]; 0] = [];
 
-/// How many re-exports are followed to the place where something stands.
+/// How many re-exports are followed to the definition.
 const STEPS_MAX: usize = 8;
 
 #[test]
@@ -64,19 +64,19 @@ fn files_import_each_other_one_way() {
 #[derive(Debug)]
 struct Circle {
     files: Vec<PathBuf>,
-    /// From, to, the name that stands there.
+    /// From, to, the name defined there.
     arrows: Vec<(PathBuf, PathBuf, String)>,
 }
 
 type Names = Vec<String>;
 
-/// A module, be it a file or a part of one.
+/// A module: a file or a part of one.
 #[derive(Default)]
 struct Module {
     file: PathBuf,
-    /// What stands in it.
+    /// Its items.
     items: BTreeSet<String>,
-    /// What it brings into scope: a name, or `*`, and what for.
+    /// What it brings into scope: a name or `*`, with its path.
     uses: Vec<(String, Names)>,
     /// All paths in its code.
     paths: BTreeSet<Names>,
@@ -137,8 +137,7 @@ impl<'a> Tree<'a> {
         self.modules.insert(names, module);
     }
 
-    /// The module in which that stands which the module `from` calls `path`; `None` for what
-    /// is of another crate.
+    /// The module that defines the item which `from` calls `path`; `None` for another crate.
     fn resolve(&self, from: &[String], path: &[String], steps: usize) -> Option<&[String]> {
         let steps = steps.checked_sub(1)?;
         let (mut at, mut rest) = (from.to_vec(), path);
@@ -174,7 +173,7 @@ impl<'a> Tree<'a> {
             .map(|(key, _)| key.as_slice())
     }
 
-    /// Who names whom, with one of the names.
+    /// Which file names which, with one of the names.
     fn arrows(&self) -> BTreeMap<(&Path, &Path), String> {
         let mut arrows = BTreeMap::new();
         // The module that is the whole file.
@@ -203,7 +202,7 @@ impl<'a> Tree<'a> {
         arrows
     }
 
-    /// The circles: files each of which can be reached from each.
+    /// The circles: files that can all reach each other.
     fn circles(&self) -> Vec<Circle> {
         let arrows = self.arrows();
         let mut next: BTreeMap<&Path, Vec<&Path>> = BTreeMap::new();
@@ -294,7 +293,7 @@ fn attributes(item: &Item) -> &[Attribute] {
     }
 }
 
-/// What an item is called by others.
+/// Name of an item for other modules.
 fn name_of(item: &Item) -> Option<String> {
     let name = match item {
         Item::Const(i) => &i.ident,
@@ -337,7 +336,7 @@ impl Module {
         self.uses.push((name, path));
     }
 
-    /// The paths in what is given to a macro.
+    /// The paths in the arguments of a macro.
     fn tokens(&mut self, tokens: TokenStream) {
         let (mut path, mut colons): (Names, usize) = (Vec::new(), 0);
         for token in tokens {
@@ -402,7 +401,7 @@ impl<'ast> Visit<'ast> for Module {
     }
 }
 
-/// The circles of a made-up crate: names of files and what is in them.
+/// The circles of a made-up crate: file names and contents.
 fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let read = |path: &Path| {
         let file = files.iter().find(|(name, _)| Path::new(name) == path)?;
@@ -420,7 +419,7 @@ fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
 fn a_circle_is_found_whatever_way_it_is_written() {
     let root = ("src/lib.rs", "mod a; mod b; mod c;");
     let none: [&str; 0] = [];
-    // One way, whatever the names.
+    // One way, with any names.
     let b = ("src/b.rs", "pub struct B; pub fn b() {}");
     for a in [
         "use crate::b::B;",

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::{ARROWS, files, root};
 
-/// The list that a newcomer reads is the table that is held; crates of tests and tools are not in it.
+/// The list for newcomers matches the tested table; crates of tests and tools are not in it.
 #[test]
 fn the_architecture_lists_the_arrows() {
     let short = |name: &str| name.trim_start_matches("wheeleg-").to_owned();
@@ -43,7 +43,7 @@ fn the_architecture_lists_the_arrows() {
     assert_eq!(listed, table);
 }
 
-/// What a newcomer reads first fits into an hour.
+/// A newcomer's first reading fits into an hour.
 #[test]
 fn the_first_documents_are_short() {
     for (name, most) in [("README.md", 120), ("ARCHITECTURE.md", 150)] {

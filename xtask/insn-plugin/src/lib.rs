@@ -1,14 +1,13 @@
 //! QEMU TCG plugin (plugin API version 1: QEMU 4.2 to 8.x) that counts the
 //! instructions an image executes from one mark to the next.
 //!
-//! A mark is a function of the image; the first instruction of it is the
-//! instant. Arguments, after the plugin's file name, separated by commas:
+//! A mark is a function of the image; its first instruction is the instant. Arguments, after the plugin's
+//! file name, separated by commas:
 //!
 //! * `region=NAME:BEGIN:END`, any number of times: count from each execution of
 //!   the function BEGIN to the next of END,
-//! * `out=FILE`: where the result goes when the emulator ends, one line per
-//!   region: name, number of passes, then smallest, median and largest count,
-//!   and in which pass (from 0) the largest came first.
+//! * `out=FILE`: file of the result when the emulator ends, one line per region: name, number of passes, then
+//!   smallest, median and largest count, and in which pass (from 0) the largest came first.
 //!
 //! Counts are exact: every executed instruction adds one, in code that the
 //! emulator generates. The declarations below are written from QEMU's

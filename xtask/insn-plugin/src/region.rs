@@ -1,4 +1,4 @@
-//! Which marks there are, and what was counted between them.
+//! The marks, and the counts between them.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -47,7 +47,7 @@ struct Region {
     counts: Vec<u64>,
 }
 
-/// All regions and where the result goes.
+/// All regions, and the file of the result.
 #[derive(Debug)]
 pub(crate) struct Plan {
     regions: Vec<Region>,

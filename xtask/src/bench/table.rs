@@ -43,7 +43,7 @@ impl Sample {
     }
 }
 
-/// What a target bounds.
+/// Quantity bounded by a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Bound {
     /// Median of time over the reference's time in the same round.

@@ -1,5 +1,5 @@
-//! Runs beside the three-step test: with faults, both also with the predictive law, and with boards
-//! of three kinds.
+//! Runs besides the three-step test: with faults, both also with the predictive law, and with boards of three
+//! kinds.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,19 +19,18 @@ use crate::sizes;
 const PAPER: &str = "wheeleg-2003";
 const PREDICTIVE: &str = "wheeleg";
 
-/// What the log of a run has.
+/// Contents of the log of a run.
 #[derive(Debug)]
 enum Reported {
     /// A board latches the fault of this number in the protocol's table.
     Fault(u8),
-    /// A board tells the master that it has restarted.
+    /// A board reports to the master that it has restarted.
     Restart,
 }
 
-/// Runs in which boards latch faults, with what causes them: the master falls silent, a
-/// wheel runs against its drive, a valve does not open, the emergency stop; in which a
-/// board's supply or program fails in mid-move, and a request to brake ends with a tick
-/// edge; and what must be reported.
+/// Runs in which boards latch faults, with their causes: the master falls silent, a wheel runs against its
+/// drive, a valve does not open, the emergency stop; in which a board's supply or program fails in mid-move,
+/// and a request to brake ends with a tick edge; and the events that must be reported.
 const EVENTFUL: [(&str, &[&str], &[Reported]); 6] = [
     ("master-lost", &[], &[LINK_LOST]),
     (
@@ -65,8 +64,8 @@ const EMERGENCY_STOP: Reported = Reported::Fault(39);
 const ENCODER: Reported = Reported::Fault(41);
 const NO_MOTION: Reported = Reported::Fault(44);
 
-/// A run in which nothing happens says nothing about the ticks in which something does.
-/// `events` is the table of the run's events.
+/// Checks that the event happened: a run without events proves nothing about the ticks of one. `events` is
+/// the table of the run's events.
 fn ensure_reported(events: &str, what: &Reported) -> anyhow::Result<()> {
     let mut lines = events.lines();
     let columns: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -94,7 +93,7 @@ fn ensure_reported(events: &str, what: &Reported) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A tick that nobody counted is none that holds.
+/// An uncounted tick does not meet its limit.
 fn ensure_measured(worst: u64, image: &str) -> anyhow::Result<()> {
     ensure!(worst > 0, "no tick of an image `{image}` was counted");
     Ok(())
@@ -177,7 +176,7 @@ pub(super) fn predictive(emulator: &Path, images: &Path) -> StepResult<Value> {
     Ok(figures)
 }
 
-/// Which nodes of a mixed run are outside, and where.
+/// Nodes of a mixed run that are outside, and where.
 const MIXED: [&str; 10] = [
     "--node",
     "joint1=qemu",
@@ -191,10 +190,10 @@ const MIXED: [&str; 10] = [
     "wheel8=qemu",
 ];
 
-/// Part of the paper's test with boards of three kinds on one bus: in the simulator, as
-/// images on the emulated part, and on QEMU. No bit may differ from the host, and the log
-/// must be that of the native run. `images` are those of the emulated part, built in the
-/// same `way` as those for QEMU will be; gives what was compared.
+/// Part of the paper's test with boards of three kinds on one bus: in the simulator, as images on the
+/// emulated part, and on QEMU. No bit may differ from the host, and the log must equal that of the native
+/// run. `images` are those of the emulated part, built in the same `way` as those for QEMU will be; returns
+/// the compared quantities.
 pub(super) fn mixed(emulator: &Path, images: &Path, way: Way) -> StepResult<Value> {
     qemu::emulator()?;
     let folder = target_dir().join("pil-run").join("mixed");

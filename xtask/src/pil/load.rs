@@ -8,7 +8,7 @@ const TICKS_PER_S: f64 = 100.0;
 
 /// Processor time so far.
 pub(super) struct Meter {
-    /// Of everybody, and what a host of this machine has taken, ticks.
+    /// Of all programs, and taken by a host of this machine, ticks.
     all: u64,
     /// Of this program and those it has started and waited for, ticks.
     own: u64,
@@ -16,7 +16,7 @@ pub(super) struct Meter {
 }
 
 impl Meter {
-    /// Begins; `None` where the system does not tell.
+    /// Begins; `None` if the system has no such figures.
     pub(super) fn begin() -> Option<Self> {
         Some(Self {
             all: all(&fs::read_to_string("/proc/stat").ok()?)?,
@@ -25,7 +25,7 @@ impl Meter {
         })
     }
 
-    /// What others have used since then, in cores.
+    /// Use by others since then, in cores.
     pub(super) fn others(&self) -> Option<f64> {
         let now = Self::begin()?;
         let passed_s = self.since.elapsed().as_secs_f64();

@@ -8,11 +8,11 @@ use anyhow::{Context, Result, ensure};
 
 use crate::sizes::elf::Elf;
 
-/// Functions that are shown.
+/// Number of functions shown.
 const SHOWN: usize = 20;
 
-/// Prints the profiles that the boards of one run left in `folder`: of each image the
-/// board with the worst tick. What a function was inlined into counts there.
+/// Prints the profiles that the boards of one run left in `folder`: for each image the board with the worst
+/// tick. Inlined functions count for their caller.
 pub(super) fn print(folder: &Path, images: &Path) -> Result<()> {
     let mut worst: BTreeMap<String, (u64, BTreeMap<String, u64>)> = BTreeMap::new();
     for entry in fs::read_dir(folder).with_context(|| folder.display().to_string())? {

@@ -11,27 +11,27 @@ use crate::rust::build_wheeleg;
 /// Least speed of eight boards with the plant, times real time, on 2 cores.
 pub(super) const SPEED_LEAST: f64 = 2.0;
 
-/// Cores that others may use in a run that has to meet it: what a system does by itself.
+/// Cores that others may use in a run that has to meet the target: an idle system's own use.
 const OTHERS_MOST: f64 = 0.15;
 
 /// One run: times real time, and cores that others used meanwhile, if that is known.
 pub(super) type Speed = (f64, Option<f64>);
 
-/// Whether nobody else was at work in a run.
+/// Whether nothing else was running during a run.
 fn was_alone((_, others): Speed) -> bool {
     others.is_some_and(|cores| cores <= OTHERS_MOST)
 }
 
-/// Whether the target was met by a run that nobody is known to have disturbed.
+/// Whether a run without a known disturbance met the target.
 pub(super) fn is_met(runs: &[Speed]) -> bool {
     runs.iter()
         .any(|run| run.0 >= SPEED_LEAST && was_alone(*run))
 }
 
-/// The speeds against the target: the fastest of the runs that were alone on the machine must
-/// meet it. What disturbs a run only takes time, and some of it, as a virtual machine's
-/// neighbours, is seen by nobody; so every speed stands in the line. Where no run was alone
-/// nothing is judged, and not shown as met, either.
+/// The speeds against the target: the fastest of the runs that were alone on the machine must meet it. A
+/// disturbance only makes a run slower, and some of it, as by a virtual machine's neighbours, cannot be
+/// detected; so every speed is in the line. If no run was alone, nothing is judged, and not shown as met,
+/// either.
 ///
 /// # Errors
 /// The same line, if the target is missed.
@@ -62,8 +62,8 @@ pub(super) fn speed_verdict(runs: &[Speed]) -> Result<String, String> {
     }
 }
 
-/// Three steps on emulated boards, and the cores that others used meanwhile. Only the run
-/// itself is watched: what is built for it stands before.
+/// Three steps on emulated boards, and the cores that others used meanwhile. Only the run itself is watched:
+/// builds come before.
 pub(super) fn watched(
     folder: &str,
     environment: &[(&str, &Path)],

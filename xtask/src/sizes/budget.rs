@@ -16,16 +16,16 @@ pub(super) struct Budget {
     pub(super) stack_margin_min: f64,
     /// Used by the runs on emulated boards.
     pub(super) tick_instructions_max: u64,
-    /// Most instructions of a tick in the mean of a run, where that is limited.
+    /// Most instructions of a tick in the mean of a run, if that is limited.
     pub(super) tick_instructions_mean_max: Option<u64>,
-    /// Flash that is known to be missing, if it is.
+    /// Known excess of flash, if any.
     pub(super) flash_shortfall: Option<Shortfall>,
-    /// Instructions of a tick that are known to be too many, if they are.
+    /// Known excess of instructions of a tick, if any.
     pub(super) tick_shortfall: Option<Shortfall>,
 }
 
-/// A limit that is known to be missed: named in every run, never let grow, and
-/// an error once it is met.
+/// A limit that is known to be missed: named in every run, never allowed to grow, and an error once it is
+/// met.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Shortfall {
@@ -60,7 +60,7 @@ impl Budget {
         toml::from_str(&text).with_context(|| path.display().to_string())
     }
 
-    /// What is beyond the limits.
+    /// Figures beyond the limits.
     pub(super) fn breaches(&self, figures: &Figures) -> Vec<String> {
         let mut breaches = Vec::new();
         let mut limit = |what: &str, value: u64, max: u64| {
@@ -92,8 +92,8 @@ impl Budget {
         breaches
     }
 
-    /// What runs on emulated boards have shown to be beyond the limits, or beyond
-    /// the bound of the stack that was said to hold for every input.
+    /// Measurements on emulated boards beyond the limits, or beyond the bound of the stack that should hold
+    /// for every input.
     pub(super) fn breaches_of_run(&self, run: &Run, figures: &Figures) -> Vec<String> {
         let mut breaches = Vec::new();
         let (used, bound) = (run.stack_used_bytes, figures.stack_bound_bytes);

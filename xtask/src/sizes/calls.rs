@@ -1,4 +1,4 @@
-//! Who calls whom, and how deep that goes.
+//! The call graph, and its depth.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,8 +20,8 @@ pub(super) struct Node {
 /// Functions by address.
 pub(super) type Graph = BTreeMap<u32, Node>;
 
-/// The graph of an image and the functions with indirect calls, which may reach
-/// every function whose address stands anywhere in flash.
+/// The graph of an image and the functions with indirect calls, which may reach every function whose address
+/// is anywhere in flash.
 pub(super) fn graph(elf: &Elf) -> Result<(Graph, Vec<String>)> {
     let mut graph = Graph::new();
     let mut indirect = Vec::new();

@@ -1,4 +1,4 @@
-//! What is read out of an image.
+//! Data read from an image.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +16,7 @@ const FLASH: Range<u64> = 0x0800_0000..0x0802_0000;
 /// RAM of the part.
 const RAM: Range<u64> = 0x2000_0000..0x2000_8000;
 
-/// One function: where it lies, what it is called.
+/// One function: its address and its name.
 #[derive(Debug, Clone)]
 pub(super) struct Function {
     pub(super) address: u32,
@@ -33,7 +33,7 @@ pub(crate) struct Elf {
     pub(super) functions: BTreeMap<u32, Function>,
     /// Addresses at which data begins inside code.
     data: Vec<(u32, bool)>,
-    /// Stack use per function, as the compiler says.
+    /// Stack use per function, from the compiler.
     pub(super) stack_sizes: BTreeMap<u32, u32>,
     /// Names in the debug information.
     debug_names: Vec<u8>,
@@ -90,8 +90,7 @@ impl Elf {
             if name.starts_with("$d") || name.starts_with("$t") {
                 self.data.push((address as u32, name.starts_with("$d")));
             } else if symbol.kind() == SymbolKind::Text && FLASH.contains(&address) {
-                // Bit 0 says Thumb. Aliases share an address; the one that says
-                // its size wins.
+                // Bit 0 marks Thumb. Aliases share an address; the one with a size wins.
                 let address = address as u32 & !1;
                 let size = symbol.size() as u32;
                 let function = Function {
@@ -159,12 +158,12 @@ impl Elf {
             .sum()
     }
 
-    /// BLAKE3 of the flash up to the last byte that is written. An emulated board
-    /// names itself by the first half of it.
+    /// BLAKE3 of the flash up to the last byte that is written. An emulated board identifies itself by the
+    /// first half of it.
     pub(crate) fn flash_hash(&self) -> String {
         let mut flash = Vec::new();
         for (address, data) in &self.segments {
-            // What lies between two segments is erased.
+            // The gap between two segments is erased.
             flash.resize((address - FLASH.start) as usize, 0xFF);
             flash.extend_from_slice(data);
         }
@@ -229,8 +228,8 @@ impl Elf {
         })
     }
 
-    /// Every aligned word of flash that is no instruction, and every constant that two
-    /// instructions (MOVW, MOVT) put into a register. What is computed is not found.
+    /// Every aligned word of flash that is not an instruction, and every constant that two instructions
+    /// (MOVW, MOVT) put into a register. Computed constants are not found.
     pub(crate) fn constants(&self) -> Vec<u32> {
         let mut constants = Vec::new();
         for (base, data) in &self.segments {

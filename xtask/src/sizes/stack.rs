@@ -7,15 +7,15 @@ use anyhow::{Context, Result, ensure};
 use super::calls::{Chain, Graph, deepest, graph};
 use super::elf::Elf;
 
-/// What the processor pushes at an exception: eight words, and up to one for
-/// alignment (ARM DDI 0403, B1.5.7).
+/// Bytes that the processor pushes at an exception: eight words, and up to one for alignment (ARM DDI 0403,
+/// B1.5.7).
 const EXCEPTION_FRAME: u32 = 36;
 
 /// First external interrupt in the vector table.
 const EXTERNAL: u32 = 16;
 
-/// Vectors by priority level, the lowest first; every external interrupt that is
-/// not named here has one and the same priority, so that none interrupts another.
+/// Vectors by priority level, the lowest first; all external interrupts not named here have the same
+/// priority, so that none interrupts another.
 ///
 /// The levels are those of the board's start-up code: the supply's interrupt is
 /// above the others, NMI and HardFault above everything by the architecture.
@@ -25,7 +25,7 @@ const ABOVE: [(&str, &[u32]); 3] = [
     ("HardFault", &[3]),
 ];
 
-/// The bound and where it comes from.
+/// The bound and its source.
 pub(super) struct Bound {
     pub(super) bytes: u64,
     /// One line per function on the deepest chain.

@@ -1,11 +1,11 @@
-//! The Thumb-2 instructions that matter for a stack bound: calls, branches, and
-//! what moves the stack pointer (ARM DDI 0403, chapter A7).
+//! The Thumb-2 instructions that matter for a stack bound: calls, branches, and changes of the stack pointer
+//! (ARM DDI 0403, chapter A7).
 //!
 //! A disassembler is not used: these are a dozen encodings, and the caller checks
 //! every decoded call against the table of functions, so that a mistake here
 //! cannot stay unnoticed.
 
-/// What an instruction does to control flow and stack.
+/// Effect of an instruction on control flow and stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effect {
     /// Neither calls nor touches the stack pointer downwards.
@@ -17,11 +17,11 @@ pub(super) enum Effect {
         /// Comes back (BL).
         links: bool,
     },
-    /// Calls or branches to what a register or a word in memory holds.
+    /// Calls or branches to an address in a register or in memory.
     Indirect,
     /// Jumps into the list of branches that follows it (a `match`).
     Table,
-    /// Takes so many bytes of stack.
+    /// Takes this many bytes of stack.
     Push(u32),
     /// Takes an amount of stack that is not in the instruction.
     DynamicPush,
@@ -116,7 +116,7 @@ fn wide(address: u32, h1: u16, h2: u16) -> Effect {
         }
         // SUB.W SP, SP, Rm
         _ if h1 & 0xFFEF == 0xEBAD && h2 >> 8 & 0xF == 13 => Effect::DynamicPush,
-        // LDR PC, […], but for the pop of one register
+        // LDR PC, […], except for the pop of one register
         0xF85D if h2 == 0xFB04 => Effect::None,
         _ if h1 & 0xFF70 == 0xF850 && h2 >> 12 == 15 => Effect::Indirect,
         _ => Effect::None,
@@ -164,7 +164,7 @@ fn expand_immediate(a: u32, b: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Encodings as LLVM's assembler gives them, at address 0x100.
+    /// Encodings from LLVM's assembler, at address 0x100.
     #[test]
     fn encodings_of_the_assembler() {
         let at = |first, second| decode(0x100, first, second);

@@ -18,8 +18,8 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     loop {
-        // As it is written by mistake: without `const { … }`. The black box keeps the
-        // optimiser from doing here what it may or may not do in a larger program.
+        // Written as by mistake: without `const { … }`. The black box keeps the optimiser from doing here
+        // what it may or may not do in a larger program.
         let text = core::hint::black_box("12.5");
         GAIN.store(I16F16::lit(text).to_bits(), Ordering::Relaxed);
     }

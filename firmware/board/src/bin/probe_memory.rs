@@ -1,6 +1,6 @@
-//! Copies and clears memory with the board's own routines, for every alignment and many
-//! lengths, on an emulated board. Two pins say what came of it: PB15 (dump valve) that
-//! every byte was right, PB13 (motor backward) that one was not.
+//! Copies and clears memory with the board's own routines, for every alignment and many lengths, on an
+//! emulated board. Two pins give the result: PB15 (dump valve) that every byte was right, PB13 (motor
+//! backward) that one was not.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]
@@ -12,7 +12,7 @@ const PLACE: usize = 64;
 /// Longest piece: several rounds of the loop and every remainder.
 const BYTES_MAX: usize = 44;
 const WORD: usize = 4;
-/// What stands where nothing may be written.
+/// Value where nothing may be written.
 const GUARD: u8 = 0xA5;
 
 wheeleg_board::exception_handlers!();

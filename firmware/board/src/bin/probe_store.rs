@@ -1,8 +1,7 @@
-//! Saves parameters through the board's own flash driver, for power cuts in
-//! mid-save on an emulated board. It has no application: two pins say which set it
-//! found when it started, PB13 (motor backward) the old one, PB15 (dump valve) the
-//! new one. Blank flash gets the old set at once; the old set gets the new one
-//! after a while, in which the power cut can be prepared.
+//! Saves parameters through the board's own flash driver, for power cuts in mid-save on an emulated board. It
+//! has no application: two pins show which set it found when it started, PB13 (motor backward) the old one,
+//! PB15 (dump valve) the new one. Blank flash gets the old set at once; the old set gets the new one after a
+//! while, in which the power cut can be prepared.
 #![no_std]
 #![no_main]
 #![allow(unsafe_code, reason = "handlers and symbols that are linked by name")]

@@ -29,7 +29,7 @@ pub(super) fn start() {
     // Four converter clocks between calibration and enabling (RM0440 §21.4.8).
     cortex_m::asm::delay(16);
     adc.isr().write(|r| r.set_adrdy(true));
-    // Asked for until it is ready: so soon after a calibration the bit may not be taken.
+    // Repeated until it is ready: so soon after a calibration the bit may be ignored.
     while !adc.isr().read().adrdy() {
         adc.cr().modify(|r| r.set_aden(true));
     }

@@ -104,7 +104,7 @@ fn unmask(interrupt: Interrupt) {
     }
 }
 
-/// A running board; `WHEEL` tells the kinds apart.
+/// A running board; `WHEEL` distinguishes the kinds.
 #[derive(Debug)]
 pub struct G431<const WHEEL: bool> {
     bus: Bus,
@@ -143,7 +143,7 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
     ) {
         watchdog::feed();
         if WHEEL {
-            // A damaged period would stop the ticks before one of them could find it.
+            // A damaged period would stop the ticks before one of them could detect it.
             if !tick::runs_at(period) && confirmed() {
                 tick::set_period(period);
             }
@@ -179,8 +179,8 @@ impl<const WHEEL: bool> Board for G431<WHEEL> {
 
     #[inline]
     fn idle(&mut self) {
-        // An interrupt that comes after the look is pending, and ends the sleep
-        // although it is masked; its handler runs when the mask is taken away.
+        // An interrupt that comes after the check is pending, and ends the sleep although it is masked; its
+        // handler runs when the mask is removed.
         cortex_m::interrupt::free(|_| {
             if !latch::take_wake() {
                 cortex_m::asm::wfi();

@@ -1,9 +1,9 @@
 //! Hardware that takes the outputs away when the processor cannot: breaks of the timers, and a
 //! guard below the stack.
 //!
-//! The break of TIM1 and TIM8 is raised, besides by their pins, by what the system configuration
-//! connects to it (RM0440 §10.2.8). It clears MOE: the pins go to their idle level, low, in a
-//! few nanoseconds and without an instruction. These connections stay until a reset.
+//! The break of TIM1 and TIM8 is raised, besides by their pins, by sources that the system configuration
+//! connects to it (RM0440 §10.2.8). It clears MOE: the pins go to their idle level, low, in a few nanoseconds
+//! and without an instruction. These connections last until a reset.
 //!
 //! | connection | raised by | without it |
 //! |---|---|---|
@@ -16,8 +16,8 @@
 
 use super::pac;
 
-/// The last 32 KiB below the RAM, where the stack would go when it overflows. No memory that a
-/// program uses lies there: the unique id and the option bytes are below it.
+/// The last 32 KiB below the RAM, where the stack would go when it overflows. No memory that a program uses
+/// is there: the unique id and the option bytes are below it.
 const GUARD: u32 = 0x1FFF_8000;
 /// Size field of a region: 2^(n + 1) bytes.
 const GUARD_SIZE: u32 = 14;
@@ -37,14 +37,13 @@ pub(super) fn connect() {
     });
 }
 
-/// Whether RAM has a parity error. Before the clock of the system configuration is on, nothing
-/// can tell.
+/// Whether RAM has a parity error. This is unknown until the clock of the system configuration is on.
 pub(super) fn ram_is_damaged() -> bool {
     pac::RCC.apb2enr().read().syscfgen() && pac::SYSCFG.cfgr2().read().spf()
 }
 
-/// Guards what lies below the stack: an access there is a processor fault. The fault's handler
-/// runs without the guard.
+/// Guards the memory below the stack: an access there is a processor fault. The fault's handler runs without
+/// the guard.
 pub(super) fn guard_stack() {
     // SAFETY: before the main loop, and nothing else uses the unit; no memory of the program
     // lies in the region.

@@ -1,7 +1,7 @@
 //! TIM8 channel 1 and one pin: the motor's H-bridge.
 //!
-//! What a tick writes waits in two words until the next tick edge, where the
-//! edge's handler hands it to timer and pin.
+//! The outputs of a tick wait in two words until the next tick edge, where the edge's handler passes them to
+//! timer and pin.
 
 use super::inhibit::Inhibited;
 use super::{pac, pins};
@@ -20,7 +20,7 @@ const PRESCALER: u16 = 84;
 static DUTY: AtomicU32 = AtomicU32::new(0);
 /// 1 for backward.
 static BACKWARD: AtomicU32 = AtomicU32::new(0);
-/// What the pin shows.
+/// The pin's state.
 static SHOWN_BACKWARD: AtomicU32 = AtomicU32::new(0);
 
 /// Magnitude, effective from the next tick edge.
@@ -70,7 +70,7 @@ impl OutputPin for Sign {
     }
 }
 
-/// The dump valve's pin; acts at once, where it is fitted.
+/// The dump valve's pin; acts at once, if it is fitted.
 #[derive(Debug)]
 pub struct Dump {
     /// Wheel 7 has it.
@@ -120,8 +120,8 @@ pub(super) fn configure() -> HBridge<Pulse, Sign> {
     }
 }
 
-/// At a tick edge: what the last tick prepared becomes active. A change of
-/// direction blanks the pulse until the next PWM period, against shoot-through.
+/// At a tick edge: the outputs of the last tick become active. A change of direction blanks the pulse until
+/// the next PWM period, against shoot-through.
 #[inline]
 pub(super) fn apply() {
     let tim = pac::TIM8;
@@ -136,8 +136,7 @@ pub(super) fn apply() {
     tim.ccr(0).write(|r| r.set_ccr(duty));
 }
 
-/// Permits the output while nothing is asked of it; hardware refuses while
-/// POWER_OK is low.
+/// Enables the output while its duty is zero; hardware refuses while POWER_OK is low.
 #[inline]
 pub(super) fn permit() {
     let tim = pac::TIM8;

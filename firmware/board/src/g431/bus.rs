@@ -34,8 +34,8 @@ const POSITION_MASK: u16 = (RING - 1) as u16;
 const _: () = assert!(RING.is_power_of_two());
 /// Time of a byte, µs.
 const BYTE_US: u16 = 10;
-/// A frame whose end is noted later than this after the driver was off was cut
-/// off; handlers wait for each other for less, µs.
+/// A frame whose end is noted later than this after the driver was off was cut off; handlers delay each other
+/// for less than that, µs.
 const LATE_US: u32 = 30;
 
 /// Memory that DMA reads or writes.
@@ -120,8 +120,8 @@ impl Bus {
         guard.cr1().write(|r| r.set_opm(true));
         guard.ccmr_output(0).write(|r| r.set_ocm(0, Ocm::PWM_MODE2));
         guard.ccer().write(|r| r.set_cce(0, true));
-        // A crystal that stops slows this timer tenfold: the break, of inner causes alone, ends the
-        // pulse then. Its own pin is no source of it.
+        // A crystal that stops slows this timer tenfold: then the break, from internal sources only, ends the
+        // pulse. Its own pin is not one of them.
         guard.af1().write(|r| r.set_bkine(false));
         guard.bdtr().write(|r| {
             r.set_moe(true);
@@ -173,7 +173,7 @@ impl Bus {
         cut_off
     }
 
-    /// Forgets all that was received and not handed over.
+    /// Discards all bytes received and not passed on.
     pub(super) fn forget(&mut self) {
         cortex_m::interrupt::free(|_| {
             MARKS.clear();
@@ -236,7 +236,7 @@ fn arm(length: u16, start_at: u32) {
         r.set_msize(Size::BITS32);
         r.set_en(true);
     });
-    // In this order: the flag may stand from the transmitter's first idle frame.
+    // In this order: the flag may be set from the transmitter's first idle frame.
     pac::USART1.icr().write(|r| r.set_tc(true));
     pac::USART1.cr1().modify(|r| r.set_tcie(true));
     let end = length.saturating_mul(BYTE_US).saturating_add(MARGIN_US);
@@ -322,7 +322,7 @@ pub fn on_usart() {
         usart.icr().write(|r| r.set_cmf(true));
         mark(time);
     }
-    // The flag also stands after the line was idle; the enable says that it is ours.
+    // The flag is also set after the line was idle; the enable bit shows that it is ours.
     if status.tc() && usart.cr1().read().tcie() {
         if is_late(time) {
             // The main loop sees it, as one that never ends.

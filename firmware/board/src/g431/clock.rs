@@ -19,8 +19,7 @@ const _: () = {
     assert!(HSI_HZ / 4 * 85 / 2 == CLOCK_HZ);
 };
 
-/// Polls of HSERDY before the crystal is given up: about 20 ms at 16 MHz, ten
-/// times its usual start-up time.
+/// Polls of HSERDY before giving up on the crystal: about 20 ms at 16 MHz, ten times its usual start-up time.
 const HSE_POLLS: u32 = 40_000;
 /// Polls of any other ready flag; the watchdog ends what never gets ready.
 const POLLS: u32 = 1_000_000;
@@ -30,8 +29,8 @@ const POLLS: u32 = 1_000_000;
 pub enum Source {
     /// 24 MHz crystal.
     Crystal,
-    /// Internal oscillator, −1.9 to +1.6 % over 0 to 85 °C (DATASHEET): enough to be heard and
-    /// to say what is wrong, not to keep to a slot (`wheeleg_node::time`).
+    /// Internal oscillator, −1.9 to +1.6 % over 0 to 85 °C (DATASHEET): enough to be heard and to report the
+    /// fault, not to keep to a slot (`wheeleg_node::time`).
     Internal,
 }
 
@@ -48,8 +47,8 @@ pub fn start() -> Source {
     pac::PWR.cr3().modify(|r| r.set_ucpd1_dbdis(true));
     // Voltage range 1, boost mode: needed above 150 MHz (RM0440 §6.1.5).
     pac::PWR.cr1().modify(|r| r.set_vos(Vos::RANGE1));
-    // R1MODE is bit 8 and all that is there; 0 is boost (RM0440, PWR_CR5). The register
-    // crate has it in bit 0.
+    // R1MODE is bit 8 and the only one there; 0 is boost (RM0440, PWR_CR5). The register crate has it in bit
+    // 0.
     pac::PWR.cr5().write_value(pac::pwr::regs::Cr5(0));
     wait(POLLS, || !pac::PWR.sr2().read().vosf());
 

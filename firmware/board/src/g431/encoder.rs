@@ -5,7 +5,7 @@ use pac::timer::vals::{CcmrInputCcs, FilterValue, Sms};
 use wheeleg_node::hardware::Encoder;
 use wheeleg_units::WheelCount;
 
-/// Sets the counter up; it stands until [`start`].
+/// Sets the counter up; it stands still until [`start`].
 pub(super) fn configure() -> WheelEncoder {
     let tim = pac::TIM3;
     tim.arr().write(|r| r.set_arr(u16::MAX));
@@ -23,8 +23,8 @@ pub(super) fn configure() -> WheelEncoder {
     WheelEncoder
 }
 
-/// Counts from 0 on: with the sample timer, so that the first sample brings the counts
-/// of one sample and not those of a start-up, too.
+/// Counts from 0 on: together with the sample timer, so that the first sample holds only the counts of one
+/// sample and not those of the start-up.
 pub(super) fn start() {
     let tim = pac::TIM3;
     tim.cnt().write(|r| r.set_cnt(0));

@@ -21,8 +21,8 @@ pub fn take_cause() -> ResetCause {
     let csr = pac::RCC.csr();
     let flags = csr.read().0;
     csr.modify(|r| r.set_rmvf(true));
-    // The note is read only where a program has written it: with parity, RAM that nobody has
-    // written since power-up gives an error.
+    // The note is read only if a program has written it: with parity, RAM that nobody has written since
+    // power-up gives an error.
     let note = match reset::may_have_note(flags) {
         true => NOTE.load(Ordering::Relaxed),
         false => 0,
@@ -48,9 +48,9 @@ pub fn on_nmi() {
     }
 }
 
-/// The processor has faulted, perhaps because its stack is no memory: the handler begins with
-/// the stack as after a reset, since a second fault in here would lock the processor up. The
-/// name is that of the vector table; a handler of `cortex-m-rt` would push registers first.
+/// The processor has faulted, perhaps because its stack is not in memory: the handler sets the stack as after
+/// a reset, since a second fault here would lock the processor up. The name is that of the vector table; a
+/// handler of `cortex-m-rt` would push registers first.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 extern "C" fn on_fault() -> ! {
@@ -67,8 +67,8 @@ extern "C" fn after_fault() -> ! {
     reset(Note::ProcessorFault)
 }
 
-/// The handlers of all that ends in a reset, once in every image: the supply
-/// sags, the clock stops, the processor faults, an interrupt has no handler.
+/// The handlers of everything that ends in a reset, once in every image: the supply sags, the clock stops,
+/// the processor faults, an interrupt has no handler.
 #[macro_export]
 macro_rules! exception_handlers {
     () => {

@@ -49,8 +49,7 @@ impl ParameterPages {
         }
         // Flags of an earlier operation are cleared by writing them.
         flash.sr().write_value(flash.sr().read());
-        // What the data cache holds of the place would outlive the change; it can be emptied
-        // only while it is off (RM0440 §5.3.7).
+        // The data cache would keep the old contents; it can be emptied only while it is off (RM0440 §5.3.7).
         flash.acr().modify(|r| r.set_dcen(false));
         match change {
             Change::Erase { page } => {
@@ -81,8 +80,8 @@ impl ParameterPages {
     }
 }
 
-/// What is done to the flash: a page erased, or a double word at an address of
-/// [`ParameterPages::address`] written.
+/// An operation on the flash: erase a page, or write a double word at an address of
+/// [`ParameterPages::address`].
 #[derive(Clone, Copy)]
 enum Change {
     Erase { page: u8 },
@@ -104,7 +103,7 @@ fn outcome() -> Result<(), FlashError> {
 impl Flash for ParameterPages {
     fn read(&self, page: usize, word: usize) -> Option<u64> {
         let address = Self::address(page, word)?;
-        // A flag that stands would hide the errors after it (RM0440 §5.7.7).
+        // A set flag would hide the errors after it (RM0440 §5.7.7).
         clear_ecc_flags();
         // SAFETY: an aligned address inside the flash. A word that a power cut left half-written
         // has a double error, which the NMI handler turns into a note.

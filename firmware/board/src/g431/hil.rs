@@ -1,10 +1,9 @@
 //! The hardware-in-the-loop board: sensors, outputs and bus travel over USART2,
 //! on a bare Nucleo-G431RB through its debug probe's serial port.
 //!
-//! The pins that drive valves, motor and dump valve on the real board were made
-//! outputs and driven low by the first instructions after reset. The modules
-//! that could change that are not compiled into these images, and the two
-//! features exclude each other.
+//! The pins that drive valves, motor and dump valve on the real board were made outputs and driven low by the
+//! first instructions after reset. The modules that could change that are not compiled into these images, and
+//! the two features exclude each other.
 
 use super::slot::Slot;
 use super::{breaks, clock, fatal, pac, pins, power, timebase, watchdog};
@@ -17,9 +16,9 @@ use wheeleg_units::Micros;
 const DIVIDER: u16 = (clock::CLOCK_HZ / 1_000_000) as u16;
 const HOST: &str = "STM32G431, HIL over USART2";
 
-/// Runs a board on the serial line, for ever: the next simulator may open a new
-/// session. Pins and session are kept where they are made: the stack holds what it takes
-/// to make a board, and not the board as well.
+/// Runs a board on the serial line, for ever: the next simulator may open a new session. Pins and session
+/// stay where they are made, so that the stack holds the memory for making a board, and not the board as
+/// well.
 pub fn run<B: Board<'static>>(
     board_pins: &'static Slot<B::Pins>,
     session: &'static Slot<Session<'static, B>>,
@@ -51,10 +50,9 @@ where
     }
 }
 
-/// USART2, polled: the protocol is request and reply, so nothing arrives while
-/// a request is being answered. Its FIFO of eight bytes covers what a byte takes to be
-/// worked off; to disable the detection of overruns would pass the FIFO by (RM0440,
-/// USART_CR3.OVRDIS). A byte that is lost all the same damages its frame, which is refused.
+/// USART2, polled: the protocol is request and reply, so nothing arrives while a request is being answered.
+/// Its FIFO of eight bytes covers the processing time of a byte; disabling overrun detection would bypass the
+/// FIFO (RM0440, USART_CR3.OVRDIS). A byte that is still lost damages its frame, which is refused.
 struct Line {
     _one: (),
 }

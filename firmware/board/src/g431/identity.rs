@@ -1,11 +1,10 @@
-//! Identity of a board: the 96-bit unique id of the processor, and what its image reports about
-//! itself.
+//! Identity of a board: the 96-bit unique id of the processor, and the report of its image about itself.
 
 use wheeleg_identity::{Digest, Identity, Kind, Record};
 
 use super::pac;
 
-/// What this build was made of.
+/// Digest of the sources of this build.
 const SOURCES: Digest = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
 
 /// The record of an image of this build.

@@ -1,4 +1,4 @@
-//! What an interrupt handler latched at a tick edge, until the main loop takes it.
+//! Inputs that an interrupt handler latched at a tick edge, until the main loop takes them.
 
 use crate::same_core::Announce;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -10,7 +10,7 @@ struct Latch {
     /// Set by every handler, cleared by the main loop before it looks for work.
     wake: AtomicBool,
     pending: AtomicBool,
-    /// Edge of the newest tick that was latched; none before the first one, at time 0.
+    /// Edge of the newest latched tick; none before the first one, at time 0.
     edge: AtomicU32,
     sample: AtomicU32,
     port_a: AtomicU32,
@@ -117,7 +117,7 @@ impl PositionSensor for Potentiometer {
     }
 }
 
-/// The four foot switches, where they are fitted.
+/// The four foot switches, if they are fitted.
 #[derive(Debug)]
 pub struct Feet {
     /// Joints 3 and 6 have them.
@@ -134,7 +134,7 @@ impl SwitchBank for Feet {
     }
 }
 
-/// The supply-pressure switch, where it is fitted.
+/// The supply-pressure switch, if it is fitted.
 #[derive(Debug)]
 pub struct Supply {
     /// Wheel 7 has it.

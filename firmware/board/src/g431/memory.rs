@@ -1,10 +1,10 @@
 //! Copying and clearing of memory, which the compiler calls by name. Moving and setting stay those
 //! of the compiler's library.
 //!
-//! The routines of the compiler's own library take 1.6 KB of flash, most of it for cores
-//! that cannot access unaligned words. This one can, so that one loop serves every
-//! alignment. Assembly, because the compiler would make a call of the routine itself of a
-//! loop in it. The registers are those that the Run-time ABI leaves to them (ARM IHI 0043).
+//! The routines of the compiler's own library take 1.6 KB of flash, most of it for cores that cannot access
+//! unaligned words. This one can, so that one loop serves every alignment. In assembly, because the compiler
+//! would replace a loop in the routine by a call of the routine itself. It uses the registers that the
+//! Run-time ABI leaves to it (ARM IHI 0043).
 
 use core::arch::global_asm;
 

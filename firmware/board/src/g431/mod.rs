@@ -1,5 +1,4 @@
-//! The STM32G431CB. Register names as in RM0440; what is used and why stands in
-//! `BOARD.md`.
+//! The STM32G431CB. Register names as in RM0440; `BOARD.md` says which peripherals are used, and why.
 #![allow(
     unsafe_code,
     reason = "registers, interrupt handlers, memory that DMA shares"

@@ -17,7 +17,7 @@ const COUNT: u32 = cfg!(feature = "mutant-valve-pins") as u32
 
 const _: () = assert!(COUNT == 1, "one mutation at a time");
 
-/// The mark of an image that must never be flashed: its symbol is looked for.
+/// The mark of an image that must never be flashed: tools search for its symbol.
 #[unsafe(no_mangle)]
 static THIS_IMAGE_IS_WRONG_ON_PURPOSE: u32 = COUNT;
 

@@ -3,7 +3,7 @@
 use super::flash::ParameterPages;
 use crate::store::Store;
 
-/// The store, for whoever saves.
+/// The store, for saving.
 ///
 /// # Safety
 /// At most one may exist at a time.

@@ -11,8 +11,8 @@ pub struct Slot<T> {
     value: UnsafeCell<MaybeUninit<T>>,
 }
 
-// SAFETY: the one reference to the value goes to whoever comes first; `taken`
-// keeps everybody else away. The main program alone uses it, no handler does.
+// SAFETY: the first caller gets the one reference to the value; `taken` keeps everybody else away. Only the
+// main program uses it, no handler does.
 unsafe impl<T> Sync for Slot<T> {}
 
 impl<T> Slot<T> {
@@ -26,7 +26,7 @@ impl<T> Slot<T> {
         }
     }
 
-    /// Puts what `make` gives into the slot; `None` if it is taken already.
+    /// Puts the result of `make` into the slot; `None` if it is taken already.
     #[inline]
     #[expect(clippy::mut_from_ref, reason = "`taken` gives the reference out once")]
     pub fn fill(&'static self, make: impl FnOnce() -> T) -> Option<&'static mut T> {

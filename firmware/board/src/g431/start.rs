@@ -1,4 +1,4 @@
-//! The first half of a board's start: what all images have in common.
+//! The first half of a board's start, common to all images.
 
 use super::{breaks, clock, fatal, identity, pins, power, watchdog};
 use crate::led::Status;
@@ -7,7 +7,7 @@ use wheeleg_node::NodeIdentity;
 use wheeleg_protocol::ResetCause;
 use wheeleg_units::Micros;
 
-/// What a board is, before it has an application.
+/// A board before it has an application.
 #[derive(Debug)]
 pub struct Start {
     pub(super) source: clock::Source,

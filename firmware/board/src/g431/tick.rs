@@ -1,4 +1,4 @@
-//! TIM1, the tick, and what TIM2 notes about it.
+//! TIM1, the tick, and its time stamps from TIM2.
 
 use super::{pac, timebase};
 use pac::timer::vals::{CcmrInputCcs, Mms, Ts};
@@ -101,7 +101,7 @@ fn take(channel: usize) -> bool {
     set
 }
 
-/// Clears one flag: they are cleared by writing 0, and 1 leaves them alone.
+/// Clears one flag: writing 0 clears, and 1 has no effect.
 #[inline]
 fn clear(channel: usize) {
     let mut flags = pac::timer::regs::SrGp16(u32::MAX);

@@ -27,9 +27,8 @@ impl<const N: usize> SetDutyCycle for Valve<N> {
         MAX
     }
 
-    /// Microseconds open in the next tick; more than a tick is all of it, as the
-    /// compare unit has it. An inhibited output that is asked to open is an error; one
-    /// that is asked to stay shut obeys.
+    /// Microseconds open in the next tick; more than a tick means all of it, as in the compare unit. Opening
+    /// an inhibited output is an error; keeping it shut is not.
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Inhibited> {
         pac::TIM1.ccr(N).write(|r| r.set_ccr(duty));
         if duty > 0 && !pac::TIM1.bdtr().read().moe() {

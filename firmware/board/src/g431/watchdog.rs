@@ -15,7 +15,7 @@ pub fn start() {
     iwdg.kr().write(|r| r.set_key(Key::ENABLE));
     iwdg.pr().write(|r| r.set_pr(Pr::DIVIDE_BY8));
     iwdg.rlr().write(|r| r.set_rl(RELOAD));
-    // Both registers take five periods of the slow oscillator to be taken over.
+    // Both registers take five periods of the slow oscillator to take effect.
     for _ in 0..100_000_u32 {
         let status = iwdg.sr().read();
         if !status.pvu() && !status.rvu() {
@@ -25,7 +25,7 @@ pub fn start() {
     feed();
 }
 
-/// Starts the 50 ms anew.
+/// Restarts the 50 ms.
 #[inline]
 pub fn feed() {
     pac::IWDG.kr().write(|r| r.set_key(Key::RESET));

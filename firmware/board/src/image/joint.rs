@@ -31,8 +31,7 @@ fn main() -> ! {
     executive::run(node, &mut board)
 }
 
-/// Makes the application in its place. Not inlined, so that what its making takes
-/// is off the stack when it runs.
+/// Makes the application in its place. Not inlined, so that its construction is off the stack when it runs.
 #[inline(never)]
 fn make(
     identity: NodeIdentity,

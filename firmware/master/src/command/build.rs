@@ -22,7 +22,7 @@ pub struct Given<'a> {
     pub value: Value,
 }
 
-/// Why no command can be made of what was given.
+/// Why the arguments do not make a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArgumentError<'a> {
     /// The command has no argument of this name.
@@ -185,7 +185,7 @@ impl Command {
     }
 }
 
-/// What was given, known to be arguments of the command, each at most once.
+/// The given arguments, known to belong to the command, each at most once.
 struct Arguments<'a>(&'a [Given<'a>]);
 
 impl<'a> Arguments<'a> {

@@ -1,4 +1,4 @@
-//! Acyclic requests: what to request from which node, and on whose behalf.
+//! Acyclic requests: what to request from which node, and for whom.
 
 use heapless::Deque;
 use wheeleg_protocol::{Address, Message};
@@ -57,10 +57,10 @@ pub struct Job {
     pub to: Address,
     /// Request.
     pub message: Message,
-    /// On whose behalf.
+    /// For whom it is made.
     pub purpose: Purpose,
-    /// Latest time at which it may leave the queue, µs: requests wait while a silent board is
-    /// asked again, and what moves an axis must not come long after it was wanted.
+    /// Latest time at which it may leave the queue, µs: requests wait while a silent board is asked again,
+    /// and a command that moves an axis must not come long after it was wanted.
     pub until_us: u64,
 }
 
@@ -121,7 +121,7 @@ impl Jobs {
                 return;
             };
             if !unwanted(&job) {
-                // There is room: it has just been taken out.
+                // There is room: it has just been removed.
                 let _fits = self.push(job);
             } else if let Some(ticket) = job.purpose.ticket() {
                 dropped(ticket);
@@ -135,8 +135,8 @@ impl Jobs {
         self.drop_where(|_| true, dropped);
     }
 
-    /// Asks every node the same, for nobody: first those that are `alive` (a
-    /// silent one would keep the others waiting through its retries).
+    /// Asks every node the same, with nobody waiting for it: first those that are `alive` (a silent one would
+    /// delay the others through its retries).
     pub fn ask_all(&mut self, message: Message, alive: impl Fn(usize) -> bool) {
         for wanted in [true, false] {
             for to in Address::nodes() {

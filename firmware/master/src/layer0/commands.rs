@@ -31,7 +31,7 @@ impl Layer0 {
         }
     }
 
-    /// `Ok(true)`: done; `Ok(false)`: the answer comes with that of the nodes.
+    /// `Ok(true)`: done; `Ok(false)`: the nodes' answers complete it.
     fn begin(
         &mut self,
         accepted: &Accepted,
@@ -191,7 +191,7 @@ impl Layer0 {
                 if !self.jobs.has_room(2) {
                     return Err(Refusal::Busy);
                 }
-                // What it has counted before and after tells whether it was reset.
+                // Its counts before and after show whether it was reset.
                 let look = Job::new(to, proto::LinkReport {}.into(), Purpose::Report);
                 let _fits = self.jobs.push(look);
                 self.ask(accepted, to, proto::ParamSave {}.into())
@@ -292,8 +292,8 @@ impl Layer0 {
         Ok(false)
     }
 
-    /// What tells a wheel board the speed and acceleration of its profiles; where it is streamed
-    /// its references, the speed that these never exceed.
+    /// Messages that set the speed and acceleration of a wheel board's profiles; if its references are
+    /// streamed, the speed that these never exceed.
     fn profile_messages(&self) -> [Message; 2] {
         let push = self.push.speed_mm_s;
         let speed = match self.config.wheel_drive {
@@ -309,8 +309,8 @@ impl Layer0 {
         ]
     }
 
-    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels
-    /// are told at once, the others when they arm.
+    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels get it at once, the others when
+    /// they arm.
     pub(super) fn shape_pushes(&mut self, push: PushProfile) {
         if push == self.push {
             return;

@@ -1,4 +1,4 @@
-//! The bus cycle: what ends one, what SYNC says, what the slots bring.
+//! The bus cycle: its end, the contents of SYNC, and the slots.
 
 use core::num::NonZeroU8;
 
@@ -67,8 +67,8 @@ impl Layer0 {
         (record, feedback)
     }
 
-    /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there
-    /// are any, and gives the bytes of SYNC.
+    /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there are any, and returns the
+    /// bytes of SYNC.
     pub fn start_cycle(&mut self, now_us: u64, setpoints: Option<Setpoints>) -> TxBytes {
         let setpoints = setpoints.filter(|setpoints| setpoints.permit == self.permit);
         match setpoints.filter(|_| self.orphan.given_up.is_none()) {
@@ -237,7 +237,7 @@ impl Layer0 {
         self.stale_cycles == 0
     }
 
-    /// What the boards have said in their slots.
+    /// The boards' reports in their slots.
     fn senses(&self) -> Senses {
         let mut senses = Senses {
             feet: self.feet,
@@ -270,7 +270,7 @@ impl Layer0 {
         for side in [Side::Left, Side::Right] {
             let node = self.nodes.get(side.joint(Cylinder::Vertical));
             let Some(reply) = node.and_then(|node| node.reply) else {
-                // Not heard in this cycle: the last state stands until the node is lost.
+                // Not heard in this cycle: the last state holds until the node is lost.
                 continue;
             };
             let now = self.switches(side, reply.inputs);
@@ -348,7 +348,7 @@ impl Layer0 {
             _ => return,
         };
         if has_started(before.as_ref(), &reply) {
-            // Its counter stands at 0: that is no motion.
+            // Its counter is 0: that is not motion.
             self.odometry.rebase(side);
         }
         if let Some(count) = reply.wheel_position() {

@@ -22,9 +22,9 @@ const ALL: u8 = 0x0F;
 /// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes
 /// to roll onto its sole.
 const AGREE: u8 = 20;
-/// A swinging foot that is drawn up by so much, mm, from where it stood is in the air.
+/// A swinging foot drawn up by this much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
-/// Legs extended at least so far, mm, have their soles in the plane of the wheels.
+/// Legs extended at least this far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
 /// Swings in which a switch must stay closed.
 const SWINGS: u8 = 2;
@@ -40,11 +40,11 @@ struct One {
     closed: u8,
     /// Stances in which it stayed open.
     open: u8,
-    /// Told of already.
+    /// Already reported.
     told: bool,
 }
 
-/// What a foot does, as far as its switches can be judged by it.
+/// Motion of a foot, as far as it allows judging its switches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
     /// Neither.
@@ -78,8 +78,8 @@ pub struct Stuck {
 }
 
 impl FootWatch {
-    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs'
-    /// strokes, and whether the leg swings; gives a switch that has just been found stuck.
+    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, and
+    /// whether the leg swings; returns a switch that has just been found stuck.
     pub fn sample(
         &mut self,
         now: FootSwitches,
@@ -146,7 +146,7 @@ mod tests {
     /// A pattern, the stroke of b6 and for how many cycles.
     type Stretch = (u8, i16, u32);
 
-    /// What is told over these stretches; the other leg stands at `other_mm`.
+    /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`.
     fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
         let mut found = Vec::new();

@@ -16,11 +16,11 @@ const PATIENCE: u8 = 5;
 /// Cycles until it is asked again.
 const AGAIN: u8 = 100;
 
-/// For how many cycles each board has been armed while nobody was.
+/// Number of cycles for which each board has been armed although none should be.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LeftBehind([u8; NODES]);
 
-/// What is to be done about a board.
+/// Action for a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Measure {
     /// It is named, and asked to disarm.
@@ -30,8 +30,8 @@ enum Measure {
 }
 
 impl LeftBehind {
-    /// Takes whether the newest reply of node index 0..8 shows that it is armed; a missing reply
-    /// tells nothing.
+    /// Takes whether the newest reply of node index 0..8 shows that it is armed; a missing reply shows
+    /// nothing.
     fn shows(&mut self, index: usize, armed: Option<bool>) -> Option<Measure> {
         let cycles = self.0.get_mut(index)?;
         if !armed? {
@@ -70,7 +70,7 @@ impl Layer0 {
                 events.push(now_us, Event::Found { node, finding });
             }
             if measure.is_some() {
-                // Where the queue is full it is asked the next time.
+                // If the queue is full, it is asked next time.
                 let _fits = self
                     .jobs
                     .push(Job::new(to, Disarm {}.into(), Purpose::Stop));

@@ -24,18 +24,18 @@ const SPOILT_CYCLES: u8 = 3;
 /// replies and the longest answer make less than 500 bytes with 232 of replies in
 /// slots, and an answer is not repeated in the same cycle.
 const BABBLE_BYTES: u32 = 400;
-/// Cycles in a row with so much rubbish.
+/// Cycles in a row with this much rubbish.
 const BABBLE_CYCLES: u8 = 2;
 /// Cycles without after which the line is quiet.
 const QUIET_CYCLES: u8 = 10;
-/// Frames in a cycle that nobody asked for: 30 % of the line, bytes.
+/// Bytes of a cycle in unrequested frames: 30 % of the line.
 const FLOOD_BYTES: u32 = 300;
-/// Cycles in a row with so many of them.
+/// Cycles in a row with that many of them.
 const FLOOD_CYCLES: u8 = 10;
-/// Errors that babble leaves in the counters of whoever hears it, at least.
+/// Errors that babble leaves at least in the counters of a board that hears it.
 const HEARD_ERRORS: u32 = 4;
 
-/// State of a condition that lasts: told at its begin, and again after its end.
+/// State of a condition that lasts: reported at its begin, and again after its end.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lasting {
     cycles: u8,
@@ -43,7 +43,7 @@ struct Lasting {
     told: bool,
 }
 
-/// What a cycle brought for a condition.
+/// Effect of a cycle on a condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Edge {
     None,
@@ -72,18 +72,18 @@ impl Lasting {
     }
 }
 
-/// What was found in a cycle.
+/// Finding of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Found {
     /// The line is full of rubbish.
     Babble,
     /// It is over.
     BabbleOver,
-    /// This node sends what nobody asked for.
+    /// This node sends unrequested frames.
     Flood(Address),
 }
 
-/// Whose rubbish is in the slot of a board that is not heard.
+/// Source of the rubbish in the slot of a board that is not heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spoilt {
     /// Its own.
@@ -101,7 +101,7 @@ pub struct Line {
     rubbish: u32,
     /// The same by slot.
     slots: [u32; NODES],
-    /// Bytes of this cycle in frames that nobody asked for, by node.
+    /// Bytes of this cycle in unrequested frames, by node.
     unasked: [u32; NODES],
     spoilt: [u8; NODES],
     /// Cycles in a row in which each node was not heard.
@@ -153,15 +153,15 @@ impl Line {
         }
     }
 
-    /// A sound frame that nobody asked for.
+    /// A sound frame that was not requested.
     pub fn unasked(&mut self, from: Address, encoded: usize) {
         if let Some(bytes) = from.slot().and_then(|index| self.unasked.get_mut(index)) {
             *bytes = bytes.saturating_add(u32::try_from(encoded).unwrap_or(u32::MAX));
         }
     }
 
-    /// Ends a cycle; `replied` says which nodes were heard in it. Calls `found` for
-    /// what begins or ends.
+    /// Ends a cycle; `replied` says which nodes were heard in it. Calls `found` for each condition that
+    /// begins or ends.
     pub fn end_cycle(&mut self, replied: impl Fn(usize) -> bool, mut found: impl FnMut(Found)) {
         let rubbish = self.rubbish.saturating_add(core::mem::take(&mut self.open));
         self.rubbish = 0;
@@ -200,8 +200,8 @@ impl Line {
         }
     }
 
-    /// By whom the slot of node index 0..8 has been spoilt for as long as a board is
-    /// given to answer, if it has been, and it alone.
+    /// Who spoils the slot of node index 0..8, and no other, for as long as a board is given to answer, if
+    /// anybody does.
     #[must_use]
     pub fn spoilt(&self, index: usize) -> Option<Spoilt> {
         let lasts = |cycles: &u8| *cycles >= SPOILT_CYCLES;
@@ -217,8 +217,8 @@ impl Line {
         })
     }
 
-    /// Takes what node index 0..8 has heard. Gives the board that babbled, once, when
-    /// all others have counted rubbish since the babble began and it has not.
+    /// Takes the link record of node index 0..8. Returns the board that babbled, once, when all others have
+    /// counted rubbish since the babble began and it has not.
     pub fn heard(&mut self, index: usize, record: &LinkRecord) -> Option<Address> {
         let errors = record.errors();
         if self.babble.told {
@@ -236,7 +236,7 @@ impl Line {
         }
         let mut deaf = None;
         for (index, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
-            // One that was reset since has counted anew: it tells nothing.
+            // One that was reset since has restarted its count: it proves nothing.
             let grown = (*after)?.checked_sub(before.unwrap_or(0))?;
             if grown < HEARD_ERRORS {
                 if deaf.is_some() {

@@ -3,8 +3,8 @@
 //!
 //! One bus cycle of 10 ms:
 //!
-//! 1. [`Layer0::finish_cycle`]: which nodes answered, odometry, feet, faults, behaviours;
-//!    gives the telemetry record and the feedback for layer 1.
+//! 1. [`Layer0::finish_cycle`]: which nodes answered, odometry, feet, faults, behaviours; returns the
+//!    telemetry record and the feedback for layer 1.
 //! 2. [`Layer0::start_cycle`]: builds SYNC from the newest set-points.
 //! 3. [`Layer0::on_bus_bytes`]: collects slot replies and answers.
 //! 4. [`Layer0::next_acyclic`]: requests in the rest of the cycle.
@@ -62,7 +62,7 @@ enum Power {
     Armed,
 }
 
-/// What a group of requests to all nodes is for.
+/// Purpose of a group of requests to all nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum GroupKind {
     Arm,
@@ -77,7 +77,7 @@ struct Group {
     kind: GroupKind,
     left: u8,
     failed: Option<Refusal>,
-    /// Cycles waited for the nodes to show what they acknowledged.
+    /// Cycles waited for the nodes to show the acknowledged state.
     waited: u8,
 }
 
@@ -111,7 +111,7 @@ pub struct Layer0 {
     emergency_stop: bool,
     group: Option<Group>,
     setpoints: Setpoints,
-    /// Profile of the wheels' pushes, as last told to their boards.
+    /// Profile of the wheels' pushes, as last sent to their boards.
     push: PushProfile,
     stale_cycles: u16,
     /// Number of the permission to move: of all references that have not ended.
@@ -212,7 +212,7 @@ impl Layer0 {
         self.setpoints.phase
     }
 
-    /// What is known of each node.
+    /// State of each node.
     #[must_use]
     pub const fn nodes(&self) -> &Nodes {
         &self.nodes
@@ -224,7 +224,7 @@ impl Layer0 {
         &self.odometry
     }
 
-    /// Layer 1 stands still, and has been given up: it will not answer its commands.
+    /// Layer 1 has stopped, and has been given up: it will not answer its commands.
     #[must_use]
     pub const fn has_given_layer_one_up(&self) -> bool {
         self.stale_cycles >= STALL_CYCLES

@@ -1,4 +1,4 @@
-//! What layer 0 knows about each node: identity and last reply.
+//! State of each node in layer 0: identity and last reply.
 
 use wheeleg_protocol::{Address, BoardKind, Identity, Limit, NodeMode, SlotReply};
 
@@ -6,7 +6,7 @@ use crate::config::UniqueId;
 use crate::dispatcher::Refusal;
 use crate::setpoint::NODES;
 
-/// Result of asking a node who it is.
+/// Result of asking a node for its identity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Enumerated {
     /// Not answered yet.
@@ -16,7 +16,7 @@ pub enum Enumerated {
     Ready(Identity),
     /// Speaks another version of the interface.
     Schema(Identity),
-    /// Not the kind of board its address stands for, or the straps say otherwise.
+    /// Not the kind of board that belongs to its address, or the straps differ.
     Role(Identity),
     /// Another board than the one that was commissioned here.
     Foreign(Identity),
@@ -27,9 +27,9 @@ pub enum Enumerated {
 /// One node.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
-    /// Who it is.
+    /// Its identity.
     pub enumerated: Enumerated,
-    /// It did not answer the last question who it is.
+    /// It did not answer the last request for its identity.
     pub identify_failed: bool,
     /// Frames that it has counted since it started, when last asked.
     pub frames: Option<u32>,
@@ -40,7 +40,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Unique id of the board, once it has said who it is.
+    /// Unique id of the board, once it has given its identity.
     #[must_use]
     pub const fn unique_id(&self) -> Option<UniqueId> {
         match self.enumerated {
@@ -90,11 +90,11 @@ impl Nodes {
         Some(home.0.raw())
     }
 
-    /// Takes the boards as they are for the commissioned ones.
+    /// Accepts the present boards as the commissioned ones.
     ///
     /// # Errors
-    /// The first board that bars it: missing, not identified, of another version or role, or
-    /// one of two at its address. Then nothing changed.
+    /// The first board that prevents it: missing, not identified, of another version or role, or one of two
+    /// at its address. Then nothing has changed.
     pub fn commission(
         &mut self,
         alive: impl Fn(usize) -> bool,
@@ -108,7 +108,7 @@ impl Nodes {
             }
             *place = node.unique_id();
         }
-        // A fault is no bar, and hides none at a board after it.
+        // A fault does not prevent it, and must not hide a misfit of a later board.
         let bar = (0..NODES).find_map(|index| trial.misfit(index, alive(index), master));
         if let Some(bar) = bar {
             return Err(bar);
@@ -167,37 +167,37 @@ impl Nodes {
         result
     }
 
-    /// Takes the frames that a node has counted. True if it goes on counting from
-    /// where it was: a board that was reset since restarts.
+    /// Takes the number of frames that a node has counted. True if it continues its count: a board that was
+    /// reset since restarts it.
     pub fn counted(&mut self, from: Address, frames: u32) -> bool {
         let node = from.slot().and_then(|index| self.nodes.get_mut(index));
         let before = node.and_then(|node| node.frames.replace(frames));
         before.is_some_and(|before| before <= frames)
     }
 
-    /// What a node has counted is not compared any more: it has said why it started.
+    /// The count of a node is not compared any more: it has reported why it started.
     pub fn forget_count(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.frames = None;
         }
     }
 
-    /// A node did not answer the question who it is: it is missing, or it and a duplicate
-    /// spoil each other's answers. It is asked by turns so that duplicates part.
+    /// A node did not answer the request for its identity: it is missing, or it and a duplicate spoil each
+    /// other's answers. It is asked in two ways by turns so that duplicates separate.
     pub fn identify_failed(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.identify_failed = !node.identify_failed;
         }
     }
 
-    /// Forgets who a node is (it was lost and may have been replaced or reset).
+    /// Forgets the identity of a node (it was lost and may have been replaced or reset).
     pub fn forget(&mut self, index: usize) {
         if let Some(node) = self.nodes.get_mut(index) {
             *node = Node::default();
         }
     }
 
-    /// First node at or after index `from` (cyclically) that has not said who it is.
+    /// First node at or after index `from` (cyclically) that has not given its identity.
     #[must_use]
     pub fn next_unknown(&self, from: usize) -> Option<Address> {
         let unknown = |(address, node): (Address, &Node)| {
@@ -287,7 +287,7 @@ pub(super) const fn is_armed(mode: NodeMode) -> bool {
     matches!(mode, NodeMode::Armed | NodeMode::Tracking)
 }
 
-/// What a board is by what it says of itself.
+/// Judges a board by its own report.
 fn judged(from: Option<Address>, identity: Identity, schema_hash: u64) -> Enumerated {
     let kind = if from.is_some_and(Address::is_joint) {
         BoardKind::Joint

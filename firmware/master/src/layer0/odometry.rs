@@ -5,7 +5,7 @@ use wheeleg_units::WheelCount;
 use crate::contact::Side;
 use crate::setpoint::WHEELS;
 
-/// What turns counts into distance.
+/// Conversion of counts into distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WheelGeometry {
     /// Quadrature counts per revolution of the wheel, > 0
@@ -89,8 +89,8 @@ impl Odometry {
         }
     }
 
-    /// Forgets where a wheel's counter stood: its next count is a new origin,
-    /// and the distance so far is kept. For a node that was reset.
+    /// Forgets the last count of a wheel: its next count is a new origin, and the distance so far is kept.
+    /// For a node that was reset.
     pub fn rebase(&mut self, side: Side) {
         if let Some(last) = self.last.get_mut(side.index()) {
             *last = None;

@@ -1,5 +1,5 @@
-//! The operator's lease of control: a person drives the robot only while it is known that they
-//! see it. It is the master that notices when they are gone, not the network before it.
+//! The operator's lease of control: a person drives the robot only while it is known that they see it. The
+//! master itself notices when they are gone, not the network in front of it.
 
 use super::{Layer0, Power};
 use crate::command::Command;
@@ -7,9 +7,9 @@ use crate::config::{OPERATOR_TIMEOUT_MAX_US, OPERATOR_TIMEOUT_MIN_US};
 use crate::dispatcher::Refusal;
 use crate::event::{Events, HoldReason};
 
-/// Client number of the operator who may hold the control.
+/// Client number of the operator who may hold control.
 pub const OPERATOR_CLIENT: u8 = 2;
-/// Client number of everybody else at the console: they may stop, and nothing more.
+/// Client number of everybody else at the console: they may only stop.
 pub const STOP_CLIENT: u8 = 3;
 /// A lease that lives from one sight of the robot to the next.
 #[derive(Clone, Copy, Debug)]
@@ -44,8 +44,8 @@ impl Lease {
         self.seen_us
     }
 
-    /// The operator has seen the robot as it was at `seen_us`. What is older than the newest
-    /// sight, or in the future, gains nothing.
+    /// The operator has seen the robot's state of `seen_us`. A view older than the newest one, or in the
+    /// future, has no effect.
     pub fn beat(&mut self, seen_us: u64, now_us: u64) {
         if let Some(newest) = &mut self.seen_us
             && seen_us <= now_us
@@ -54,7 +54,7 @@ impl Lease {
         }
     }
 
-    /// Begins the lease. Who holds it already has seen nothing more by asking again.
+    /// Begins the lease. A holder that asks again has seen nothing more by that.
     fn take(&mut self, now_us: u64) {
         self.seen_us.get_or_insert(now_us);
     }
@@ -87,7 +87,7 @@ impl Layer0 {
         self.lease.beat(seen_us, now_us);
     }
 
-    /// Whether a client may give this command. An E-stop is not asked for: anybody may stop.
+    /// Whether a client may give this command. An E-stop is not checked: anybody may stop.
     ///
     /// # Errors
     /// [`Refusal::NotInControl`].
@@ -121,8 +121,8 @@ impl Layer0 {
         Ok(())
     }
 
-    /// Stops a robot whose operator is gone. True if they are gone just now: then what they gave
-    /// must not run any more either.
+    /// Stops a robot whose operator is gone. True if they have just gone: then their commands must not run
+    /// any more either.
     pub fn watch_operator(&mut self, now_us: u64, events: &mut Events) -> bool {
         let lost = self.lease.expire(now_us);
         if lost && self.power != Power::Disarmed {

@@ -16,10 +16,10 @@ const PERIOD_CYCLES: u32 = 10;
 const ROUND: usize = 2 * NODES;
 /// Rounds without links between two with them on a sound line, 0.8 s each.
 const QUIET_ROUNDS: u8 = 7;
-/// Time for which the boards go on recording, ms: three rounds of 1.6 s.
+/// Time for which the boards keep recording, ms: three rounds of 1.6 s.
 const LEASE_MS: u16 = 5_000;
 
-/// What is to be asked of one board.
+/// Open questions to one board.
 #[derive(Clone, Copy, Debug, Default)]
 struct Open {
     why: bool,
@@ -31,7 +31,7 @@ struct Open {
     faults: u16,
 }
 
-/// What is to be asked of whom.
+/// Open questions to all boards.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Questions {
     nodes: [Open; NODES],
@@ -39,7 +39,7 @@ pub struct Questions {
     next_cycle: u32,
     /// Broken frames that the master had heard when the last round began.
     errors: u32,
-    /// Rounds without links still to come; the one under way has them if it is all of them.
+    /// Rounds without link reports still to come; the present one has them if this is the full number.
     quiet: u8,
 }
 
@@ -71,7 +71,7 @@ impl Questions {
         }
     }
 
-    /// Node index 0..8 is to say why it stopped.
+    /// Asks node index 0..8 why it stopped.
     pub fn why(&mut self, index: usize) {
         if let Some(node) = self.nodes.get_mut(index) {
             node.why = true;
@@ -85,14 +85,14 @@ impl Questions {
         }
     }
 
-    /// All nodes are to say what they have heard.
+    /// Asks all nodes what they have heard.
     pub fn links(&mut self) {
         for node in &mut self.nodes {
             node.link = true;
         }
     }
 
-    /// A question that has not been answered is asked again.
+    /// Repeats an unanswered question.
     pub fn again(&mut self, to: Address, message: &Message) {
         let Some(node) = to.slot().and_then(|index| self.nodes.get_mut(index)) else {
             return;

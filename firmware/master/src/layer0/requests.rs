@@ -90,7 +90,7 @@ impl Layer0 {
         }
     }
 
-    /// Takes a frame from the bus that is no slot reply. False if nobody asked for it.
+    /// Takes a frame from the bus that is not a slot reply. False if it was not requested.
     fn on_answer(
         &mut self,
         envelope: Envelope,
@@ -187,8 +187,8 @@ impl Layer0 {
         }
     }
 
-    /// The answer to a question of the master's own. One that is not answered is
-    /// not repeated: a board that comes back is asked anew.
+    /// The answer to a question of the master's own. An unanswered one is not repeated: a board that comes
+    /// back is asked again.
     fn reported(
         &mut self,
         from: Address,
@@ -208,7 +208,7 @@ impl Layer0 {
                     ago_us,
                 };
                 events.push(now_us, diagnosis);
-                // What led to it.
+                // Ask for the events before it.
                 self.questions.log(index);
                 self.nodes.forget_count(from);
             }
@@ -231,7 +231,7 @@ impl Layer0 {
         }
     }
 
-    /// What a board has heard. True if it was not reset since it was asked last.
+    /// Takes a board's link record. True if it was not reset since the last one.
     fn heard(
         &mut self,
         from: Address,
@@ -257,8 +257,8 @@ impl Layer0 {
         went_on
     }
 
-    /// A board says that it has stored its parameters. If it was reset meanwhile,
-    /// those that it has stored are not those that it was told.
+    /// A board reports that it has stored its parameters. If it was reset meanwhile, it has not stored those
+    /// that it was sent.
     fn saved(
         &mut self,
         ticket: Ticket,
@@ -291,7 +291,7 @@ impl Layer0 {
                 self.abort_arming(now_us, events);
                 events.push(now_us, Event::Refused { ticket, reason });
             }
-            // Armed when the replies say so: see `confirm_arming`.
+            // Armed once the replies show it: see `confirm_arming`.
             (GroupKind::Arm, None) => {}
             _ if left > 0 => {}
             (_, Some(reason)) => {
@@ -306,8 +306,8 @@ impl Layer0 {
         }
     }
 
-    /// One node refused or stayed behind: the others are disarmed again. What
-    /// else was waiting is dropped, and its users are told.
+    /// One node refused or stayed behind: the others are disarmed again. Other waiting jobs are dropped, and
+    /// their users notified.
     pub(super) fn abort_arming(&mut self, now_us: u64, events: &mut Events) {
         self.power = Power::Disarmed;
         let reason = Refusal::Interrupted;

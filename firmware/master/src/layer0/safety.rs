@@ -1,4 +1,4 @@
-//! Stops: E-stop, HOLD of all axes, and what triggers them.
+//! Stops: E-stop, HOLD of all axes, and their triggers.
 
 use wheeleg_protocol::{Address, EmergencyBrake, InputBits, Message};
 
@@ -26,14 +26,14 @@ impl Layer0 {
     /// E-stop: the bit goes out with the next SYNC and stays until cleared.
     pub fn emergency_stop(&mut self, now_us: u64, events: &mut Events) {
         self.emergency_stop = true;
-        // Where all is held already: nothing that waits may open a valve after the stop.
+        // If everything is held already: no waiting command may open a valve after the stop.
         self.drop_openings(now_us, events);
         self.hold_all(HoldReason::EmergencyStop, now_us, events);
     }
 
-    /// Stops every axis. References freeze where the joints are in the next
-    /// SYNC, wheels are withdrawn, and every node is asked to brake (E-stop: the
-    /// bit in SYNC does it). The first reason stays until cleared.
+    /// Stops every axis. References freeze at the joints' positions in the next SYNC, wheels are withdrawn,
+    /// and every node is commanded to brake (E-stop: the bit in SYNC does it). The first reason stays until
+    /// cleared.
     pub(crate) fn hold_all(&mut self, reason: HoldReason, now_us: u64, events: &mut Events) {
         if self.hold.is_some() && self.orphan.given_up.is_none() {
             return;
@@ -50,8 +50,8 @@ impl Layer0 {
         }
     }
 
-    /// Layer 1 stands still. Where it walked, the behaviours bring the robot to a stand and keep it
-    /// there for a while ([`CARRIED`]); otherwise all axes hold.
+    /// Layer 1 has stopped. If it walked, the behaviours bring the robot to a stand and keep it there for a
+    /// while ([`CARRIED`]); otherwise all axes hold.
     fn give_up_layer_one(&mut self, now_us: u64, events: &mut Events) {
         let reason = HoldReason::LayerOneStalled;
         if self.hold.is_some() || self.setpoints.walk.is_none() {
@@ -103,7 +103,7 @@ impl Layer0 {
         }
     }
 
-    /// Keeps every joint where it was last measured and ends all references.
+    /// Keeps every joint at its last measured position and ends all references.
     pub(super) fn freeze(&mut self) {
         let mut strokes = [None; crate::setpoint::JOINTS];
         for (stroke, (_, node)) in strokes.iter_mut().zip(self.nodes.iter()) {
@@ -113,7 +113,7 @@ impl Layer0 {
         self.release();
     }
 
-    /// Ends all references; the wheels' next motion begins where they are.
+    /// Ends all references; the wheels' next motion begins at their present positions.
     pub(super) fn release(&mut self) {
         self.direct = Default::default();
         self.direct_travel = None;
@@ -135,7 +135,7 @@ impl Layer0 {
         }
         group.waited = group.waited.saturating_add(1);
         let (ticket, waited) = (group.ticket, group.waited);
-        // A motion begun while a joint still fills would be made up for in one go.
+        // A motion begun while a joint still fills would be caught up with in one jump.
         let fills = self.nodes.fills();
         let allowed = if fills { FILL_CYCLES } else { CONFIRM_CYCLES };
         if self.nodes.all_armed() && !fills {
@@ -160,8 +160,8 @@ impl Layer0 {
             })
     }
 
-    /// A save stalls the board for two or three cycles, and it was asked to: it is
-    /// missed only when it does not come back.
+    /// A save stalls the board for two or three cycles, at the master's own request: it counts as missing
+    /// only if it does not come back.
     fn unless_saving(
         &mut self,
         index: usize,
@@ -184,7 +184,7 @@ impl Layer0 {
         }
     }
 
-    /// What was on the line in this cycle beside what was asked for.
+    /// Checks the traffic of this cycle besides the requested frames.
     fn watch_line(&mut self, now_us: u64, events: &mut Events) {
         let (nodes, questions) = (&self.nodes, &mut self.questions);
         let replied = |index| nodes.get(index).is_some_and(|node| node.reply.is_some());
@@ -201,7 +201,7 @@ impl Layer0 {
         });
     }
 
-    /// Whether the supply pressure switch is open, as its board told last.
+    /// Whether the supply pressure switch is open, as its board last reported.
     pub(super) fn has_no_air(&self) -> bool {
         let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
         supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE))

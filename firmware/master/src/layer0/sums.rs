@@ -1,4 +1,4 @@
-//! Which boards have other parameters in force than they should have, by the sums that they tell
+//! Finds boards with other parameters in force than they should have, by the sums that they report
 //! (protocol/SPEC.md, Parameter sets): lost, half loaded, or set by somebody.
 
 use crate::setpoint::NODES;
@@ -11,7 +11,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Nothing told yet; a board without a `wanted` sum may have any parameters.
+    /// No sum reported yet; a board without a `wanted` sum may have any parameters.
     pub(super) const fn new(wanted: [Option<u32>; NODES]) -> Self {
         Self {
             wanted,
@@ -19,7 +19,7 @@ impl Sums {
         }
     }
 
-    /// A board tells its sum. True if it is another one than it told before, and not the wanted.
+    /// A board reports its sum. True if it differs from the one before, and from the wanted one.
     pub(super) fn heard(&mut self, index: usize, sum: u32) -> bool {
         let Some((wanted, told)) = self.wanted.get(index).zip(self.told.get_mut(index)) else {
             return false;
@@ -28,7 +28,7 @@ impl Sums {
         before != Some(sum) && wanted.is_some_and(|wanted| wanted != sum)
     }
 
-    /// A board is lost: what comes back may be another one.
+    /// A board is lost: a returning one may be another board.
     pub(super) fn lost(&mut self, index: usize) {
         if let Some(told) = self.told.get_mut(index) {
             *told = None;

@@ -52,7 +52,7 @@ impl WheelUnits {
         Acceleration8p8::new(libm::roundf(raw).clamp(1.0, 32767.0) as u16).unwrap_or_default()
     }
 
-    /// Longest move of a single command that the counters can tell: [`REACH_COUNTS`].
+    /// Longest move of a single command that the counters can represent: [`REACH_COUNTS`].
     #[must_use]
     pub fn travel_limit(&self) -> PositionMm {
         um_to_mm(self.geometry.counts_to_um(i64::from(REACH_COUNTS)))
@@ -65,10 +65,9 @@ impl WheelUnits {
     }
 }
 
-/// Longest distance between a wheel and its reference, counts: half of what
-/// the 24-bit circle tells apart. A profile that still runs to one such
-/// reference can then be followed by one to any other without going the wrong
-/// way round.
+/// Longest distance between a wheel and its reference, counts: half of the unambiguous range of the 24-bit
+/// circle. A profile that still runs to one such reference can then be followed by one to any other without
+/// going the wrong way round.
 const REACH_COUNTS: i32 = (1 << 22) - 1;
 
 /// References sent to the wheels.
@@ -82,7 +81,7 @@ pub struct Wheels {
 }
 
 impl Wheels {
-    /// Forgets everything: the next motion begins where the wheels are.
+    /// Forgets everything: the next motion begins at the wheels' positions.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
@@ -129,8 +128,8 @@ impl Wheels {
         })
     }
 
-    /// Whether a new motion of `travel_mm`, which begins at the last reference,
-    /// ends within the reach of both wheels from where they are.
+    /// Whether a new motion of `travel_mm`, which begins at the last reference, ends within the reach of both
+    /// wheels from their positions.
     #[must_use]
     pub fn has_room(
         &self,
@@ -153,7 +152,7 @@ impl Wheels {
 /// A move of both wheels that the user commands by its length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DirectMove {
-    /// From where the wheels are to the end, over its magnitude.
+    /// From the wheels' positions to the end, over its magnitude.
     profile: Trapezoid,
     backward: bool,
     target_mm: PositionMm,

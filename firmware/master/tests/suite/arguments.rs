@@ -1,4 +1,4 @@
-//! Arguments of commands: one table for what builds a command and what the layers check.
+//! Arguments of commands: one table for building commands and for the checks of the layers.
 
 use fixed::types::I16F16;
 use wheeleg_master::MasterConfig;
@@ -12,7 +12,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::common::TestRig;
 
-/// Arguments that the master accepts: those of the paper's gait, else about the middle.
+/// Arguments that the master accepts: those of the paper's gait, otherwise about the middle.
 fn usual(argument: &'static Argument) -> Value {
     let seconds = |us| Value::Micros(us);
     match (argument.name, argument.kind) {
@@ -236,7 +236,7 @@ fn every_command_is_built_from_exactly_the_arguments_of_its_row() {
     }
 }
 
-/// What the layers check when they carry a command out is what the table says.
+/// The layers check exactly the table's ranges when they carry a command out.
 #[test]
 fn the_layers_refuse_what_lies_one_step_beyond_the_table_and_nothing_within() {
     let mut refusals = 0;

@@ -28,7 +28,7 @@ pub(crate) fn mm(mm: f64) -> PositionMm {
     PositionMm::from_f64(mm)
 }
 
-/// A robot of which a test says all that its boards say.
+/// A robot whose boards report what a test sets.
 pub(crate) struct Robot {
     pub(crate) behaving: Behaving,
     pub(crate) senses: Senses,
@@ -71,7 +71,7 @@ impl Robot {
         self.senses.feet = feet.map(|touches| Some(FootSwitches(if touches { 0x0F } else { 0 })));
     }
 
-    /// Cycles; what is told in them.
+    /// Runs cycles; returns the acts reported in them.
     pub(crate) fn run(&mut self, cycles: u32) -> Vec<Act> {
         let mut told = Vec::new();
         for _ in 0..cycles {
@@ -82,7 +82,7 @@ impl Robot {
         told
     }
 
-    /// The behaviours' part of a cycle; what is told in it.
+    /// The behaviours' part of a cycle; returns the acts reported in it.
     pub(crate) fn observe(&mut self) -> Vec<Act> {
         let mut events = Events::new();
         self.behaving
@@ -104,7 +104,7 @@ impl Robot {
         travel.map_or(0.0, |travel| travel.wheels[0].velocity_mm_s.to_f64())
     }
 
-    /// Leads the wheels for a cycle at a speed, mm/s; gives the speed that they are led at.
+    /// Leads the wheels for a cycle at a speed, mm/s; returns the speed used.
     pub(crate) fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
         if fresh {
             self.travel_mm += 0.01 * mm_s;
@@ -159,7 +159,7 @@ fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
         robot.run(4);
         assert_eq!(robot.reference(B5, 60.0), 60.0);
     }
-    // 5 mm in the half second are motion, 4.9 mm are none.
+    // 5 mm in half a second count as motion, 4.9 mm do not.
     for (way_mm, told) in [(4.9, true), (5.0, false)] {
         let mut robot = Robot::all(STAND);
         robot.joint(B5).saturated = true;
@@ -224,8 +224,8 @@ fn b2_wheels_give_way_after_200_ms_until_a_foot_carries() {
     assert_eq!(robot.acts().back_mm, mm(0.0), "switched off");
 }
 
-/// Feet that look for the ground at their full length carry nothing: wheels that went on would drive in below the
-/// robot until it lies on its tail. Where one stands the other is only set down.
+/// Feet that search for the ground at their full length carry nothing: wheels that went on would drive in
+/// below the robot until it lies on its tail. If one foot stands, the other is only set down.
 #[test]
 fn b2_the_wheels_stop_while_both_feet_are_set_down_without_ground() {
     let lower = LegPlan::Lower(mm(150.0));
@@ -286,7 +286,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
     assert_eq!(robot.run(1), []);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(121.0)));
     assert_eq!(robot.behaving.tally().of(Behaviour::Touchdown), 1);
-    // 20 mm beside where it was expected (130 mm) is told, less is not.
+    // 20 mm off the expected place (130 mm) is reported, less is not.
     for (at, told) in [
         (110.0, vec![Act::EarlyGround(Side::Left)]),
         (110.1, vec![]),
@@ -297,7 +297,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
         robot.joint(B6).stroke_mm = mm(at);
         assert_eq!(robot.run(2), told, "{at}");
     }
-    // A touch of one cycle is a graze: the foot goes on down.
+    // A touch of one cycle is a graze: the foot keeps going down.
     let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
     robot.joint(B6).stroke_mm = mm(125.0);
     robot.run(1);
@@ -312,7 +312,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
     assert_eq!(robot.acts().landing[0], Landing::Waiting, "felt anew");
     robot.run(1);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(129.0)));
-    // Without it the foot goes down on what was expected, and 4 mm more.
+    // Without it the foot goes down to the expected ground, and 4 mm more.
     let mut robot = Robot::new(
         [LegPlan::Lower(from), LegPlan::Stance],
         Behaviours::ALL.without(Behaviour::Touchdown),
@@ -392,8 +392,8 @@ fn b4_no_ground_is_told_after_200_ms() {
     assert_eq!(robot.run(1), [Act::NoGround(Side::Left)]);
 }
 
-/// A foot that is pressed against something from the begin of its reach on goes back after 0.1 s: after 0.2 s of push
-/// without motion its board takes it for a fault. One that gets away has its 250 ms.
+/// A foot that is pressed against something from the start of its reach goes back after 0.1 s: after 0.2 s of
+/// push without motion its board takes it for a fault. One that gets away has its 250 ms.
 #[test]
 fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_gives_up() {
     let pressed = |velocity_mm_s: f64| {
@@ -404,7 +404,7 @@ fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_giv
     let mut robot = pressed(9.9);
     assert_eq!(robot.run(9), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
-    // One that moves is told a cycle later: b5 waits where it touches.
+    // A moving one is reported a cycle later: b5 waits where it touches.
     assert_eq!(pressed(10.1).run(10), []);
 }
 
@@ -461,7 +461,7 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
         150.0,
         "and goes on when it is free"
     );
-    // One that goes on to touch has met something.
+    // A foot that continues and touches has met something.
     robot.touch([true; 2]);
     assert_eq!(robot.run(10), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
@@ -496,14 +496,14 @@ fn b6_a_foot_follows_lost_ground_by_20_mm_at_half_the_speed() {
         robot.lead(100.0, true).wheels[0].velocity_mm_s.to_f64(),
         50.0
     );
-    // What it has found is kept until the stance ends.
+    // Its foothold is kept until the stance ends.
     robot.touch([true; 2]);
     robot.run(10);
     assert_eq!(robot.reference(B6, 100.0), 120.0);
     assert!(!robot.acts().lost[0]);
 }
 
-/// A robot whose wheels go and whose legs follow with this slip, for so many cycles; λ and pace act.
+/// A robot whose wheels turn and whose legs follow with this slip, for `cycles` cycles; λ and pace act.
 fn slipping(slip: f64, cycles: u32, enabled: Behaviours) -> Robot {
     let mut robot = Robot::new(STAND, enabled);
     let (mut wheels, mut stroke) = (0.0, 170.0);
@@ -540,7 +540,7 @@ fn b7_wheels_that_slip_slow_down_and_the_legs_pull() {
     let robot = slipping(0.77, 160, Behaviours::ALL);
     assert_eq!(robot.told, [Act::Slip]);
     assert!(robot.acts().pace < 1);
-    // A leg counts from 0.3 s of its stance on, and the slip has to last as long.
+    // A leg counts from 0.3 s of its stance on, and the slip must last as long.
     for (cycles, told) in [(55, 0), (70, 1)] {
         assert_eq!(slipping(0.5, cycles, Behaviours::ALL).told.len(), told);
     }
@@ -610,7 +610,7 @@ fn b9_three_swings_in_a_row_that_run_against_something_are_stuck_and_then_two() 
             let reaches = leg == LegPlan::Reach;
             robot.touch([!reaches, true]);
             robot.joint(B5).velocity_mm_s = VelocityMmS::from_int(if bumps { 0 } else { 100 });
-            // Wheels and legs go on as if nothing were.
+            // Wheels and legs continue as if nothing had happened.
             for wheel in &mut robot.senses.wheels {
                 wheel.travel_um += way_um;
             }

@@ -66,8 +66,8 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
     );
 }
 
-/// A limit below what is streamed lets the wheels fall behind their references, and the stop at
-/// the end of a push becomes a jolt.
+/// A limit below the streamed speed lets the wheels fall behind their references, and the stop at the end of
+/// a push becomes a jolt.
 #[test]
 fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
     let mut rig = TestRig::new(MasterConfig {
@@ -88,7 +88,7 @@ fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
     assert_eq!(profiles(&mut rig), [[13, 5, 16, 5], [13, 5, 16, 5]]);
 }
 
-/// Speeds and accelerations that both wheels were told, in order.
+/// Speeds and accelerations sent to both wheels, in order.
 fn profiles(rig: &mut TestRig) -> [Vec<u16>; 2] {
     [7, 8].map(|node| {
         let told = rig.node(node).requests.iter().filter_map(|m| match m {
@@ -110,12 +110,12 @@ fn new_gait_parameters_reach_the_wheels_profiles() {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(profiles(&mut rig), [[10, 5], [10, 5]]);
-    // Armed: told at once, once, and only where something changed.
+    // Armed: sent at once, once, and only where something changed.
     let set = rig.submit(Command::SetGait(gait(360, 1200)));
     rig.run(20);
     assert!(rig.done(set));
     assert_eq!(profiles(&mut rig), [[10, 5, 21, 9], [10, 5, 21, 9]]);
-    // Disarmed: told with the next arming.
+    // Disarmed: sent with the next arming.
     rig.submit(Command::Disarm);
     rig.run(20);
     rig.submit(Command::SetGait(gait(180, 600)));
@@ -171,7 +171,7 @@ fn misplaced_board_and_missing_node_refuse_arming() {
     let ticket = rig.submit(Command::Arm);
     rig.run(3);
     assert_eq!(rig.refusal(ticket), Some(Refusal::NodeMissing { node: 2 }));
-    // The absent node keeps nobody else from being identified.
+    // The absent node does not delay the identification of others.
     for node in [1, 3, 4, 5, 6, 7, 8] {
         assert!(rig.saw(|event| *event == Event::NodeReady(node)), "{node}");
     }
@@ -211,7 +211,7 @@ fn arming_waits_for_slow_answers_however_long_they_take_in_all() {
         rig.cycle();
         cycles += 1;
     }
-    // Longer than what the boards have to show a closed loop once they were all asked.
+    // Longer than the boards have to show a closed loop once all were asked.
     assert!(cycles > 12, "{cycles}");
     assert!(rig.master.is_armed());
 }
@@ -339,12 +339,12 @@ fn a_wheel_move_beyond_the_encoder_circle_is_refused() {
         assert!(!done);
     }
     assert_eq!(go(&mut rig, 7_500), (None, true));
-    // A second one would add up to 15 m from where the wheels are.
+    // A second one would add up to 15 m from the wheels' positions.
     assert_eq!(go(&mut rig, 7_500), (Some(Refusal::Moving), false));
     assert_eq!(go(&mut rig, -7_500), (None, true));
 }
 
-/// Half of what the 24-bit circle tells apart, less one.
+/// Half of the unambiguous range of the 24-bit circle, less one.
 #[test]
 fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
     let wheels = WheelGeometry {
@@ -491,7 +491,7 @@ fn wheel_moves_start_at_the_last_reference_and_wrap() {
                 travel_mm: PositionMm::from_int(100),
             });
             if drive == WheelDrive::Stream {
-                // The master's own trapezoid: it begins where the wheels are, and takes its time.
+                // The master's own trapezoid: it begins at the wheels' positions, and takes its time.
                 let sync = rig.cycle();
                 let slot = sync.slots.wheel(Address::wheel(7).unwrap()).unwrap();
                 let end = (8_388_000 + k * 11_035) as i32;
@@ -528,7 +528,7 @@ fn a_wheel_that_starts_anew_has_not_moved() {
     wheel.position = 0;
     rig.run(1);
     assert_eq!(travel_um(&rig), before);
-    // From there on what it counts is motion again: half of it is the mean of both.
+    // From there on its counts are motion again: half of it is the mean of both.
     rig.nodes[6].mode = NodeMode::Idle;
     rig.nodes[6].position = 1_000;
     rig.run(1);
@@ -608,8 +608,7 @@ fn telemetry_drops_the_oldest_and_counts() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// Whatever comes from the bus: no panic, never armed without a command, no
-    /// set-point in any slot.
+    /// For any input from the bus: no panic, never armed without a command, no set-point in any slot.
     #[test]
     fn arbitrary_bytes_never_arm(
         chunks in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..200), 0..20),

@@ -165,7 +165,7 @@ fn late_far_repeated_and_reordered_commands_are_refused() {
         Err(Reject::DeadlineTooFar)
     );
     assert_eq!(submit(request(4, 1, now)), Err(Reject::UnknownClient));
-    // A client that connects anew may start again.
+    // A client that reconnects may start again.
     assert_eq!(
         submit(request(0, 1, now)),
         Err(Reject::OutOfOrder { last: 9 })

@@ -1,4 +1,4 @@
-//! Commands of the user to single axes: what reaches which board, and when nothing may.
+//! Commands of the user to single axes: which board gets what, and when nothing may reach one.
 
 use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
@@ -111,7 +111,7 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
         slot.reference
     };
     let before = kept(&mut rig);
-    // Pushed away, and asked to stop once more.
+    // Pushed away, and commanded to stop again.
     rig.node(1).position += i64::from(PositionMm::from_int(9).raw());
     rig.node(1).rate = 0;
     rig.run(2);
@@ -120,11 +120,11 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
     assert_eq!(kept(&mut rig), before);
 }
 
-/// Counts by which the left wheel goes in a gait, after moves of the user of so many mm.
+/// Counts that the left wheel travels in a gait, after these moves of the user, mm.
 fn gait_after(moves_mm: &[i16]) -> i64 {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
-    // A second time: the numbers begin anew with neither.
+    // A second time: neither restarts the numbers.
     let ticket = rig.submit(Command::Stand);
     rig.run(500);
     assert!(rig.done(ticket));
@@ -141,7 +141,7 @@ fn gait_after(moves_mm: &[i16]) -> i64 {
     rig.node(7).position - start
 }
 
-/// Who lets go of the wheels gives `Hold`: a move under way ends there, a second time, too.
+/// A user releases the wheels with `Hold`: a move under way ends there, also the second time.
 #[test]
 fn a_hold_stops_a_move_of_the_user() {
     for wheel_drive in [WheelDrive::Profile, WheelDrive::Stream] {
@@ -176,7 +176,7 @@ fn a_hold_stops_a_move_of_the_user() {
     }
 }
 
-/// Both number their motions: however many there were, a gait goes on from where the wheels are.
+/// Both number their motions: however many there were, a gait goes on from the wheels' positions.
 #[test]
 fn a_move_of_the_user_is_none_of_the_gaits() {
     let alone = gait_after(&[]);

@@ -283,7 +283,7 @@ fn stop_ends_with_the_step_under_way() {
     assert_eq!(gait.steps(), 2);
 }
 
-/// The foot stood at 170 mm: it comes fast to 15 mm above that, and slowly from there on.
+/// The foot stood at 170 mm: it goes fast to 15 mm above that, and slowly from there on.
 #[test]
 fn a_guarded_touchdown_is_slow_from_above_the_ground_on() {
     const SPEED_MM_S: f64 = 60.0;
@@ -326,7 +326,7 @@ fn a_guarded_touchdown_is_slow_from_above_the_ground_on() {
         180.0,
         "the push needs it down"
     );
-    // In the next step the ground is where the foot stands now.
+    // In the next step the ground is at the foot's present place.
     assert_eq!(b6_at(3_434, Some(176)).reference_mm.to_f64(), 0.0);
     assert_eq!(b6_at(4_340, Some(0)).reference_mm.to_f64(), 161.0);
 }
@@ -360,7 +360,7 @@ fn touchdown_reflex_is_asked_for_from_the_lowering_on() {
     }
 }
 
-/// The number of a motion tells that its distance counts from anew.
+/// A new motion number means that the distance restarts from zero.
 #[test]
 fn a_second_gait_numbers_its_motions_on() {
     let motions = |gait: &mut SquareGait| -> std::collections::BTreeSet<u16> {

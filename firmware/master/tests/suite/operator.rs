@@ -1,4 +1,4 @@
-//! The lease of control: who may command, and what comes of an operator who is gone.
+//! The lease of control: who may command, and what happens when the operator is gone.
 
 use crate::common::{CYCLE_US, TestRig};
 use wheeleg_master::MasterConfig;
@@ -12,7 +12,7 @@ use wheeleg_master::event::{Event, HoldReason};
 use wheeleg_master::layer0::operator::{Lease, OPERATOR_CLIENT, STOP_CLIENT};
 use wheeleg_protocol::{Address, NodeMode, SyncFlags};
 
-/// An operator at a console, who numbers what they give.
+/// An operator at a console, who numbers their commands.
 struct Console {
     rig: TestRig,
     next_id: u32,
@@ -116,7 +116,7 @@ fn an_operator_who_is_gone_stops_the_robot_and_it_stays_stopped() {
     assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Hold));
     assert_eq!(rig.refusal(gait), Some(Refusal::Interrupted));
     assert!(rig.done(waits), "it ran while its giver was there");
-    // Who comes back has no control; with it, the stop is still to be cleared.
+    // An operator who comes back has no control; once they have it, the stop must still be cleared.
     assert_eq!(
         console.give(OPERATOR_CLIENT, Command::ClearFault),
         NOT_IN_CONTROL
@@ -134,7 +134,7 @@ fn what_waits_when_the_operator_is_lost_never_runs() {
     let mut console = Console::new();
     console.done(Command::TakeControl, 1);
     console.done(Command::Arm, 20);
-    // A host that was suspended: what was given before is taken from the queue long after.
+    // A host that was suspended: earlier commands are taken from the queue long after.
     let arm = console
         .give(OPERATOR_CLIENT, Command::Disarm)
         .expect("taken");
@@ -202,7 +202,7 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
         assert_eq!(console.rig.master.layer0().lease().seen_us(), seen);
     }
     console.rig.run(50);
-    // Nor does one of somebody who holds nothing.
+    // Nor does a beat of a client that holds nothing.
     console
         .rig
         .master
@@ -210,8 +210,7 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
     assert!(!console.rig.master.layer0().lease().is_held());
 }
 
-/// Each time it is asked about something that was seen long before: it would be a way to drive without
-/// looking.
+/// Each request refers to a view from long before: otherwise one could drive without looking.
 #[test]
 fn who_takes_the_control_again_has_seen_nothing_more() {
     let mut console = Console::new();

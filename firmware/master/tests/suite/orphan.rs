@@ -1,5 +1,5 @@
-//! A walk whose layer 1 stands still, with eight boards on the bus: what goes on, how it ends, and
-//! what can never begin again.
+//! A walk whose layer 1 has stopped, with eight boards on the bus: what goes on, how it ends, and what can
+//! never begin again.
 
 use crate::common::{CYCLE_US, TestRig, leg};
 use wheeleg_master::MasterConfig;
@@ -38,7 +38,7 @@ fn order(speed_mm_s: i16, turn_rad_s: &str) -> WalkOrder {
 }
 
 impl Walker {
-    /// It has walked for so many cycles.
+    /// A robot that has walked for `cycles` cycles.
     fn new(order: WalkOrder, cycles: usize) -> Self {
         let mut walker = Self {
             rig: TestRig::new(MasterConfig {
@@ -80,7 +80,7 @@ impl Walker {
         }
     }
 
-    /// Layer 1 stands still from now on.
+    /// Layer 1 stops from now on.
     fn stall(&mut self, cycles: usize) {
         self.rig.master.set_layer1_enabled(false);
         self.run(cycles);
@@ -100,7 +100,7 @@ impl Walker {
         wheels.map(|node| node.position).collect()
     }
 
-    /// Nothing moves in so many cycles, and nothing is armed that could.
+    /// Checks that nothing moves for `cycles` cycles, and nothing is armed that could.
     fn stays(&mut self, cycles: usize, why: &str) {
         let (strokes, wheels) = (self.strokes_mm(), self.wheels());
         for cycle in 0..cycles {
@@ -244,7 +244,7 @@ fn no_walk_goes_on_after_a_clear_and_an_arming() {
         let record = walker.rig.last_record.unwrap();
         assert_eq!((record.phase, record.walk), (Phase::Idle, None));
         assert!(walker.rig.master.is_armed(), "{later}");
-        // And it can be ordered anew.
+        // And it can be ordered again.
         walker.rig.submit(Command::Walk(order(120, "0")));
         walker.run(60);
         assert!(walker.wheels()[0] > wheels[0] + 1000);
@@ -255,10 +255,10 @@ fn asks(walker: &mut Walker, command: Command) {
     walker.rig.submit(command);
 }
 
-/// A stop: name, how it comes about, the reason that is told.
+/// A stop: its name, how it comes about, the reported reason.
 type Stop = (&'static str, fn(&mut Walker), Option<HoldReason>);
 
-/// What can stop a robot whose layer 1 stands still.
+/// Causes that can stop a robot whose layer 1 has stopped.
 const STOPS: [Stop; 8] = [
     (
         "E-stop",
@@ -311,7 +311,7 @@ fn every_stop_stops_a_walk_without_layer_1_and_a_layer_1_that_wakes_moves_nothin
                 let mut walker = Walker::new(order(120, "0.03"), 311);
                 walker.stall(cycles);
                 stop(&mut walker);
-                // Three cycles to miss a board, some for the request of a hold to be found.
+                // Three cycles to miss a board, some to find the request for a hold.
                 walker.run(GIVEN_UP + 2);
                 if wakes {
                     walker.wake();
@@ -363,7 +363,7 @@ fn a_walk_that_stops_or_backs_off_when_layer_1_stalls_comes_to_its_stand() {
             let mut walker = Walker::new(order(120, "0"), 305);
             if stuck {
                 walker.rig.submit(Command::SetBehaviours(Behaviours::ALL));
-                // A wheel that gives all and does not turn.
+                // A wheel at full torque that does not turn.
                 for wheel in [7, 8] {
                     walker.rig.node(wheel).rate = 0;
                 }
@@ -397,7 +397,7 @@ fn a_walk_that_stops_or_backs_off_when_layer_1_stalls_comes_to_its_stand() {
 fn commands_to_a_layer_1_that_was_given_up_are_answered() {
     let mut walker = Walker::new(order(120, "0"), 300);
     walker.stall(5);
-    // It waits for a layer 1 that never takes it, and is answered when that is given up.
+    // It waits for a layer 1 that never takes it, and is answered when layer 1 is given up.
     let before = walker.rig.submit(Command::StopGait);
     walker.run(10);
     assert_eq!(walker.rig.refusal(before), Some(Refusal::Latched));

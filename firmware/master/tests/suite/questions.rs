@@ -1,5 +1,5 @@
-//! What the master asks by itself, and what it says of boards and line: causes of
-//! faults and restarts, link counters, logs, commissioned boards, babble.
+//! The master's own questions, and its reports about boards and line: causes of faults and restarts, link
+//! counters, logs, commissioned boards, babble.
 
 use crate::common::{NO_LOG, TestRig, emit};
 use wheeleg_master::MasterConfig;
@@ -60,7 +60,7 @@ fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
     assert_eq!(diagnoses(&rig).len(), 1, "once");
 }
 
-/// A new master leads boards that have told their fault to nobody yet.
+/// A new master leads boards that have not reported their fault to anybody yet.
 #[test]
 fn a_fault_from_before_this_master_is_told_by_its_age() {
     const AGE_US: u64 = 3_000_000;
@@ -267,7 +267,7 @@ fn another_board_than_the_commissioned_one_bars_arming_and_both_ids_are_named() 
     for told in [foreign(3, 4, Some(4)), foreign(4, 0xEE, None)] {
         assert!(rig.saw(|event| *event == told), "{told:?}");
     }
-    // Taken over as they are, they arm.
+    // Once accepted, they arm.
     let ticket = rig.submit(Command::Commission);
     rig.run(2);
     assert!(rig.done(ticket), "{:?}", rig.refusal(ticket));
@@ -367,7 +367,7 @@ fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
         diagnoses(&rig).iter().map(|(n, _)| *n).collect::<Vec<_>>(),
         [3]
     );
-    // One that never comes back is told as lost after all.
+    // One that never comes back is reported as lost after all.
     rig.node(5).save_cycles = 200;
     let ticket = rig.submit(Command::SaveParameters { node: 5 });
     rig.run(40);
@@ -437,7 +437,7 @@ fn who_fills_the_line_is_named() {
             rig.master.on_bus_bytes(&answer, start + 5_000 + 350 * i);
         }
     }
-    // Answers that nobody waits for, twelve in a cycle.
+    // Unrequested answers, twelve in a cycle.
     assert_eq!(found(&rig, Finding::LineFull), [Some(8)]);
     assert!(rig.master.is_armed(), "and goes on");
 }

@@ -1,4 +1,4 @@
-//! What behaviours make of references comes and goes at its stated rate, whatever the robot does
+//! Changes that behaviours make to references come and go at their stated rate, whatever the robot does
 //! meanwhile.
 
 use crate::behaviours::{Robot, geometry, mm};
@@ -20,7 +20,7 @@ fn plans(robot: &mut Robot, legs: [LegPlan; 2]) {
     robot.setpoints.walk = Some(WalkPlan { legs, driven: true });
 }
 
-/// References of these joints for 100 mm each; a robot that does not walk any more included.
+/// References of these joints for 100 mm each, also for a robot that no longer walks.
 fn references(robot: &Robot, joints: [usize; 2]) -> [f64; 2] {
     let plan = robot.setpoints.walk;
     joints.map(|joint| {
@@ -33,7 +33,7 @@ fn references(robot: &Robot, joints: [usize; 2]) -> [f64; 2] {
     })
 }
 
-/// Runs cycles; no reference of these joints changes by more than this in one. Gives the last.
+/// Runs cycles; no reference of these joints changes by more than this in one. Returns the last ones.
 fn evenly(robot: &mut Robot, joints: [usize; 2], most_mm: f64, cycles: u32) -> [f64; 2] {
     let mut before = references(robot, joints);
     for cycle in 0..cycles {
@@ -48,7 +48,7 @@ fn evenly(robot: &mut Robot, joints: [usize; 2], most_mm: f64, cycles: u32) -> [
     before
 }
 
-/// Ways of the wheels in a cycle, mm, and of the feet that stand with this slip.
+/// Runs a cycle: travel of the wheels, mm, and of the standing feet with this slip.
 fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     let turn = (wheels_mm[1] - wheels_mm[0]) / 560.0;
     let forward = 0.5 * (wheels_mm[0] + wheels_mm[1]);
@@ -76,8 +76,8 @@ fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     }
 }
 
-/// A robot that has gone so for some cycles, both feet at first so far ahead of their yaw axes and
-/// left of them, mm.
+/// A robot that has moved like this for some cycles, with both feet at first this far ahead of their yaw axes
+/// and left of them, mm.
 fn gone(
     geometry: WalkGeometry,
     wheels_mm: [f64; 2],
@@ -128,7 +128,7 @@ fn legs_pull_the_way_that_their_wheels_go_each_for_itself() {
     };
     assert_eq!(lead([0.8, 0.8], [180.0, 0.0]), [70.0, 70.0]);
     assert_eq!(lead([-0.8, -0.8], [30.0, 0.0]), [130.0, 130.0]);
-    // Turning on the spot to the left, the left foot has to go ahead.
+    // When turning on the spot to the left, the left foot must go ahead.
     assert_eq!(lead([-0.25, 0.25], [150.0, 35.0]), [130.0, 70.0]);
 }
 
@@ -156,7 +156,7 @@ fn the_lead_of_a_pulling_leg_goes_by_half_a_millimetre_in_a_cycle() {
         before = now;
     }
     assert_eq!(before, [130.0; 2], "and pulls the other way");
-    // Its walk ends, and it stands in the last references.
+    // Its walk ends, and it holds the last references.
     let mut robot = pulls();
     robot.setpoints.walk = None;
     robot.setpoints.phase = Phase::Done;
@@ -166,7 +166,7 @@ fn the_lead_of_a_pulling_leg_goes_by_half_a_millimetre_in_a_cycle() {
     let mut robot = pulls();
     robot.behaving.enable(Behaviours::NONE);
     assert_eq!(evenly(&mut robot, B5, 0.5, 60), [100.0; 2]);
-    // A hold ends it at once: the references are where the legs are.
+    // A hold ends it at once: the references equal the legs' positions.
     let mut robot = pulls();
     robot.setpoints.walk = None;
     robot.setpoints.phase = Phase::Hold;
@@ -197,7 +197,7 @@ fn the_share_of_the_load_goes_by_0_15_mm_in_a_cycle() {
         assert!((late[0] - 99.0).abs() < 0.01, "{ends}: {late:?}");
         assert_eq!(evenly(&mut robot, B6, rate, 8), [100.0; 2], "{ends}");
     }
-    // A foot that lands stands anew.
+    // A foot that lands starts a new stance.
     let mut robot = shares();
     plans(&mut robot, [LegPlan::Lower(mm(80.0)), LegPlan::Stance]);
     robot.run(1);
@@ -207,7 +207,7 @@ fn the_share_of_the_load_goes_by_0_15_mm_in_a_cycle() {
 
 #[test]
 fn switching_behaviours_in_mid_walk_moves_no_reference_at_once() {
-    // A leg that has followed lost ground stands on what it has found.
+    // A leg that has followed lost ground stands on the ground that it has found.
     let mut robot = Robot::all(STAND);
     robot.touch([false, true]);
     robot.run(20);
@@ -225,7 +225,7 @@ fn switching_behaviours_in_mid_walk_moves_no_reference_at_once() {
     robot.behaving.enable(Behaviours::NONE);
     assert_eq!(evenly(&mut robot, B5, 3.0, 17)[0], 96.0);
     assert_eq!(evenly(&mut robot, B5, 4.0, 2)[0], 100.0);
-    // A foot that searches stays where it has come to.
+    // A searching foot stays where it is.
     let mut robot = Robot::all([LegPlan::Lower(mm(120.0)), LegPlan::Stance]);
     robot.touch([false, true]);
     for _ in 0..60 {
@@ -247,7 +247,7 @@ fn a_nailed_foot_that_is_stopped_above_the_ground_it_expects_lands_within_60_ms(
     robot.joint(B6[0]).stroke_mm = mm(70.0);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(200);
     robot.run(15);
-    // Nails go in: it touches, and goes on.
+    // Nails go in: it touches, and continues down.
     robot.touch([true; 2]);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(10);
     robot.run(30);
@@ -259,7 +259,7 @@ fn a_nailed_foot_that_is_stopped_above_the_ground_it_expects_lands_within_60_ms(
     robot.run(1);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(70.0)));
     assert!(robot.told.contains(&Act::EarlyGround(Side::Left)));
-    // A piston that is stopped by something else than the ground has not landed.
+    // A piston stopped by something other than the ground has not landed.
     let mut robot = Robot::all(lower);
     robot.behaving = Behaving::new(Behaviours::ALL, geometry(true));
     robot.touch([false, true]);

@@ -1,4 +1,4 @@
-//! What stops the robot, how fast, and what it takes to go on.
+//! Causes that stop the robot, how fast it stops, and how it can continue.
 
 use crate::common::{CYCLE_US, FakeNode, TestRig, emit};
 use proptest::prelude::*;
@@ -386,7 +386,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
             assert_eq!(asked, usize::from(boards.contains(&node.address.raw())));
         }
     }
-    // One that does not hear is asked again, and named once.
+    // One that does not hear it is asked again, and named once.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).mode = NodeMode::Armed;
@@ -400,7 +400,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
     assert_eq!(rig.node(4).mode, NodeMode::Idle);
     let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
     assert_eq!(told, [Some(4)]);
-    // Arming and disarming on request are no such thing, whoever is slow.
+    // A requested arming or disarming is no such thing, whichever board is slow.
     for slow in [6, 8] {
         let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
@@ -408,7 +408,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         let ticket = rig.submit(Command::Disarm);
         rig.run(60);
         assert!(rig.done(ticket) && !rig.saw(|event| left(event).is_some()));
-        // Nor is an arming that is given up.
+        // Nor is an aborted arming.
         let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         rig.node(2).never_arms = true;
@@ -444,7 +444,7 @@ fn a_valve_is_not_opened_long_after_it_was_asked_for() {
     assert_eq!(late, (false, Some(Refusal::Expired), 1));
 }
 
-/// With the robot held already, an E-stop still drops what waits.
+/// With the robot held already, an E-stop still drops waiting commands.
 #[test]
 fn an_e_stop_of_a_held_robot_drops_what_was_asked_before() {
     let mut rig = TestRig::new(MasterConfig::default());

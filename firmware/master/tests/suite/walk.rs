@@ -1,6 +1,6 @@
-//! A walk against an ideal robot: pistons that follow their references at a limited speed, wheels
-//! that follow theirs, and a nose that lies on the feet: what reaches as far down as the other leg,
-//! within what the air gives way, touches the ground.
+//! A walk against an ideal robot: pistons that follow their references at a limited speed, wheels that follow
+//! theirs, and a nose that rests on the feet: a leg that reaches as far down as the other one, within the
+//! give of the air, touches the ground.
 
 use crate::common::leg;
 use fixed::types::I16F16;
@@ -19,7 +19,7 @@ const PISTON_MM: f64 = 3.0;
 struct Robot {
     walk: Walk,
     behaving: Behaving,
-    /// What was told in the last cycle.
+    /// Acts reported in the last cycle.
     told: Vec<Act>,
     speeds: [f64; 6],
     strokes: [f64; 6],
@@ -30,7 +30,7 @@ struct Robot {
     segment: u16,
     now_us: u64,
     last: Setpoints,
-    /// How often it was told that it is stuck, beside what the behaviours find.
+    /// How often it was reported as stuck, not counting what the behaviours find.
     stuck: u8,
 }
 
@@ -174,7 +174,7 @@ fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
                 let wanted = out.joints[side.joint(Cylinder::Vertical)]
                     .unwrap()
                     .reference_mm;
-                // A rise is asked for in one step.
+                // A rise is commanded in one step.
                 if wanted.to_f64() < before[side.index()] - 12.5 {
                     rises[side.index()] += 1;
                     // The tenth cycle is this one.
@@ -217,7 +217,7 @@ fn standing_feet_stay_where_they_are_on_the_ground() {
                 robot.touches(side) && !matches!(plan, LegPlan::Lower(_))
             });
             robot.cycle();
-            // What the wheels have moved, as the robot turns about the middle of its axle.
+            // Travel from the wheels, as the robot turns about the middle of its axle.
             let [left, right] = [0, 1].map(|i| 1e-3 * (robot.wheels_mm[i] - before.0[i]));
             let (way, turned) = (0.5 * (left + right), (right - left) / 0.56);
             for side in [Side::Left, Side::Right] {
@@ -297,7 +297,7 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
     // The standing foot is still inside its reach.
     let [x, _] = robot.foot_m(Side::Right);
     assert!(x > 0.012, "{x}");
-    // It goes on when there is ground again.
+    // It continues when there is ground again.
     robot.ground[0] = 0.0;
     robot.run(3.0);
     assert!(robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64() > 50.0);
@@ -307,7 +307,7 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
 fn a_hole_is_reached_with_the_nose_down() {
     let mut robot = Robot::new(order(100, "0"));
     robot.run(8.0);
-    // Beyond the 20 mm that are left below the foot, within what the nose can give.
+    // Beyond the 20 mm left below the foot, within the give of the nose.
     robot.ground[0] = 40.0;
     let before = robot.wheels_mm[0];
     robot.run(10.0);
@@ -373,7 +373,7 @@ fn what_is_out_of_range_is_refused() {
         let walk = walk.as_mut().expect("in range").as_mut().expect("heard");
         assert!(walk.change(order).is_err());
     }
-    // A board that was not heard: it is not known where the leg stands.
+    // A board was not heard: the position of its leg is unknown.
     let mut deaf = feedback;
     deaf.strokes_mm[4] = None;
     let walk = Walk::new(WalkGeometry::default(), WalkOrder::default(), &deaf, 1);
@@ -404,7 +404,7 @@ fn a_robot_that_is_stuck_backs_off_the_way_that_it_came() {
         robot.stuck = 1;
         robot.cycle();
         assert!(robot.told.contains(&Act::BackOff), "{speed} {turn}");
-        // It has to slow down first.
+        // It must slow down first.
         robot.run(0.35);
         let before = robot.wheels_mm;
         robot.run(0.25);

@@ -63,8 +63,7 @@ fn three_steps_cover_three_strokes() {
             assert_eq!(b6.on_link_loss, LinkLossAction::HoldThenExhaust);
         }
         if phase == Phase::Push {
-            // Leg–wheel co-operation: b5 gives way by what the wheels measured
-            // in the last cycle.
+            // Leg–wheel co-operation: b5 gives way by the wheels' measured travel of the last cycle.
             let b5 = sync.slots.joint(Address::joint(2).unwrap()).unwrap();
             let pushed = (counts - start_counts) as f64 * 942.478 / 104_000.0;
             let found = b5.reference.to_f64();
@@ -158,7 +157,7 @@ fn commands_out_of_place_are_refused_with_the_reason() {
         refused(&mut rig, Command::SetGait(bad)),
         Some(Refusal::Parameter(_))
     ));
-    // Another start pose has to be taken up first.
+    // Another start pose must be taken up first.
     let ticket = rig.submit(Command::Stand);
     rig.run(400);
     assert!(rig.done(ticket));
@@ -275,7 +274,7 @@ fn a_wheel_that_stays_behind_does_not_shift_the_next_move() {
     rig.submit(Command::WheelReference { travel_mm });
     let sync = rig.cycle();
     let slot = sync.slots.wheel(Address::wheel(7).unwrap()).unwrap();
-    // Two moves of 55 174 counts from the start, not from where it was pushed.
+    // Two moves of 55 174 counts from the start, not from where it was pushed to.
     let origin = wheeleg_units::WheelCount::wrapping_new(start as i32);
     assert_eq!(slot.reference.wrapping_difference(origin), 2 * 11_035);
 }

@@ -1,4 +1,4 @@
-//! Why a unit cannot be made, or cannot go on.
+//! Errors that keep a unit from being made, or from going on.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,10 @@ use wheeleg_studies::axis_sim::suite::AxisSimError;
 
 use crate::value::{Value, ValueType};
 
-/// Why a unit cannot be made, or cannot go on.
+/// An error of a unit.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum FmuError {
-    /// The axis file is wrong, as it is or with the parameters that were set.
+    /// The axis file is wrong, unchanged or with the set parameters.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Config(#[from] ConfigError),
@@ -23,7 +23,7 @@ pub enum FmuError {
         help("look at the inputs before that time: load, on-times, moving mass")
     )]
     Plant(#[from] PlantError),
-    /// The same of the plant with its board.
+    /// The same for the plant with its board.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Axis(#[from] AxisSimError),
@@ -38,7 +38,7 @@ pub enum FmuError {
     Resources {
         /// File.
         path: PathBuf,
-        /// What the system or the reader said.
+        /// Reason of the system or the reader.
         reason: String,
     },
     /// Another description than the library's.
@@ -48,7 +48,7 @@ pub enum FmuError {
         help("the description was changed or belongs to another unit: export it again")
     )]
     Token {
-        /// What the importer gave.
+        /// Input of the importer.
         given: String,
         /// The unit's own.
         expected: String,
@@ -69,7 +69,7 @@ pub enum FmuError {
     Reference {
         /// The reference.
         reference: u32,
-        /// Type that was asked for.
+        /// Requested type.
         expected: ValueType,
     },
     /// As many values as references were wanted.
@@ -90,7 +90,7 @@ pub enum FmuError {
     Range {
         /// Variable.
         name: String,
-        /// Value that was given.
+        /// Given value.
         value: Value,
         /// Smallest allowed.
         min: f64,
@@ -118,7 +118,7 @@ pub enum FmuError {
         help("instantiate, enter and exit the initialization mode, step, terminate")
     )]
     Order {
-        /// What was called.
+        /// The call.
         call: &'static str,
         /// State of the unit.
         when: &'static str,
@@ -168,7 +168,7 @@ pub enum FmuError {
     Archive {
         /// File.
         path: PathBuf,
-        /// What the system said.
+        /// The system's reason.
         reason: String,
     },
     /// The shared library is not there, or is another file.
@@ -178,7 +178,7 @@ pub enum FmuError {
         help("build it, `cargo build --release -p wheeleg-fmu`, or name it with --library")
     )]
     Library {
-        /// Where it was looked for.
+        /// Searched path.
         path: PathBuf,
         /// Why not.
         reason: String,

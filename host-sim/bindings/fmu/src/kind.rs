@@ -1,8 +1,8 @@
-//! What a unit holds.
+//! Contents of a unit.
 
 use serde::{Deserialize, Serialize};
 
-/// What a unit holds.
+/// Contents of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {

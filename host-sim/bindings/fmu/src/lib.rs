@@ -1,9 +1,9 @@
 //! A cylinder as a Functional Mock-up Unit, for Simulink, Dymola, OpenModelica, FMPy and the
 //! other tools that read one: FMI 2.0 and 3.0, co-simulation.
 //!
-//! Nothing is modelled here. A unit holds the plant of an axis file, or the plant with a joint
-//! board's firmware; this crate gives them FMI's names, its C interface and its archive. One
-//! shared library serves every unit: what it is, it reads from the unit's resources.
+//! Nothing is modelled here. A unit holds the plant of an axis file, or the plant with a joint board's
+//! firmware; this crate adds FMI's names, its C interface and its archive. One shared library serves every
+//! unit: it reads its contents from the unit's resources.
 //!
 //! # Glossary
 //!
@@ -11,9 +11,9 @@
 //! * **importer**: the tool that runs a unit
 //! * **kind**: plant (the importer gives the valves' on-times) or controlled (the importer gives
 //!   references, the firmware the on-times)
-//! * **model**: what a unit is made of: kind, law, axis file, and the variables that follow
-//! * **variable**: what an importer sets or reads, by its value reference
-//! * **model description**: the XML file that tells an importer the variables
+//! * **model**: contents of a unit: kind, law, axis file, and the variables that follow
+//! * **variable**: a value that an importer sets or reads, by its value reference
+//! * **model description**: the XML file that lists the variables for an importer
 //! * **token**: names the model; an importer hands it back so that library and description match
 //! * **tick**: 1 ms, the joint boards' control period; the unit's steps are multiples of it
 

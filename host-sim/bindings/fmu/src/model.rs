@@ -1,4 +1,4 @@
-//! What a unit is made of.
+//! The model of a unit.
 
 use std::path::{Path, PathBuf};
 
@@ -15,23 +15,23 @@ use crate::variable::{self, Variable};
 pub const IDENTIFIER: &str = "wheeleg";
 /// Name of the axis file in a unit's resources.
 pub const AXIS_FILE: &str = "axis.toml";
-/// Name of the file beside it that says the rest.
+/// Name of the file beside it with the other data.
 pub const UNIT_FILE: &str = "unit.json";
 
-/// What the resources say beside the axis file.
+/// Data in the resources besides the axis file.
 #[derive(Debug, Serialize, Deserialize)]
 struct About {
     kind: Kind,
-    /// Name of the control law; of a plant none.
+    /// Name of the control law; none for a plant.
     law: Option<String>,
     /// Program that exported it.
     version: String,
 }
 
-/// What a unit is made of, with the variables that follow from it.
+/// The model of a unit, with the variables that follow from it.
 #[derive(Debug)]
 pub struct Model {
-    /// What the unit holds.
+    /// Contents of the unit.
     pub kind: Kind,
     /// Control law of a controlled unit.
     pub law: axis_sim::Kind,
@@ -48,7 +48,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// A model of an axis file. A board that cannot be designed for it is found here.
+    /// A model of an axis file. Reports an axis for which no board can be designed.
     ///
     /// # Errors
     /// [`FmuError`] if the file is wrong or its plant or board cannot be built.
@@ -74,7 +74,7 @@ impl Model {
         Ok(model)
     }
 
-    /// What [`UNIT_FILE`] says.
+    /// Contents of [`UNIT_FILE`].
     pub(crate) fn about(&self) -> String {
         let controlled = self.kind == Kind::Controlled;
         let about = About {

@@ -1,4 +1,4 @@
-//! What runs in a unit: the plant, or the plant with its board.
+//! The simulation in a unit: the plant, or the plant with its board.
 
 use wheeleg_plant::assembly::CylinderOutputs;
 use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
@@ -7,7 +7,7 @@ use wheeleg_studies::axis_sim::{Action, AxisSim, Kind as Law, Node, design};
 use crate::error::FmuError;
 use crate::kind::Kind;
 
-/// What is seen after a tick.
+/// Observable values after a tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Seen {
     /// Of the cylinder.
@@ -16,16 +16,16 @@ pub struct Seen {
     pub supply_pa: f64,
     /// Air taken since the start \[kg\].
     pub air_kg: f64,
-    /// Reading of the converter; 0 where a board takes it.
+    /// Reading of the converter; 0 if a board takes it.
     pub code: u16,
     /// Of the board.
     pub board: Action,
 }
 
-/// A running plant, with its board if there is one. A clone goes on on its own.
+/// A running plant, with its board if there is one. A clone continues on its own.
 #[derive(Clone)]
 pub(crate) enum Simulation {
-    /// The plant alone.
+    /// Only the plant.
     Plant {
         /// The plant.
         axis: Box<Axis>,
@@ -38,7 +38,7 @@ pub(crate) enum Simulation {
     Controlled {
         /// The bench of the studies.
         bench: Box<AxisSim<Node>>,
-        /// What the board did last.
+        /// The board's last action.
         action: Action,
     },
 }
@@ -89,7 +89,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What can be seen now.
+    /// The current observable values.
     pub(crate) fn seen(&self) -> Seen {
         let (axis, state) = match self {
             Self::Plant { axis, state, .. } => (&**axis, &**state),

@@ -16,13 +16,13 @@ use crate::variable::{Role, Variable};
 const TICK_S: f64 = 1e-3;
 /// Longest step, ticks: an hour.
 const MAX_TICKS: f64 = 3.6e6;
-/// What an importer's sum of steps may be off the unit's time \[s\]: the unit counts ticks, and takes
-/// nothing from it. A million sums of 1 ms are off by 2e-8 s, those of a day by more than 1e-6 s.
+/// Allowed error of an importer's sum of steps against the unit's time \[s\]: the unit counts ticks, and
+/// ignores the sum. A million sums of 1 ms are off by 2e-8 s, those of a day by more than 1e-6 s.
 const TIME_TOLERANCE_S: f64 = 0.25 * TICK_S;
-/// What a step may be off a whole number of ticks, in ticks.
+/// Allowed deviation of a step from a whole number of ticks, in ticks.
 const STEP_TOLERANCE: f64 = 1e-3;
 
-/// Where an instance stands in its life.
+/// State of an instance in its life cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Phase {
     Instantiated,
@@ -43,7 +43,7 @@ impl Phase {
     }
 }
 
-/// What is written of a unit's state; the model stays with the unit.
+/// The serialized part of a unit's state; the model stays with the unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Clock {
     phase: Phase,
@@ -125,7 +125,7 @@ impl Unit {
         }
     }
 
-    /// The time at the start; FMI 2 says it before the initialization.
+    /// Sets the start time; FMI 2 gives it before the initialization.
     pub(crate) fn set_start(&mut self, start_s: f64) -> Result<(), FmuError> {
         self.expect(Phase::Instantiated, "a start time")?;
         if !start_s.is_finite() {
@@ -153,7 +153,7 @@ impl Unit {
         Ok(())
     }
 
-    /// The plant, and the board, with the parameters as they are now.
+    /// The plant, and the board, with the current parameters.
     fn built(&self) -> Result<Simulation, FmuError> {
         let model = &self.model;
         let changes = self.changes();
@@ -173,7 +173,7 @@ impl Unit {
         seed.map_or(0, |(_, value)| value.number() as u64)
     }
 
-    /// Parameters that differ from the axis file, whole lists of those that have several values.
+    /// Parameters that differ from the axis file; for lists, the whole list.
     fn changes(&self) -> Vec<Change> {
         let mut changes = Vec::new();
         for (index, info) in self.model.config.parameters.iter().enumerate() {
@@ -238,7 +238,7 @@ impl Unit {
             }
             checked.push((index, *value));
         }
-        // All of them, or none.
+        // Set all of them, or none.
         for (index, value) in checked {
             self.state.clock.values[index] = value;
         }
@@ -312,7 +312,7 @@ impl Unit {
         Ok(())
     }
 
-    /// Everything that decides how it goes on.
+    /// The complete state that determines how it continues.
     pub(crate) fn state(&self) -> State {
         self.state.clone()
     }
@@ -339,7 +339,7 @@ impl Unit {
         serde_json::to_vec(&written).map_err(|e| FmuError::State(e.to_string()))
     }
 
-    /// The state that bytes say.
+    /// The state in these bytes.
     pub(crate) fn deserialize(&self, bytes: &[u8]) -> Result<State, FmuError> {
         if self.model.kind == Kind::Controlled {
             return Err(FmuError::Absent("a controlled unit's state as bytes"));

@@ -1,4 +1,4 @@
-//! What an importer sets and reads: one table for the description and for the calls.
+//! Variables that an importer sets and reads: one table for the description and for the calls.
 
 use wheeleg_config::{AxisConfig, Dimension, ParameterInfo};
 use wheeleg_plant::axis::{LOADS_N, TICK_US};
@@ -8,7 +8,7 @@ use crate::kind::Kind;
 use crate::simulation::Seen;
 use crate::value::Value;
 
-/// What a variable is to an importer.
+/// Role of a variable for an importer.
 #[derive(Debug, Clone, Copy)]
 pub enum Role {
     /// Time, which an importer knows itself.
@@ -39,7 +39,7 @@ pub struct Variable {
     pub dimension: Dimension,
     /// Meaning.
     pub description: String,
-    /// What it is to an importer.
+    /// Its role for an importer.
     pub role: Role,
     /// Value at the start; of an output only its type counts.
     pub start: Value,
@@ -310,7 +310,7 @@ pub(crate) fn list(kind: Kind, axis: &AxisConfig) -> Vec<Variable> {
         }),
     );
     for (index, info) in axis.parameters.iter().enumerate() {
-        // The load is an input; two of one thing would have an order.
+        // The load is an input; two variables for one thing would conflict.
         if info.path != "moving.load" {
             list.extend((0..info.value.len()).map(|component| parameter(index, component, info)));
         }
@@ -321,7 +321,7 @@ pub(crate) fn list(kind: Kind, axis: &AxisConfig) -> Vec<Variable> {
 fn parameter(index: usize, component: usize, info: &ParameterInfo) -> Variable {
     let number = info.value[component];
     let dimension = info.dimension.unwrap_or(Dimension::Number);
-    // What the reader of the file holds for whole is far inside of 32 bits.
+    // A number that the file's reader accepts as whole is well within 32 bits.
     let start = match dimension {
         Dimension::Flag => Value::Boolean(number != 0.0),
         _ if info.whole => Value::Integer(number as i32),

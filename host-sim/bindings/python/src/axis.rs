@@ -19,7 +19,7 @@ pub(crate) struct Axis {
     pub(crate) config: AxisConfig,
 }
 
-/// What a parameter is given from Python.
+/// Value of a parameter from Python.
 #[derive(FromPyObject)]
 pub(crate) enum Given {
     /// `true`, of a flag.

@@ -23,7 +23,7 @@ use crate::input::{self, Series};
 /// Parameters of a board by name, in the unit of the protocol's table.
 pub(crate) type Parameters = HashMap<String, f64>;
 
-/// A board for an axis and what was commissioned, by name.
+/// A board for an axis and its commissioned values, by name.
 pub(crate) fn built(
     sheet: &AxisParams,
     law: &str,
@@ -59,7 +59,7 @@ fn parameter(name: &str, given: f64) -> PyResult<(JointParam, i32)> {
     };
     let row = found.info();
     let raw = raw_of(row, given);
-    // The number as it stands, too: a raw one saturates.
+    // Also check the number itself: a raw one saturates.
     let [min, max] = [row.min, row.max].map(|raw| value(row, raw));
     if row.permits(raw) && given >= min && given <= max {
         Ok((*found, raw))
@@ -74,7 +74,7 @@ fn parameter(name: &str, given: f64) -> PyResult<(JointParam, i32)> {
     }
 }
 
-/// What was commissioned, as numbers by name.
+/// The commissioned values, as numbers by name.
 pub(crate) fn listed<'py>(
     py: Python<'py>,
     commissioned: &[(JointParam, i32)],
@@ -87,7 +87,7 @@ pub(crate) fn listed<'py>(
     Ok(dict)
 }
 
-/// What a board says after a tick.
+/// State of a board after a tick.
 pub(crate) fn report<'py>(
     py: Python<'py>,
     node: &Node,

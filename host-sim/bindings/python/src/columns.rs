@@ -1,5 +1,4 @@
-//! Rows of the simulation as columns with names: a dictionary of numbers of one row, one of
-//! arrays of many.
+//! Rows of the simulation as named columns: one row as a dictionary of numbers, many as one of arrays.
 
 use numpy::IntoPyArray as _;
 use pyo3::prelude::*;

@@ -11,7 +11,7 @@ use crate::columns::{self, Columns};
 use crate::error;
 use crate::input::{self, Series, Series4};
 
-/// What is seen after a tick.
+/// Observable values after a tick.
 struct Row {
     time_s: f64,
     outputs: CylinderOutputs,

@@ -32,7 +32,7 @@ pub(crate) fn value(message: impl Into<String>) -> PyErr {
     ConfigError::new_err(message.into())
 }
 
-/// What ends a simulation.
+/// An error that ends a simulation.
 pub(crate) fn simulation(error: &dyn Diagnostic) -> PyErr {
     SimulationError::new_err(plain_text(error))
 }
@@ -45,7 +45,7 @@ pub(crate) fn plant(error: &PlantError) -> PyErr {
     }
 }
 
-/// Of an axis with its board: of the plant's parameters as [`plant`]; else it ended.
+/// An error of an axis with its board: as [`plant`] for the plant's parameters; otherwise it ended.
 pub(crate) fn bench(error: &AxisSimError) -> PyErr {
     match error {
         AxisSimError::Plant(error) => plant(error),

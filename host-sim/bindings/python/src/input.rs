@@ -1,4 +1,4 @@
-//! What comes from Python, checked: a wrong value is told with its place and its range.
+//! Checks values from Python: a wrong one is reported with its place and its range.
 
 use std::fmt::Display;
 
@@ -20,7 +20,7 @@ pub(crate) type Series<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 /// Four numbers a tick.
 pub(crate) type Series4<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
-/// A number within a range; `what` says which.
+/// A number within a range; `what` names it.
 pub(crate) fn within(what: &dyn Display, value: f64, [min, max]: [f64; 2]) -> PyResult<f64> {
     if value >= min && value <= max {
         Ok(value)
@@ -80,7 +80,7 @@ pub(crate) fn on_times(what: &str, values: &[f64]) -> PyResult<[u16; 4]> {
     Ok(on_us)
 }
 
-/// A series within a range, all of it.
+/// A series entirely within a range.
 pub(crate) fn series(what: &str, values: &Series<'_>, range: [f64; 2]) -> PyResult<Vec<f64>> {
     let values = values.as_array();
     let checked = values.iter().enumerate();

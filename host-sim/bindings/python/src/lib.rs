@@ -1,16 +1,16 @@
 //! The Python package `wheeleg`: the simulator's plant and the boards' firmware, from the same
 //! source, with numpy arrays in and out.
 //!
-//! Nothing is modelled here. A class holds what a crate below has, checks what comes in, and
-//! turns rows into arrays. The interpreter lock is released while anything is simulated.
+//! Nothing is modelled here. A class wraps a type of a crate below, checks its inputs, and turns rows into
+//! arrays. The interpreter lock is released during a simulation.
 //!
 //! # Glossary
 //!
 //! * **axis**: the file of one cylinder with its valves, mass and sensor
-//! * **cylinder**: the plant of an axis; one gives the valves' on-times
-//! * **board**: the application of a joint board; one gives readings and references
-//! * **axis simulation**: both in closed loop; one gives references
-//! * **robot**: the whole robot in a scenario; one gives commands of the master
+//! * **cylinder**: the plant of an axis; its inputs are the valves' on-times
+//! * **board**: the application of a joint board; its inputs are readings and references
+//! * **axis simulation**: both in closed loop; its inputs are references
+//! * **robot**: the whole robot in a scenario; its inputs are commands of the master
 //! * **state**: everything that decides how it goes on, taken and put back bit for bit
 
 mod axis;

@@ -1,9 +1,9 @@
-//! The catalogue of faults that a run can be given.
+//! The catalogue of faults for a run.
 
 use crate::pretty;
 use crate::timing::{JOINT_TICK_NS, SERVICE_NS, WATCHDOG_NS};
 
-/// Where a fault acts, and so what its target is called.
+/// Where a fault acts, which decides the form of its target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Master, line, supply, clock or host: there is only one, no target is named.
@@ -29,9 +29,9 @@ pub struct ValueSpec {
     pub min: f64,
     /// Largest.
     pub max: f64,
-    /// Nearer to 0 than this it does nothing; 0 where all of the range does something.
+    /// Values closer to 0 than this have no effect; 0 if the whole range has an effect.
     pub gap: f64,
-    /// Where none is given.
+    /// Default value.
     pub default: f64,
     /// Meaning.
     pub doc: &'static str,
@@ -105,7 +105,7 @@ const fn value(
     })
 }
 
-/// A number of either sign, that does something from `gap` on.
+/// A number of either sign, with an effect from `gap` on.
 const fn signed(
     unit: &'static str,
     max: f64,
@@ -215,7 +215,7 @@ kinds! {
 }
 
 impl FaultKind {
-    /// Whether it is over by itself, at once or after its value: no end can be given.
+    /// Whether it ends by itself, at once or after its value: no end can be given.
     #[must_use]
     pub const fn ends_by_itself(self) -> bool {
         matches!(
@@ -230,7 +230,7 @@ impl FaultKind {
         )
     }
 
-    /// How long it lasts with this value where no end is given, s; infinite: for good.
+    /// How long it lasts with this value without a given end, s; infinite: for good.
     #[must_use]
     pub fn lasts_s(self, value: f64) -> f64 {
         let seconds = |ns: u64| ns as f64 * 1e-9;
@@ -250,7 +250,7 @@ impl FaultKind {
         &KINDS[self as usize]
     }
 
-    /// Whether it is so from power-up on, and does not begin.
+    /// Whether it is present from power-up on, and does not begin.
     #[must_use]
     pub fn is_built_in(self) -> bool {
         self == Self::OtherInterface

@@ -1,4 +1,4 @@
-//! Faults as a run is given them: the catalogue, and one fault with target, value and time.
+//! Faults of a run: the catalogue, and one fault with target, value and time.
 
 mod kind;
 mod spec;

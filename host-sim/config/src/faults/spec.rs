@@ -10,7 +10,7 @@ use wheeleg_protocol::Node;
 
 use super::kind::{FaultKind, KINDS, NOT_IMPLEMENTED, Place, ValueSpec};
 
-/// What a fault affects.
+/// The target of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultTarget {
     /// The only one there is.
@@ -30,7 +30,7 @@ pub struct FaultSpec {
     pub kind: FaultKind,
     /// Where.
     pub target: FaultTarget,
-    /// Its number; the default where none was given, 0 where it takes none.
+    /// Its number; the default if none was given, 0 if it takes none.
     pub value: f64,
     /// When it begins, s of scenario time.
     pub from_s: f64,
@@ -66,7 +66,7 @@ impl FaultSpec {
     }
 }
 
-/// Why a text is no fault.
+/// Why a text is not a fault.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SpecError {
     /// No such fault.
@@ -76,7 +76,7 @@ pub enum SpecError {
         text: String,
         /// The name in it.
         name: String,
-        /// A name that is spelt almost so.
+        /// A name with a similar spelling.
         nearest: Option<&'static str>,
     },
     /// The fault is one of the matrix that cannot be injected.
@@ -101,7 +101,7 @@ pub enum SpecError {
         /// What was found.
         found: Option<String>,
     },
-    /// The value is no number, out of range, or not wanted.
+    /// The value is not a number, out of range, or not wanted.
     #[error("`{text}`: {reason}")]
     Value {
         /// The whole text.
@@ -120,7 +120,7 @@ pub enum SpecError {
 }
 
 impl SpecError {
-    /// The same of another text, which the user wrote.
+    /// The same error about another text, which the user wrote.
     fn about(mut self, written: &str) -> Self {
         match &mut self {
             Self::Name { text, .. }
@@ -149,7 +149,7 @@ const VALVES: [&str; 4] = ["fill-a", "vent-a", "fill-b", "vent-b"];
 const LEGS: [&str; 2] = ["left", "right"];
 
 impl Place {
-    /// What a target of this kind looks like.
+    /// Form of a target of this kind.
     #[must_use]
     pub fn expected(self) -> &'static str {
         match self {
@@ -166,7 +166,7 @@ impl Place {
         }
     }
 
-    /// Every target of this kind, as a text names it; none where none is named.
+    /// Every target of this kind, as a text names it; empty if none is named.
     #[must_use]
     pub fn targets(self) -> Vec<String> {
         let targets: Vec<FaultTarget> = match self {
@@ -230,7 +230,7 @@ impl FromStr for FaultSpec {
 
     fn from_str(text: &str) -> Result<Self, SpecError> {
         let owned = || text.to_owned();
-        // What else is wrong is told before a missing time, or with it.
+        // Other errors are reported before a missing time, or with it.
         let (what, time) = match text.split_once('@') {
             Some((what, time)) => (what, Some(time)),
             None => (text, None),
@@ -307,7 +307,7 @@ fn no_such(text: &str, name: &str) -> SpecError {
 }
 
 impl ValueSpec {
-    /// The number that `text` is, or what is wrong with it.
+    /// The number in `text`, or the error in it.
     fn parse(&self, text: &str) -> Result<f64, String> {
         let wrong = match text.parse::<f64>() {
             Ok(x) if self.allows(x) => return Ok(x),
@@ -412,7 +412,7 @@ mod tests {
             [Place::Board, Place::Wheel, Place::Valve].map(|p| p.targets().len()),
             [8, 2, 24]
         );
-        // Who gave no time reads of none.
+        // An error for a text without a time does not mention one.
         let told = FaultSpec::at_once("pot-open")
             .expect_err("no target")
             .to_string();
@@ -448,7 +448,7 @@ mod tests {
             ("bit-errors=few@1s", "`few` is not a number: allowed 1e-9"),
             ("bit-errors=@1s", "`` is not a number"),
             ("bit-errors=inf@1s", "`inf` is out of range"),
-            // What can do nothing is no fault.
+            // A value without any effect is refused.
             ("bit-errors=0@1s", "`0` is out of range"),
             ("bytes-lost=0@1s", "`0` is out of range"),
             ("bytes-inserted=0@1s", "`0` is out of range"),
@@ -459,7 +459,7 @@ mod tests {
             ("valve-slow:joint1.fill-a=1@1s", "allowed 1.1 to 8"),
             ("valve-leak:joint1=1@1s", "allowed 1.1 to 10000"),
             ("supply-sag=10@1s", "allowed 0.5 to 9.9 bar"),
-            // All that is wrong is told at once.
+            // All errors are reported at once.
             ("bit-errors=0", "`0` is out of range: allowed 1e-9 to 0.1"),
             (
                 "bit-errors=0",

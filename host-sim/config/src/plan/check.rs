@@ -1,5 +1,5 @@
-//! Every value that a factor can have, against the ranges of the files: all that is wrong is
-//! told at once, before the first case.
+//! Checks every value that a factor can have against the ranges of the files, and reports all errors at once,
+//! before the first case.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -16,13 +16,13 @@ use crate::quantity::{pretty, suffix};
 use crate::reader::Reader;
 use crate::suggest::closest;
 
-/// What a path into a scenario begins with.
+/// Prefix of a path into a scenario.
 const SCENARIO: &str = "scenario.";
-/// What one into a robot begins with.
+/// Prefix of a path into a robot.
 const ROBOT: &str = "robot.";
 
-/// Reports every factor that does not fit the files, and every end of a factor at which the files
-/// contradict themselves.
+/// Reports every factor that does not fit the files, and every end of a factor at which the files become
+/// contradictory.
 pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
     let resolver = Resolver::new(plan)?;
     let mut earlier = BTreeMap::new();
@@ -44,7 +44,7 @@ pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Where the values of a factor stand in the plan.
+/// Position of a factor's values in the plan.
 fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
     let entry = r.table(&format!("factor.{}", factor.name))?;
     let keys = distribution::NAMES.iter().chain(&["grid"]);
@@ -53,7 +53,7 @@ fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
     span.or(Some(entry.span))
 }
 
-/// Where a factor names what it sets, one of a list if it is one.
+/// Position of the path that a factor sets, one of a list if it has several.
 fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>> {
     let entry = r.table(&format!("factor.{}", factor.name))?;
     let Some((key, item)) = entry.get("parameter") else {
@@ -65,7 +65,7 @@ fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>>
     one.or_else(|| item.span()).or(Some(key))
 }
 
-/// What a factor sets, by its path in a plan.
+/// The paths that a factor sets, as in a plan.
 fn set_by(factor: &Factor) -> Vec<String> {
     match &factor.sets {
         Sets::Scenario => vec!["scenario".to_owned()],
@@ -79,7 +79,7 @@ fn set_by(factor: &Factor) -> Vec<String> {
     }
 }
 
-/// Who has set the value of a path before: itself, the list that it is an element of, or one of its elements.
+/// The factor that already set a path, the list that it is an element of, or one of its elements.
 fn set_before<'a>(earlier: &BTreeMap<String, &'a str>, path: &str) -> Option<&'a str> {
     let list = path
         .strip_suffix(']')
@@ -91,8 +91,8 @@ fn set_before<'a>(earlier: &BTreeMap<String, &'a str>, path: &str) -> Option<&'a
     same.or_else(|| Some(one()?.1)).copied()
 }
 
-/// One field that is set twice, by two factors or by one: the later would win, unseen. `earlier` knows who
-/// sets what so far.
+/// Reports a field that is set twice, by two factors or by one: the later one would silently win. `earlier`
+/// holds the fields set so far.
 fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, &'a str>) {
     let mut found = None;
     for path in set_by(factor) {
@@ -109,8 +109,8 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
     r.problem(span, message, "set twice", None);
 }
 
-/// One field that a factor sets, in all files that have it; what is wrong in one is not told of
-/// the others as well.
+/// One field that a factor sets, in all files that have it; an error in one file is not repeated for the
+/// others.
 fn field_in_all<'a>(
     r: &mut Reader,
     factor: &Factor,
@@ -123,7 +123,7 @@ fn field_in_all<'a>(
     }
 }
 
-/// Fields of a scenario that a case does not take from its file, and what is to be done instead.
+/// Fields of a scenario that a case does not take from its file, and what to do instead.
 const WITHOUT_EFFECT: [(&str, &str); 4] = [
     (
         "scenario.seed",
@@ -200,7 +200,7 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
     range(r, factor, (info, component), &full, span);
 }
 
-/// A path that is like one that a file has not got, and that this factor could set.
+/// A path similar to an unknown one, which this factor could set.
 fn nearest(base: &Base, prefix: &str, path: &str, factor: &Factor) -> String {
     let paths = base.listing.iter().map(|p| p.path.as_str());
     let near = closest(path, paths).and_then(|word| base.listed(word));
@@ -261,7 +261,7 @@ fn range(
     } else {
         factor.unit.clone()
     };
-    // Of the file's unit in one of the factor's.
+    // Units of the file in one of the factor.
     let to_file = factor_between(info, &unit);
     let (min, max) = (info.min / to_file, info.max / to_file);
     let allowed = |v: f64| {
@@ -320,7 +320,7 @@ fn range(
         r.problem(span, message, "not whole", None);
         return;
     }
-    // The file's own reader sees what became of it: of 0.5 for a flag, `true`.
+    // The file's own reader sees the converted value: `true` for a flag of 0.5.
     if let Some(fraction) = fraction.filter(|_| info.whole) {
         let message = format!(
             "`factor.{}`: {} is no whole number: {name} must be one from {range}",
@@ -332,7 +332,7 @@ fn range(
     }
 }
 
-/// The numbers between which all values of a factor lie.
+/// The smallest and the largest value of a factor.
 fn extremes(factor: &Factor) -> Vec<f64> {
     let number = |v: &Value| match v {
         Value::Number(n) => Some(*n),
@@ -348,11 +348,11 @@ fn extremes(factor: &Factor) -> Vec<f64> {
     }
 }
 
-/// Numbers of a list that are tried before the first case.
+/// Numbers of a list tried before the first case.
 const PROBES: usize = 20;
 
-/// Of a list those that are tried: all names, and of more than [`PROBES`] numbers the smallest, the
-/// largest and some between.
+/// The values of a list to try: all names, and of more than [`PROBES`] numbers the smallest, the largest and
+/// some between.
 fn tried(mut list: Vec<Value>) -> Vec<Value> {
     let number = |value: &Value| match value {
         Value::Number(n) => Some(*n),
@@ -367,8 +367,7 @@ fn tried(mut list: Vec<Value>) -> Vec<Value> {
     places.map(|place| list[place].clone()).collect()
 }
 
-/// The values of a factor at which something is most likely to be wrong: of a list those that are
-/// [tried], of a distribution its ends.
+/// The values of a factor most likely to be wrong: of a list those [tried], of a distribution its ends.
 fn probes(factor: &Factor) -> Vec<Value> {
     match &factor.values {
         Values::Grid(list) => tried(list.clone()),
@@ -382,7 +381,7 @@ fn probes(factor: &Factor) -> Vec<Value> {
     }
 }
 
-/// Runs the files' own readers at the ends of each factor, the others at a value in their middle.
+/// Runs the files' own readers at the ends of each factor, with the others at a middle value.
 fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
     let middle: Vec<Value> = plan
         .factors
@@ -393,7 +392,7 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
         })
         .collect();
     if let Err(error) = resolver.resolve(&middle) {
-        // Of a factor that is wrong by itself its place is known.
+        // If a factor is wrong by itself, its place is known.
         let mut named = false;
         for (factor, value) in plan.factors.iter().zip(&middle) {
             if let Err(error) = resolver.resolve_only(&[(factor, value)]) {
@@ -441,7 +440,7 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
     }
 }
 
-/// What the reader of a file says of a value.
+/// Reports what the reader of a file finds wrong with a value.
 fn report(r: &mut Reader, span: Option<Range<usize>>, what: &str, error: &ConfigError) {
     for problem in error.problems() {
         let help = problem.help_text().map(str::to_owned);
@@ -454,7 +453,7 @@ fn report(r: &mut Reader, span: Option<Range<usize>>, what: &str, error: &Config
     }
 }
 
-/// A distribution of a fault's number without an end.
+/// Reports a distribution of a fault's number without an end.
 fn infinite_fault(r: &mut Reader, factor: &Factor) {
     let span = span_of(r, factor);
     let message = format!(

@@ -1,7 +1,7 @@
-//! Distributions of a factor's value, and where they end.
+//! Distributions of a factor's value, and their ends.
 //!
-//! Densities are those of the text books; a normal and a log-normal one may be cut by `min` and
-//! `max`, and what is left then has probability 1.
+//! Densities are those of the text books; a normal and a log-normal one may be truncated by `min` and `max`,
+//! and the rest then has probability 1.
 
 use super::value::{Value, list};
 use crate::quantity::{brief, pretty};
@@ -35,24 +35,24 @@ pub enum Distribution {
     },
     /// Gaussian.
     Normal {
-        /// Mean of the uncut distribution.
+        /// Mean of the untruncated distribution.
         mean: f64,
-        /// Standard deviation of the uncut distribution, above 0.
+        /// Standard deviation of the untruncated distribution, above 0.
         sd: f64,
-        /// Lower cut; −∞ where there is none.
+        /// Lower limit; −∞ without one.
         min: f64,
-        /// Upper cut; ∞ where there is none.
+        /// Upper limit; ∞ without one.
         max: f64,
     },
     /// The logarithm is Gaussian.
     LogNormal {
-        /// Median of the uncut distribution, above 0.
+        /// Median of the untruncated distribution, above 0.
         median: f64,
         /// Standard deviation of the logarithm, above 0.
         sigma: f64,
-        /// Lower cut; 0 where there is none.
+        /// Lower limit; 0 without one.
         min: f64,
-        /// Upper cut; ∞ where there is none.
+        /// Upper limit; ∞ without one.
         max: f64,
     },
     /// Density that rises from `min` to `mode` and falls to `max`.
@@ -79,7 +79,7 @@ pub(super) const NAMES: [&str; 6] = [
 ];
 
 impl Distribution {
-    /// Smallest and largest value; infinite where nothing cuts it. `None` of a choice.
+    /// Smallest and largest value; infinite without a limit. `None` for a choice.
     #[must_use]
     pub fn ends(&self) -> Option<[f64; 2]> {
         match *self {
@@ -92,7 +92,7 @@ impl Distribution {
         }
     }
 
-    /// A value in the middle, for what is looked at beside other factors.
+    /// A middle value, used while other factors are checked.
     #[must_use]
     pub fn middle(&self) -> Value {
         match self {
@@ -108,7 +108,7 @@ impl Distribution {
     }
 }
 
-/// Reads the distribution `key` of a factor; with its unit, empty where none is given.
+/// Reads the distribution `key` of a factor, with its unit, empty if none is given.
 pub(super) fn read(r: &mut Reader, factor: &Entry, key: &str) -> Option<(Distribution, String)> {
     let path = factor.field_path(key);
     let holds = fields(key);
@@ -202,10 +202,10 @@ fn fields(key: &str) -> &'static [&'static str] {
     }
 }
 
-/// Standard deviations beyond which a bell has nothing to cut out: 6e-16 of its probability.
+/// Standard deviations beyond which a bell has almost nothing left: 6e-16 of its probability.
 const FAR: f64 = 8.0;
 
-/// A window far from the bell that it is cut from, by its ends in standard deviations.
+/// Reports a window far from the bell that it is cut from; its ends are in standard deviations.
 fn empty(low: f64, high: f64) -> Option<String> {
     let (end, beyond) = match (low > FAR, high < -FAR) {
         (true, _) => ("min", low),
@@ -219,7 +219,7 @@ fn empty(low: f64, high: f64) -> Option<String> {
     ))
 }
 
-/// Why numbers are no distribution.
+/// Why numbers do not make a distribution.
 fn contradiction(d: &Distribution) -> Option<String> {
     let above = |name: &str, value: f64| {
         (value <= 0.0).then(|| format!("{name} = {} must be above 0", pretty(value)))

@@ -1,32 +1,31 @@
-//! One factor of a plan: what it sets, and its values.
+//! One factor of a plan: its target, and its values.
 
 use super::distribution::{self, Distribution};
 use super::value::{Value, list};
 use crate::reader::{Entry, NAME_LENGTH, Reader};
 
-/// What a factor sets.
+/// The target of a factor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sets {
-    /// Which scenario is run.
+    /// The scenario to run.
     Scenario,
-    /// Which robot.
+    /// The robot.
     Robot,
-    /// Fields of the scenario, without the `scenario.` of the plan, and of the robot, without
-    /// its `robot.`.
+    /// Fields of the scenario, without the plan's prefix `scenario.`, and of the robot, without its `robot.`.
     Fields {
         /// Of the scenario.
         scenario: Vec<String>,
         /// Of the robot.
         robot: Vec<String>,
     },
-    /// A fault, the value in place of its `{}`.
+    /// A fault, with the value in place of its `{}`.
     Fault(String),
 }
 
-/// Where the values come from.
+/// Origin of the values.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Each of a list, with all samples.
+    /// Each value of a list, with all samples.
     Grid(Vec<Value>),
     /// One for each sample.
     Drawn(Distribution),
@@ -37,20 +36,20 @@ pub enum Values {
 pub struct Factor {
     /// Name: column `f.NAME` of the table.
     pub name: String,
-    /// What it sets.
+    /// Its target.
     pub sets: Sets,
     /// Its values.
     pub values: Values,
-    /// Unit of the values; empty where they have none.
+    /// Unit of the values; empty if they have none.
     pub unit: String,
-    /// Whether the value is one that the file's is multiplied by.
+    /// Whether the file's value is multiplied by this one.
     pub scale: bool,
-    /// Whether it leaves the seed as it is, so that its values meet the same noise.
+    /// Whether it keeps the seed, so that all its values meet the same noise.
     pub paired: bool,
 }
 
 impl Factor {
-    /// Number of values of its list; 1 of one that is drawn.
+    /// Number of values of its list; 1 if drawn.
     #[must_use]
     pub fn grid_len(&self) -> u64 {
         match &self.values {
@@ -140,7 +139,7 @@ fn read(r: &mut Reader, name: &str) -> Option<Factor> {
     fits(r, &entry, &factor).then_some(factor)
 }
 
-/// Whether what it sets, `scale` and the kind of its values go together.
+/// Whether its target, `scale` and the kind of its values fit together.
 fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
     let path = &entry.path;
     let why = match &factor.sets {

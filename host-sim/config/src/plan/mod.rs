@@ -1,4 +1,4 @@
-//! A plan of a campaign: one scenario, many times, with what differs from case to case.
+//! A plan of a campaign: one scenario, many times, and the differences from case to case.
 //!
 //! | file | what |
 //! |---|---|
@@ -51,9 +51,9 @@ pub const SAMPLERS: [(&str, Sampler); 3] = [
 /// Which cases keep their log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeepLogs {
-    /// None.
+    /// No case.
     None,
-    /// Those that missed a required target, or have no result.
+    /// Cases that missed a required target, or have no result.
     Failed,
     /// All.
     All,
@@ -65,7 +65,7 @@ const KEEP: [(&str, KeepLogs); 3] = [
     ("all", KeepLogs::All),
 ];
 
-/// What every case begins with.
+/// Start of every case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Base {
     /// Scenario, by built-in name or path.
@@ -83,23 +83,23 @@ pub struct Plan {
     pub root: u64,
     /// Samples of each cell of the grid.
     pub samples: u64,
-    /// Cases of each sample, which differ in their noise alone.
+    /// Cases of each sample, which differ only in their noise.
     pub replicates: u64,
     /// How samples are drawn.
     pub sampler: Sampler,
     /// Cases of a part file; `None`: as many as are 30 to 120 s of work.
     pub block: Option<u64>,
-    /// Which logs are kept.
+    /// Logs that are kept.
     pub keep: KeepLogs,
     /// Simulated time after which a case is given up, s.
     pub limit_s: Option<f64>,
-    /// Bars in place of those of every scenario; `None`: they keep theirs.
+    /// Bars that replace those of every scenario; `None`: they keep theirs.
     pub bars: Option<ArrayOfTables>,
-    /// What every case begins with.
+    /// Start of every case.
     pub base: Base,
-    /// What differs, in the order of the file.
+    /// The differences, in the order of the file.
     pub factors: Vec<Factor>,
-    /// The texts that it stands on.
+    /// The texts that it is made from.
     pub sources: Sources,
 }
 
@@ -128,8 +128,7 @@ impl Plan {
     /// A plan by built-in name, or from a TOML file.
     ///
     /// # Errors
-    /// [`ConfigError`] with every problem of the plan, or those of a scenario or robot that it
-    /// names.
+    /// [`ConfigError`] with every problem of the plan, or those of a scenario or robot named in it.
     pub fn load(name_or_path: &str) -> Result<Self, ConfigError> {
         Self::of(Sources::load(name_or_path)?)
     }
@@ -153,7 +152,7 @@ impl Plan {
         r.finish(&what, plan).map(|(plan, _)| plan)
     }
 
-    /// Cells of the grid: one for each combination of values of the factors that have a list.
+    /// Cells of the grid: one for each combination of values of the factors with a list.
     #[must_use]
     pub fn cells(&self) -> u64 {
         self.factors.iter().map(Factor::grid_len).product()
@@ -165,7 +164,7 @@ impl Plan {
         self.cells() * self.samples * self.replicates
     }
 
-    /// Whether two samples may well have the same values: some factors are drawn, and each of them from
+    /// Whether two samples are likely to have the same values: some factors are drawn, and each of them from
     /// a list.
     #[must_use]
     pub fn draws_from_lists_alone(&self) -> bool {
@@ -281,7 +280,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
     Some(plan)
 }
 
-/// Samples differ in what is drawn: without it each case would be computed once more.
+/// Reports samples without anything drawn: each case would be computed again.
 fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
     let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
     let samples = plan.samples;
@@ -301,7 +300,7 @@ fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
     );
 }
 
-/// The bars as they stand in the plan, once they are known to be right.
+/// The bars as written in the plan, once they are known to be right.
 fn bars(r: &mut Reader, sources: &Sources) -> Option<ArrayOfTables> {
     if crate::bars::read(r, &TOP).is_empty() {
         return None;

@@ -1,4 +1,4 @@
-//! Values of all factors to a scenario and a robot, read and checked as files are.
+//! Turns values of all factors into a scenario and a robot, read and checked like files.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ impl Base {
         })
     }
 
-    /// The quantity at a path, and of a list its component where the path ends in one.
+    /// The quantity at a path, or a component of it if the path ends in an index.
     pub(super) fn listed(&self, path: &str) -> Option<(&ParameterInfo, Option<usize>)> {
         let of = |path: &str| self.listing.iter().find(|p| p.path == path);
         if let Some(info) = of(path) {
@@ -50,38 +50,38 @@ impl Base {
         Some((info, Some(component)))
     }
 
-    /// The quantity of which a path names a component, whether it has that one or not.
+    /// The quantity whose component a path names, even if it lacks that component.
     pub(super) fn around(&self, path: &str) -> Option<&ParameterInfo> {
         let (whole, _) = overlay::split_index(path)?;
         self.listing.iter().find(|p| p.path == whole)
     }
 
-    /// Whether the path is that of a name rather than a number.
+    /// Whether the path leads to a name rather than a number.
     pub(super) fn has_text(&self, path: &str) -> bool {
         is_law(path) || overlay::text(&self.document, path).is_some()
     }
 }
 
-/// Whether a path is the law of a joint board, which has names for its numbers.
+/// Whether a path leads to the law of a joint board, which has names for its numbers.
 pub(super) fn is_law(path: &str) -> bool {
     path.starts_with("node.") && path.ends_with(".law")
 }
 
-/// Makes cases of a plan: its files are read once.
+/// Makes cases of a plan; reads its files once.
 pub struct Resolver<'a> {
     plan: &'a Plan,
     pub(super) scenarios: BTreeMap<&'a str, Base>,
     pub(super) robots: BTreeMap<&'a str, Base>,
 }
 
-/// A case: what is run on what.
+/// A case: a scenario on a robot.
 #[derive(Debug, Clone)]
 pub struct Resolved {
     /// The scenario.
     pub scenario: Scenario,
     /// The robot.
     pub robot: RobotConfig,
-    /// The scenario's text as JSON, without what does not enter a run: description, sources, the
+    /// The scenario's text as JSON, without parts that have no effect on a run: description, sources, the
     /// robot's file, the seed.
     pub scenario_json: serde_json::Value,
     /// Name, parameters and commissioned boards of the robot as JSON.
@@ -92,7 +92,7 @@ impl<'a> Resolver<'a> {
     /// Reads the files.
     ///
     /// # Errors
-    /// [`ConfigError`] of the first file that is wrong as it is.
+    /// [`ConfigError`] of the first file that is wrong before any change.
     pub fn new(plan: &'a Plan) -> Result<Self, ConfigError> {
         let (mut scenarios, mut robots) = (BTreeMap::new(), BTreeMap::new());
         for (name, source) in &plan.sources.scenarios {
@@ -121,13 +121,13 @@ impl<'a> Resolver<'a> {
     /// The case of one value for each factor, in their order.
     ///
     /// # Errors
-    /// [`ConfigError`] where the values do not make a scenario or a robot that there can be.
+    /// [`ConfigError`] if the values do not make a valid scenario or robot.
     pub fn resolve(&self, values: &[Value]) -> Result<Resolved, ConfigError> {
         let all: Vec<_> = self.plan.factors.iter().zip(values).collect();
         self.resolve_only(&all)
     }
 
-    /// The same of some factors, the others' fields as the files have them.
+    /// The same for some factors, with the others' fields as in the files.
     pub(super) fn resolve_only(
         &self,
         factors: &[(&Factor, &Value)],
@@ -169,7 +169,7 @@ impl<'a> Resolver<'a> {
         }
         let mut scenario_json = without_notes(&scenario_text);
         if !scenario.data.is_empty() {
-            // Two maps of one name are two grounds.
+            // Two maps of the same name may be different ground.
             let digests = scenario.data.iter().map(|(n, d)| (n.clone(), d.digest()));
             scenario_json["data"] = digests.collect::<BTreeMap<_, _>>().into_iter().collect();
         }
@@ -241,7 +241,7 @@ fn set(
         .ok_or_else(|| nowhere(format!("there is no `{path}`")))
 }
 
-/// What is written for a value of a factor, and its unit.
+/// The text to write for a value of a factor, and its unit.
 pub(super) fn written(
     info: &ParameterInfo,
     component: Option<usize>,
@@ -261,13 +261,13 @@ pub(super) fn written(
     if info.value.len() == 1 {
         return (vec![number], unit);
     }
-    // The other components stand in the file's unit.
+    // The other components are in the file's unit.
     let number = number * factor_between(info, &unit);
     let mixed = each.map(|(i, v)| if at(i) { number } else { *v });
     (mixed.collect(), info.unit.clone())
 }
 
-/// From a unit to that of the file; 1 where only one is accepted.
+/// Factor from a unit to that of the file; 1 if only one is accepted.
 pub(super) fn factor_between(info: &ParameterInfo, unit: &str) -> f64 {
     let si = |unit: &str| info.dimension.and_then(|d: Dimension| d.factor(unit));
     match (si(unit), si(&info.unit)) {
@@ -292,10 +292,10 @@ fn robot_json(robot: &RobotConfig) -> serde_json::Value {
     })
 }
 
-/// Largest whole number up to which all are exact as floats.
+/// Largest whole number below which all are exact as floats.
 const EXACT: u64 = 1 << f64::MANTISSA_DIGITS;
 
-/// A scenario's text as JSON, all numbers as floats that can be, the others as text.
+/// A scenario's text as JSON, with numbers as floats if they are exact, the others as text.
 fn without_notes(document: &DocumentMut) -> serde_json::Value {
     let mut json = item_json(document.as_item());
     if let Some(top) = json.as_object_mut() {
@@ -325,7 +325,7 @@ fn item_json(item: &Item) -> serde_json::Value {
     }
     match (item.as_float(), item.as_integer(), item.as_str()) {
         (Some(number), ..) => json!(number),
-        // Beyond it two neighbours, such as seeds, are one float.
+        // Beyond it two neighbours, such as seeds, are the same float.
         (_, Some(number), _) if number.unsigned_abs() > EXACT => json!(number.to_string()),
         (_, Some(number), _) => json!(number as f64),
         (.., text) => json!(text),

@@ -1,4 +1,4 @@
-//! The texts that a plan stands on, so that a folder of results needs no other file.
+//! The texts that a plan is made from, so that a folder of results needs no other file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::error::{ConfigError, word};
 use crate::reader::Reader;
 use crate::terrain::{Data, named_files};
 
-/// A file: its name for messages, and what is in it.
+/// A file: its name for messages, and its contents.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Text {
     /// Name for messages.
@@ -23,26 +23,26 @@ pub struct Text {
     pub text: String,
 }
 
-/// A plan's own text and those of every scenario and robot that it names.
+/// A plan's own text and those of all scenarios and robots named in it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Sources {
     /// The plan.
     pub plan: Text,
-    /// Scenarios by the name that the plan has for them.
+    /// Scenarios by their name in the plan.
     pub scenarios: BTreeMap<String, Text>,
-    /// Robots by the name that plan or scenario has for them.
+    /// Robots by their name in the plan or scenario.
     pub robots: BTreeMap<String, Text>,
     /// Robot of each scenario, by their names.
     pub robot_of: BTreeMap<String, String>,
-    /// Data files of each scenario, by the names that it has for them.
+    /// Data files of each scenario, by their name in it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(with = "BTreeMap<String, BTreeMap<String, String>>")]
     pub data: BTreeMap<String, BTreeMap<String, Data>>,
 }
 
 impl Sources {
-    /// Reads a plan, built in or from a file, and what it names. A relative path counts from the
-    /// folder of the plan, the robot's of a scenario from that of the scenario.
+    /// Reads a plan, built in or from a file, and the files named in it. A relative path counts from the
+    /// folder of the plan; a scenario's robot, from the folder of the scenario.
     ///
     /// # Errors
     /// [`ConfigError`] if one of the files cannot be read.
@@ -57,7 +57,7 @@ impl Sources {
             robot_of: BTreeMap::new(),
             data: BTreeMap::new(),
         };
-        // A plan that is no TOML, or names nothing, is told of when it is read.
+        // A plan that is not TOML, or names nothing, is reported when it is read.
         let Ok(document) = Document::parse(sources.plan.text.clone()) else {
             return Ok(sources);
         };
@@ -79,7 +79,7 @@ impl Sources {
         sources.without(wrong)
     }
 
-    /// Itself, if nothing that the plan names is `wrong`; otherwise where the plan names it.
+    /// Itself, if nothing named in the plan is `wrong`; otherwise the errors at their places in the plan.
     fn without(self, wrong: Vec<(Named, ConfigError)>) -> Result<Self, ConfigError> {
         if wrong.is_empty() {
             return Ok(self);
@@ -92,7 +92,7 @@ impl Sources {
             for problem in error.problems() {
                 let help = problem.help_text().map(str::to_owned);
                 let told = problem.summary();
-                // Of a name the file is the name itself.
+                // For a name, the file is the name itself.
                 let told = told.strip_prefix(&format!("{name}: ")).unwrap_or(&told);
                 let message = format!("`{}` = \"{name}\": {told}", named.path);
                 r.problem(named.span.clone(), message, "not usable", help);
@@ -121,14 +121,14 @@ impl Sources {
     }
 }
 
-/// A scenario or a robot, and where a plan names it.
+/// A scenario or a robot, and its place in a plan.
 struct Named {
     name: String,
     path: String,
     span: Option<Range<usize>>,
 }
 
-/// What a plan names as its `key`: in `[base]`, and in factors.
+/// The names that a plan has under `key`: in `[base]`, and in factors.
 fn named(document: &Document<String>, key: &str) -> Vec<Named> {
     let base = document.get("base").and_then(|base| base.get(key));
     let mut named: Vec<Named> = base
@@ -171,7 +171,7 @@ fn data_of(name: &str, file: &str, text: &str) -> Result<BTreeMap<String, Data>,
             Ok(bytes) => {
                 data.insert(named, Data(bytes));
             }
-            // The reader says it with its line.
+            // The reader reports it with its line.
             Err(_) => {
                 Scenario::parse_with(file, text, &files)?;
             }
@@ -180,7 +180,7 @@ fn data_of(name: &str, file: &str, text: &str) -> Result<BTreeMap<String, Data>,
     Ok(data)
 }
 
-/// A name as it is, a relative path from the folder.
+/// A name unchanged; a relative path, from the folder.
 fn placed(folder: &Path, name: &str) -> String {
     if builtin::is_path(name) && !Path::new(name).is_absolute() {
         return folder.join(name).to_string_lossy().into_owned();

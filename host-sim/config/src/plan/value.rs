@@ -5,7 +5,7 @@ use toml_edit::Item;
 
 use crate::reader::{Entry, Reader};
 
-/// Longest text, bytes: each row of a table has it.
+/// Longest text, bytes: every row of a table holds it.
 const TEXT_MOST: usize = 500;
 
 /// A value of a factor.
@@ -16,7 +16,7 @@ pub enum Value {
     Flag(bool),
     /// A number in the unit of the factor.
     Number(f64),
-    /// A name: of a scenario, a robot, a law, or what else a file has names for.
+    /// A name: of a scenario, a robot, a law, or of anything else that files name.
     Text(String),
 }
 

@@ -1,5 +1,5 @@
-//! What a robot and a single axis share: air, supply, one cylinder with its
-//! valves, and the sensor that reads its stroke.
+//! Common parts of a robot and a single axis: air, supply, one cylinder with its valves, and the sensor that
+//! reads its stroke.
 
 use wheeleg_plant::chamber::GasModel;
 use wheeleg_plant::cylinder::CylinderParams;
@@ -80,8 +80,7 @@ pub(crate) struct Sensing {
 }
 
 impl Sensing {
-    /// Reads `[sensor]` and `[numerics]`; `noise` says what kind of noise the
-    /// file's figure (LSB) states.
+    /// Reads `[sensor]` and `[numerics]`; `noise` is the kind of noise that the file's figure (LSB) states.
     pub(crate) fn read(r: &mut Reader, noise: fn(f64) -> AdcNoise) -> Option<Self> {
         if let Some(sensor) = r.table("sensor") {
             r.reject_unknown(&sensor, &["potentiometer", "adc"]);

@@ -6,7 +6,7 @@ use wheeleg_protocol::param::JointParam;
 use crate::derived::limits_si;
 use crate::params::params;
 
-// What a joint board is told of its axis has the limits of the board's parameters.
+// Data of an axis that a joint board needs has the limits of the board's parameters.
 const VALVE_ON: [f64; 2] = limits_si(JointParam::ValveOn, 1e6);
 const VALVE_OFF: [f64; 2] = limits_si(JointParam::ValveOff, 1e6);
 const BORE: [f64; 2] = limits_si(JointParam::Bore, 1e3);
@@ -95,7 +95,7 @@ params! {
         t_off: f64, "t_off", Time, VALVE_OFF[0], VALVE_OFF[1];
     }
 
-    /// The valve that empties the supply, of which no board is told.
+    /// The valve that empties the supply; no board knows its data.
     DumpValveSection {
         /// Sonic conductance C of the open valve.
         conductance: f64, "conductance", SonicConductance, 1e-12, 1e-5;
@@ -271,7 +271,7 @@ params! {
         gravity: [f64; 3], "gravity", Acceleration, -30.0, 30.0;
     }
 
-    /// What a chassis that rolls and turns needs beyond its masses, and the drawing.
+    /// Data of a chassis that rolls and turns, in addition to its masses, and of the drawing.
     SpatialParams {
         /// Inertia of the chassis about its centre of mass, roll axis.
         chassis_roll_inertia_kg_m2: f64, "chassis_roll_inertia", Inertia, 1e-4, 1000.0;
@@ -357,7 +357,7 @@ params! {
         to: [f64; 3], "to", Length, -10.0, 10.0;
     }
 
-    /// What of the robot acts on soft ground alone; without the section wheels are smooth, soles plain.
+    /// Parts of the robot that act only on soft ground; without the section wheels are smooth, soles plain.
     SoftGroundSection {
         /// Height of the lugs over the rim of a wheel.
         lugs: f64, "lugs", Length, 0.0, 0.2;

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use toml_edit::{Item, Value};
 
-/// A path, the first control character at it, and where that stands.
+/// A path, its first control character, and the position of that.
 pub(super) type Found = (String, char, Option<Range<usize>>);
 
-/// The first character of a text that neither a page nor another file can show.
+/// The first character of a text that cannot be shown in a page or another file.
 fn first(text: &str) -> Option<char> {
     let mut all = text.chars();
     all.find(|c| c.is_control() && !matches!(c, '\n' | '\r' | '\t'))
@@ -17,7 +17,7 @@ fn first(text: &str) -> Option<char> {
 pub(super) fn find(path: &str, item: &Item, found: &mut Vec<Found>) {
     if let Some(table) = item.as_table_like() {
         for (name, below) in table.iter() {
-            // Only what can be shown is shown.
+            // Leave out characters that cannot be shown.
             let shown: String = name.chars().filter(|c| !c.is_control()).collect();
             let path = match path {
                 "" => shown,

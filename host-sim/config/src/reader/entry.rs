@@ -84,7 +84,7 @@ pub(super) fn number(value: Option<&Value>) -> Option<f64> {
     }
 }
 
-/// The number that a text begins with, and what follows it.
+/// The number at the start of a text, and the rest.
 fn split_number(text: &str) -> Option<(Value, &str)> {
     let number = |text: &str| match text.parse::<i64>() {
         Ok(whole) => Some(Value::from(whole)),
@@ -94,7 +94,7 @@ fn split_number(text: &str) -> Option<(Value, &str)> {
     if let Some(value) = number(word) {
         return Some((value, rest));
     }
-    // Without a space. A unit may begin with what could be part of a number.
+    // Without a space. A unit may begin with a character that could be part of a number.
     let is_part = |c: char| c.is_ascii_digit() || "+-._eE".contains(c);
     let longest = text.find(|c| !is_part(c)).unwrap_or(text.len());
     (1..=longest).rev().find_map(|end| {
@@ -103,7 +103,7 @@ fn split_number(text: &str) -> Option<(Value, &str)> {
     })
 }
 
-/// A number with a decimal comma, with a point in its place: `0,5 s` is `0.5 s`.
+/// A number whose decimal comma is replaced by a point: `0,5 s` is `0.5 s`.
 pub(super) fn with_point(text: &str) -> Option<String> {
     let (whole, rest) = text.split_once(',')?;
     let digits = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_digit());
@@ -112,13 +112,13 @@ pub(super) fn with_point(text: &str) -> Option<String> {
         .unwrap_or(rest.len());
     let (decimals, unit) = rest.split_at(behind);
     let sign_less = whole.trim_start_matches(['+', '-']);
-    // A second comma, as in 1,234,5, says that it is something else.
+    // With a second comma, as in 1,234,5, it is something else.
     let one = digits(sign_less) && !decimals.is_empty() && !unit.starts_with([',', '.']);
     one.then(|| format!("{whole}.{rest}"))
 }
 
-/// The fields of a quantity that is written short, `"10 s"` or `true`: its value, and its
-/// unit if it has one. `None` if there is no number in it.
+/// The fields of a quantity in short form, `"10 s"` or `true`: its value, and its unit if it has one. `None`
+/// if there is no number in it.
 pub(super) fn short(item: &Item, span: &Range<usize>) -> Option<Vec<Field>> {
     let field = |key: &str, item| (key.to_owned(), span.clone(), item);
     if let Some(flag) = item.as_bool() {

@@ -1,4 +1,4 @@
-//! Reads a TOML file with positions, and collects everything that is wrong.
+//! Reads a TOML file with positions, and collects all errors.
 
 mod control;
 mod entry;
@@ -36,13 +36,13 @@ pub(crate) struct Reader {
     source_required: bool,
 }
 
-/// Whether a text is a whole number, and one that TOML cannot hold.
+/// Whether a text is a whole number too large for TOML.
 fn is_long_number(text: &str) -> bool {
     let digits = text.chars().all(|c| c.is_ascii_digit());
     digits && !text.is_empty() && text.parse::<i64>().is_err()
 }
 
-/// Whether a text that is not TOML has a comma between two digits about a byte.
+/// Whether an invalid TOML text has a comma between two digits near a byte.
 fn has_decimal_comma(text: &str, at: usize) -> bool {
     let bytes = text.as_bytes();
     let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
@@ -113,7 +113,7 @@ impl Reader {
         }
     }
 
-    /// The same of a file with other values in it. `None` if it cannot have them.
+    /// The same for a file with other values in it. `None` if it cannot have them.
     pub(crate) fn with(file: &str, text: &str, values: &[Advised]) -> Option<Self> {
         let mut document: DocumentMut = text.parse().ok()?;
         for Advised { path, value, unit } in values {
@@ -123,7 +123,7 @@ impl Reader {
         Self::parse("", file, &document.to_string(), true).ok()
     }
 
-    /// The result: what was read, or every problem found.
+    /// The result: the value, or every problem found.
     pub(crate) fn finish<T>(
         self,
         what: &str,
@@ -153,8 +153,8 @@ impl Reader {
             .push(Problem::at(place, span, message, label, help));
     }
 
-    /// Reports fields that do not fit together, each of which is within its range: with what
-    /// the file says of them, the lines of all, and values that were tried.
+    /// Reports fields that do not fit together though each is within its range: with their values in the
+    /// file, their lines, and values that were tried.
     pub(crate) fn contradiction(
         &mut self,
         fields: &[&str],
@@ -179,14 +179,14 @@ impl Reader {
         format!("`{path}`{value}{}", self.line_of(path))
     }
 
-    /// The line of a field in brackets, behind a space; empty where the file has no such field.
+    /// The line of a field in brackets, after a space; empty if the file has no such field.
     pub(crate) fn line_of(&self, path: &str) -> String {
         self.span_of(path).map_or(String::new(), |span| {
             format!(" (line {})", self.lines.of_byte(span.start))
         })
     }
 
-    /// The same of fields as they are `shown`, some of which may be those of another file.
+    /// The same for fields as they are `shown`, some of which may come from another file.
     pub(crate) fn contradiction_at(
         &mut self,
         first: Option<Range<usize>>,
@@ -208,14 +208,14 @@ impl Reader {
         }
     }
 
-    /// The last problem is that this relation does not hold.
+    /// Marks the last problem as this broken relation.
     pub(crate) fn breaks(&mut self, relation: &'static str) {
         if let Some(problem) = self.problems.last_mut() {
             problem.breaks(relation);
         }
     }
 
-    /// Path of the parameter that a name of the plant, a path with a unit behind it, begins with.
+    /// Path of the parameter at the start of a name of the plant, which is a path with a unit behind it.
     pub(crate) fn listed(&self, name: &str) -> Option<String> {
         let mut paths: Vec<&str> = self.parameters.iter().map(|p| p.path.as_str()).collect();
         paths.retain(|path| name.starts_with(path));
@@ -223,19 +223,19 @@ impl Reader {
         paths.last().map(|path| (*path).to_owned())
     }
 
-    /// Unit in which a parameter is written, and its size in SI.
+    /// Unit of a parameter in the file, and its size in SI.
     pub(crate) fn unit_of(&self, path: &str) -> Option<(f64, String)> {
         let info = self.parameters.iter().find(|p| p.path == path)?;
         let factor = info.dimension?.factor(&info.unit)?;
         Some((factor, info.unit.clone()))
     }
 
-    /// What was read so far, as written.
+    /// Parameters read so far, as written.
     pub(crate) fn parameters(&self) -> &[ParameterInfo] {
         &self.parameters
     }
 
-    /// Whether nothing is wrong so far.
+    /// Whether there is no error so far.
     pub(crate) fn is_clean(&self) -> bool {
         self.problems.is_empty()
     }
@@ -290,7 +290,7 @@ impl Reader {
         }
     }
 
-    /// Lifts entry `index` of an array of tables out as its own reader level.
+    /// Takes entry `index` of an array of tables as a reader level of its own.
     pub(crate) fn entry(&self, path: &str, index: usize) -> Entry {
         let item = self.item(path);
         let table: Option<(Vec<Field>, Range<usize>)> = item.and_then(|i| {
@@ -323,8 +323,8 @@ impl Reader {
         })
     }
 
-    /// The table at `path`, which a file may leave out; anything else there is a problem, with
-    /// the names that the table `holds` for help.
+    /// The table at `path`, which a file may leave out; anything else there is a problem, with the names that
+    /// the table `holds` as help.
     pub(crate) fn optional_table(&mut self, path: &str, holds: &[&str]) -> Option<Entry> {
         let item = self.item(path)?;
         let Some(table) = self.table(path) else {
@@ -390,8 +390,8 @@ impl Reader {
             .iter()
             .map(|spec| match entry.get(spec.key) {
                 Some(_) => self.quantity(&entry, spec),
-                // That it is missing is told above. What the other fields must be to each other
-                // does not depend on a flag, and is told at the same time.
+                // A missing flag is reported above. Relations between the other fields do not depend on a
+                // flag, and are reported at the same time.
                 None => (spec.dimension == Dimension::Flag).then(|| vec![0.0]),
             })
             .collect();
@@ -405,8 +405,8 @@ impl Reader {
         self.reject_misplaced(entry, known, &[]);
     }
 
-    /// The same; of a field that is one of the `top` of the file it says where it belongs.
-    /// TOML takes whatever stands below a heading for that section.
+    /// The same; for a field that belongs to the `top` of the file, it says so: TOML assigns everything below
+    /// a heading to that section.
     pub(crate) fn reject_misplaced(&mut self, entry: &Entry, known: &[&str], top: &[&str]) {
         for (key, span) in entry.keys() {
             if !known.contains(&key) {

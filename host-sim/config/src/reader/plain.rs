@@ -8,10 +8,10 @@ use crate::suggest::closest;
 /// Longest name, in characters.
 pub(crate) const NAME_LENGTH: usize = 64;
 
-/// Largest whole number that TOML can write.
+/// Largest whole number in TOML.
 const LARGEST_OF_TOML: u64 = i64::MAX as u64;
 
-/// Whether a name can stand in a path, in TOML and in a page as it is.
+/// Whether a name can be used unchanged in a path, in TOML and in a page.
 fn is_name(text: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     (1..=NAME_LENGTH).contains(&text.len())
@@ -20,15 +20,15 @@ fn is_name(text: &str) -> bool {
 }
 
 impl Reader {
-    /// Reads the name of a robot, an axis or a scenario: results go to folders and files of
-    /// that name, so it must be one and cannot lead out of the folder that it stands in.
+    /// Reads the name of a robot, an axis or a scenario. Results go to folders and files of that name, so it
+    /// must be a plain name that cannot lead out of its folder.
     pub(crate) fn name(&mut self, entry: &Entry, key: &str) -> Option<String> {
         let text = self.text(entry, key)?;
         if is_name(&text) {
             return Some(text);
         }
         let span = entry.get(key).and_then(|(k, item)| item.span().or(Some(k)));
-        // A long text says no more than its beginning.
+        // The beginning of a long text is enough.
         let shown: String = text.chars().take(NAME_LENGTH).collect();
         let more = if shown.len() < text.len() { "…" } else { "" };
         self.problem(
@@ -66,8 +66,7 @@ impl Reader {
         }
     }
 
-    /// Reads an optional list of texts, each of which `parse` turns into a value
-    /// or says why not.
+    /// Reads an optional list of texts; `parse` turns each into a value or returns its error.
     pub(crate) fn texts<T>(
         &mut self,
         entry: &Entry,
@@ -159,8 +158,8 @@ impl Reader {
         value
     }
 
-    /// Reads a whole number without unit, such as a seed. Those that TOML has no numbers for, above
-    /// 2⁶³ − 1, are written as text.
+    /// Reads a whole number without unit, such as a seed. Numbers too large for TOML, above 2⁶³ − 1, are
+    /// written as text.
     pub(crate) fn whole(
         &mut self,
         entry: &Entry,

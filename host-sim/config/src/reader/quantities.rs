@@ -9,7 +9,7 @@ use super::{Entry, Reader};
 use crate::params::{FieldSpec, ParameterInfo};
 use crate::quantity::{Dimension, pretty, suffix};
 
-/// What is allowed, in words.
+/// The allowed range, in words.
 pub(crate) fn range(min: f64, max: f64, unit: &str) -> String {
     format!("{} to {}{}", pretty(min), pretty(max), suffix(unit))
 }
@@ -102,15 +102,15 @@ impl Reader {
         Some(written.into_iter().map(|v| self.si(v, factor)).collect())
     }
 
-    /// A value in SI. In a scenario `57 mm` is `0.057 m` to the last bit, which a product with 0.001 is
-    /// not. Of robots and axes the unit is part of what identifies them.
+    /// A value in SI. In a scenario `57 mm` is `0.057 m` to the last bit, which a product with 0.001 is not.
+    /// In robots and axes the unit is part of their identity.
     fn si(&self, value: f64, factor: f64) -> f64 {
         let shift = factor.log10().round() as i32;
         let is_decimal = shift < 0 && format!("1e{shift}").parse() == Ok(factor);
         if self.source_required || !is_decimal {
             return value * factor;
         }
-        // Its digits stay, and the point moves.
+        // Keep the digits, and move the point.
         let written = format!("{value:e}");
         let moved = written.split_once('e').and_then(|(digits, exponent)| {
             let exponent = exponent.parse::<i32>().ok()? + shift;
@@ -119,7 +119,7 @@ impl Reader {
         moved.unwrap_or(value * factor)
     }
 
-    /// A pure number needs no unit where no source is asked for.
+    /// A pure number needs no unit if no source is required.
     fn bare_number(&self, entry: &Entry, spec: &FieldSpec) -> Option<Entry> {
         let (key, item) = entry.get(spec.key)?;
         let bare = item.is_integer() || item.is_float() || item.is_array();
@@ -133,7 +133,7 @@ impl Reader {
         })
     }
 
-    /// Reads a quantity that must be there.
+    /// Reads a required quantity.
     pub(crate) fn required(&mut self, entry: &Entry, spec: &FieldSpec) -> Option<f64> {
         if entry.has(spec.key) {
             return self.quantity(entry, spec).and_then(|v| v.first().copied());
@@ -153,8 +153,8 @@ impl Reader {
         None
     }
 
-    /// Reads a quantity that has exactly one unit, its `range` for help: value, position
-    /// of the value, source.
+    /// Reads a quantity that has exactly one unit, with its `range` for help: value, position of the value,
+    /// source.
     pub(crate) fn table_quantity(
         &mut self,
         entry: &Entry,
@@ -204,7 +204,7 @@ impl Reader {
         Some((number_found, span, source))
     }
 
-    /// How a quantity is written.
+    /// Example of a quantity.
     fn example(&self, spec: &FieldSpec) -> String {
         let key = spec.key;
         let unit = spec.dimension.units()[0].0;
@@ -228,8 +228,8 @@ impl Reader {
         }
     }
 
-    /// The table `{ value, unit, source }` that `key` must hold, if it is there. Where no
-    /// source is asked for, a text such as `"10 s"` says the same.
+    /// The table `{ value, unit, source }` of `key`, if it is there. If no source is required, a text such as
+    /// `"10 s"` means the same.
     fn stated(&mut self, entry: &Entry, key: &str, units: &str, example: &str) -> Option<Entry> {
         let path = entry.field_path(key);
         let (key_span, item) = entry.get(key)?;
@@ -247,7 +247,7 @@ impl Reader {
                     format!("`{path}` = \"{text}\" does not begin with a number; units: {units}"),
                     "a bare value",
                 ),
-                // The short form, which has no place for a source.
+                // The short form, which cannot hold a source.
                 Some(text) if short(item, &span).is_some() => {
                     (format!("`{path}` = \"{text}\" has no source"), "no source")
                 }
@@ -268,7 +268,7 @@ impl Reader {
         Some(inner)
     }
 
-    /// Numbers of many countries have a comma, those of TOML and of this program a point.
+    /// Many countries write numbers with a comma; TOML and this program need a point.
     fn decimal_comma(&mut self, path: &str, span: Range<usize>, text: &str, point: &str) {
         self.problem(
             Some(span),
@@ -346,7 +346,7 @@ impl Reader {
         );
         let mut units = spec.dimension.units().iter().map(|(name, _)| name);
         let help = match units.find(|name| name.eq_ignore_ascii_case(unit)) {
-            // Of a number such as 0,2,1 the end reads as a unit.
+            // The end of a number such as 0,2,1 reads as a unit.
             _ if unit.starts_with(',') => "numbers have a decimal point: 0.2, not 0,2".to_owned(),
             _ if unit.contains(|c: char| c.is_ascii_digit())
                 && !unit.starts_with(char::is_alphabetic) =>
@@ -354,7 +354,7 @@ impl Reader {
                 "numbers are written as 1000, 0.5 or 1e3".to_owned()
             }
             _ if unit.starts_with("x") => "numbers are written as 16, 0.5 or 1e3".to_owned(),
-            // Both signs for micro; letters that look like others.
+            // Both signs for micro; letters that look like other ones.
             _ if unit.starts_with(['µ', 'μ']) => {
                 let plain = unit.replacen(['µ', 'μ'], "u", 1);
                 format!("units have plain letters: \"{plain}\" for \"{unit}\"")

@@ -1,8 +1,8 @@
-//! What would mend a broken relation: values that are tried on the file before they are told.
+//! Advice for a broken relation: values that are tried on the file before they are proposed.
 //!
-//! A relation offers values with which it would hold itself. Another relation may refuse them, or a
-//! field's own range. So each offer is put into the file, which is checked again; what is refused is
-//! not told. Where no offer does alone, those are added that the relations broken by it ask for.
+//! A relation offers values with which it would hold. Another relation, or a field's own range, may refuse
+//! them. So each offer is put into the file, which is checked again; a refused offer is not proposed. Where
+//! no single offer is enough, offers of the relations that it breaks are added to it.
 
 use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
@@ -10,13 +10,13 @@ use std::collections::BTreeSet;
 use super::{Facts, Found, Relation};
 use crate::quantity::{pretty, suffix};
 
-/// Files that are tried at most for all relations of a file: each is read as a whole.
+/// Most files that are tried for all relations of a file: each is read in full.
 const TRIES: usize = 24;
-/// Where more than this is wrong, none is tried.
+/// With more errors than this, nothing is tried.
 const MOST_WRONG: usize = 20;
-/// Offers that are put together at most.
+/// Most offers that are combined.
 const TOGETHER: usize = 4;
-/// From a limit that is not allowed itself, the value that is tried is this share of it away.
+/// If a limit itself is not allowed, the tried value is this share of it away.
 const BESIDE: f64 = 1e-3;
 
 /// Another value for a field, with which the file would be accepted.
@@ -26,7 +26,7 @@ pub struct Advised {
     pub path: String,
     /// The value, in `unit`.
     pub value: f64,
-    /// The unit in which the file has the field.
+    /// The field's unit in the file.
     pub unit: String,
 }
 
@@ -37,7 +37,7 @@ pub(super) enum Bound {
     From,
     Below,
     Above,
-    /// This value and no other.
+    /// Only this value.
     At,
 }
 
@@ -47,7 +47,7 @@ pub(super) struct Offer {
     advised: Advised,
     bound: Bound,
     limit: f64,
-    /// What the limit is; may be empty.
+    /// Meaning of the limit; may be empty.
     of: String,
 }
 
@@ -91,7 +91,7 @@ impl Offer {
     }
 }
 
-/// A limit as it is printed, on its own side of what was worked out.
+/// A limit as printed, rounded to its own side of the computed value.
 fn written(limit: f64, bound: Bound) -> f64 {
     let printed = |value: f64| pretty(value).parse().unwrap_or(value);
     let inwards = match bound {
@@ -108,42 +108,42 @@ fn written(limit: f64, bound: Bound) -> f64 {
         .unwrap_or(limit)
 }
 
-/// What a file with other values would be refused for.
+/// Errors of a file with other values.
 pub(crate) struct Tried {
     /// Relations of fields.
     pub found: Vec<Found>,
-    /// The relation of the whole robot, or the parameter of the plant, if the rest was fit to ask.
+    /// The relation of the whole robot, or the parameter of the plant, if it was checked.
     pub whole: Option<&'static str>,
-    /// Everything else.
+    /// Number of all other errors.
     pub others: usize,
 }
 
 /// Reads the file again with other values in it.
 pub(crate) type Try<'a> = dyn Fn(&[Advised]) -> Option<Tried> + 'a;
 
-/// What a file with other values is.
+/// Result for a file with other values.
 enum Answer {
     Accepted,
-    /// A relation is broken that held before, or the one that was to be mended.
+    /// A relation is broken that held before, or the one to be mended.
     Broken(Found),
-    /// A range is left, the plant refuses it, or nobody asked.
+    /// A value is out of range, the plant refuses it, or it was not tried.
     Refused,
 }
 
-/// Looks for values that are accepted, in place of those of one broken relation.
+/// Searches for accepted values to replace those of one broken relation.
 pub(super) struct Search<'a> {
     before: BTreeSet<&'static str>,
     others: usize,
     attempt: &'a Try<'a>,
-    /// [`Tried::whole`] of the file as it is.
+    /// [`Tried::whole`] of the unchanged file.
     whole: OnceCell<Option<&'static str>>,
-    /// Tries that are left for a relation, and for all.
+    /// Tries left for a relation, and for all.
     left: Cell<usize>,
     all_left: Cell<usize>,
 }
 
 impl<'a> Search<'a> {
-    /// Of a file in which these are broken, and so much else is wrong.
+    /// For a file with these broken relations and `others` further errors.
     pub(super) fn new(found: &[Found], others: usize, attempt: &'a Try<'a>) -> Self {
         Self {
             before: found.iter().map(|found| found.relation.name).collect(),
@@ -158,13 +158,13 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether so much is wrong that not everything was tried.
+    /// Whether there were too many errors to try everything.
     pub(super) fn is_cut_short(&self) -> bool {
         self.left.get() == 0
     }
 
     /// Sets of offers that are each accepted: of one field if there are any, otherwise of several. This
-    /// relation and the `relations` - 1 after it share the tries that are left.
+    /// relation and the `relations` - 1 after it share the remaining tries.
     pub(super) fn accepted(&self, broken: &Found, relations: usize) -> Vec<Vec<Offer>> {
         self.left.set(self.all_left.get().div_ceil(relations));
         let offers = &broken.broken.offers;
@@ -189,8 +189,8 @@ impl<'a> Search<'a> {
         self.together(broken, begun).into_iter().collect()
     }
 
-    /// A narrower limit for the only field of a set, where `next`, the relation that it breaks, asks for
-    /// one; otherwise the narrowest that was tried, with the relation that it still breaks.
+    /// A narrower limit for the only field of a set, if `next`, the relation that it breaks, asks for one;
+    /// otherwise the narrowest one tried, with the relation that it still breaks.
     fn narrowed(
         &self,
         broken: &Found,
@@ -228,7 +228,7 @@ impl<'a> Search<'a> {
             return Answer::Refused;
         };
         let own = broken.relation.name;
-        // A relation that was broken before is another problem, unless these fields are its own, too.
+        // A relation that was broken before is another problem, unless it has these fields, too.
         let new = |found: &Found| {
             let Relation { name, fields, .. } = *found.relation;
             let shares = || {
@@ -239,13 +239,13 @@ impl<'a> Search<'a> {
         };
         let mut next: Vec<Found> = tried.found.into_iter().filter(new).collect();
         if !next.is_empty() {
-            // One that knows what would mend it leads further.
+            // A relation with offers of its own leads further.
             let helpful = next
                 .iter()
                 .position(|found| !found.broken.offers.is_empty());
             return Answer::Broken(next.swap_remove(helpful.unwrap_or(0)));
         }
-        // What is as wrong without these values is not their fault.
+        // An error that is the same without these values is not their fault.
         let before = || (self.attempt)(&[]).and_then(|tried| tried.whole);
         match tried.whole {
             Some(whole) if *self.whole.get_or_init(before) != Some(whole) => Answer::Refused,
@@ -253,7 +253,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Sets that break other relations, with what those ask for: the smallest sets first, and each once.
+    /// Sets that break other relations, with the offers of those: the smallest sets first, and each once.
     fn together(&self, broken: &Found, mut begun: Vec<(Vec<Offer>, Found)>) -> Option<Vec<Offer>> {
         let mut tried: BTreeSet<Vec<(String, u64)>> =
             broken.broken.offers.iter().map(|set| key(set)).collect();
@@ -279,7 +279,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// What a set puts into a file.
+/// The values that a set puts into a file.
 fn key(set: &[Offer]) -> Vec<(String, u64)> {
     let of = |Offer { advised, .. }: &Offer| (advised.path.clone(), advised.value.to_bits());
     let mut key: Vec<_> = set.iter().map(of).collect();
@@ -287,7 +287,7 @@ fn key(set: &[Offer]) -> Vec<(String, u64)> {
     key
 }
 
-/// The same sets for a file that has the fields elsewhere.
+/// The same sets for a file with other paths of the fields.
 pub(super) fn renamed(mut sets: Vec<Vec<Offer>>, path: impl Fn(&str) -> String) -> Vec<Vec<Offer>> {
     for offer in sets.iter_mut().flatten() {
         offer.advised.path = path(&offer.advised.path);
@@ -295,7 +295,7 @@ pub(super) fn renamed(mut sets: Vec<Vec<Offer>>, path: impl Fn(&str) -> String) 
     sets
 }
 
-/// The values of some sets, one of which is to be taken.
+/// The values of some sets, as alternatives.
 pub(super) fn values(sets: &[Vec<Offer>]) -> Vec<Vec<Advised>> {
     let own = |set: &Vec<Offer>| set.iter().map(|offer| offer.advised.clone()).collect();
     sets.iter().map(own).collect()

@@ -1,9 +1,9 @@
-//! What the motion and the commands of a scenario ask of the robot that carries them out.
+//! Checks a scenario's motion and commands against the robot that carries them out.
 //!
-//! A command brings values into a run of which the robot's file has others. Each relation of the table
-//! that such a value has a part in is judged again with it: of a gait at once, of a board's parameters
-//! where the board is armed with them, or left with them at the end. What a motion or a command asks of a cylinder or a leg is no
-//! field of the robot's file, and has no entry in the table.
+//! A command can replace values of the robot's file during a run. Each relation in which such a value takes
+//! part is judged again with it: those of a gait at once, those of a board's parameters when the board is
+//! armed with them, or at the end if they are left so. Demands of a motion or a command on a cylinder or a
+//! leg are not fields of the robot's file, and have no entry in the table.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::{replace, take};
@@ -30,7 +30,7 @@ use crate::reader::Reader;
 use crate::scenario::{EventAction, LegChoice, Motion, Scenario};
 use crate::{Advised, RobotConfig, command};
 
-/// Fields of a gait that make its start pose.
+/// Fields of a gait that determine its start pose.
 const POSE: [&str; 4] = [
     "gait.yaw_s2",
     "gait.stroke",
@@ -41,11 +41,11 @@ const POSE: [&str; 4] = [
 const STROKE: &str = "cylinder.stroke";
 
 impl Scenario {
-    /// Whether this robot can do what the motion and the commands ask for.
+    /// Checks whether this robot can do what the motion and the commands ask for.
     ///
     /// # Errors
-    /// [`ConfigError`] with everything that it cannot: the fields of the scenario and of the robot, and
-    /// what is allowed.
+    /// [`ConfigError`] with everything that it cannot do: the fields of the scenario and of the robot, and
+    /// the allowed values.
     pub fn check_with(&self, robot: &RobotConfig) -> Result<(), ConfigError> {
         Judge::new(self, robot).all()
     }
@@ -53,36 +53,36 @@ impl Scenario {
 
 /// A joint board whose parameters a scenario writes.
 struct Board {
-    /// What it has, by number.
+    /// Its parameters, by number.
     stored: Vec<(u16, i32)>,
-    /// The event that has written a parameter last.
+    /// The last event that wrote each parameter.
     writers: BTreeMap<u16, usize>,
     judged: bool,
-    /// Relations that it was refused for, with the values of their fields.
+    /// Relations for which it was refused, with the values of their fields.
     refused: BTreeSet<Refused>,
 }
 
-/// The name of a relation and the bits of what its fields say.
+/// The name of a relation and the bits of its fields' values.
 type Refused = (&'static str, Vec<Vec<u64>>);
 
 struct Judge<'a> {
     scenario: &'a Scenario,
     robot: &'a RobotConfig,
-    /// The scenario's file once more, where a value of it is needed, with what is wrong.
+    /// The scenario's file, read again if one of its values is needed, with the errors.
     reader: Option<Reader>,
-    /// Of the robot, with the values of the gait that it has been given.
+    /// Parameters of the robot, with the values of the newest gait.
     parameters: Vec<ParameterInfo>,
     gait: MasterGait,
     /// Poses in which it stands, by the bits of their fields.
     poses: BTreeSet<[u64; POSE.len()]>,
     boards: Vec<Board>,
     disarmed: bool,
-    /// Whether an emergency stop holds the boards: what clears it leaves them disarmed.
+    /// Whether an emergency stop holds the boards: clearing it leaves them disarmed.
     stopped: bool,
 }
 
-/// Field of a scenario that is in place of one of the robot, by the path of that, and what it is
-/// called beside its path.
+/// Field of a scenario that replaces one of the robot, by the path of that one, and its description beside
+/// its path.
 type Brought = BTreeMap<String, (String, String)>;
 
 impl<'a> Judge<'a> {
@@ -105,7 +105,7 @@ impl<'a> Judge<'a> {
             disarmed: false,
             stopped: false,
         };
-        // Its file was refused otherwise.
+        // Otherwise its file was refused.
         judge.poses.insert(judge.pose());
         judge
     }
@@ -161,12 +161,12 @@ impl<'a> Judge<'a> {
         Ok(self.reader.insert(reader))
     }
 
-    /// The quantities of an event as they are written, by their keys.
+    /// The quantities of an event as written, by their keys.
     fn written(&mut self, at: usize) -> Result<BTreeMap<String, ParameterInfo>, ConfigError> {
         let reader = self.reader()?;
         let entry = reader.entry("events", at);
         let before = reader.parameters().len();
-        // It was accepted once.
+        // It was accepted before.
         let _ = command::read(reader, &entry, &[]);
         let own = reader.parameters().iter().skip(before);
         let own = own.filter_map(|info| {
@@ -185,7 +185,7 @@ impl<'a> Judge<'a> {
         format!("`{path}`{value} of {}", self.robot.file)
     }
 
-    /// Reports what these fields of the scenario ask and the robot's `path` does not allow.
+    /// Reports a demand of these fields of the scenario that the robot's `path` does not allow.
     fn refuse(
         &mut self,
         fields: &[String],
@@ -207,7 +207,7 @@ impl<'a> Judge<'a> {
             Motion::Stand | Motion::SquareWave { .. } => Ok(()),
             Motion::Walk(order) => {
                 self.walk("motion", "kind")?;
-                // It is set down with its nose as low as that.
+                // The robot is set down with its nose that low.
                 let left_m = self.robot.gait.stroke_m + order.nose_mm.to_f64() * 1e-3;
                 if left_m >= -ROUNDING {
                     return Ok(());
@@ -243,13 +243,13 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The shortest of the cylinders, m.
+    /// The shortest stroke of the cylinders, m.
     fn stroke_m(&self) -> f64 {
         let strokes = self.robot.plant.cylinders.iter().map(|c| c.stroke_m);
         strokes.fold(f64::INFINITY, f64::min)
     }
 
-    /// A walk is planned with the strokes of the paper's leg.
+    /// Checks a walk, which is planned with the strokes of the paper's leg.
     fn walk(&mut self, path: &str, key: &str) -> Result<(), ConfigError> {
         let least_m = STROKE_MM.to_f64() * 1e-3;
         if self.stroke_m() >= least_m * (1.0 - ROUNDING) {
@@ -265,10 +265,10 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// A reference that no piston reaches.
+    /// Checks a reference that no piston may reach.
     fn reference(&mut self, at: usize) -> Result<(), ConfigError> {
         let most_m = self.stroke_m();
-        // What the command itself admits is less.
+        // The command's own limit is narrower.
         if most_m >= STROKE_MM.to_f64() * 1e-3 {
             return Ok(());
         }
@@ -302,7 +302,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// Whether the foot of `side` can go so far forward, to the left and up, mm, from the start pose.
+    /// Whether the foot of `side` can move this far forward, to the left and up, mm, from the start pose.
     fn reaches(&self, side: Side, [forward, left, height]: [f64; 3], rate_rad_s: f32) -> bool {
         let mut leg = self.robot.walk_geometry().leg;
         let stroke_m = self.stroke_m() as f32;
@@ -325,7 +325,7 @@ impl<'a> Judge<'a> {
         !matches!(path, Err(ParamError::OutOfReach { .. }))
     }
 
-    /// A path that leaves the reach of its leg. `keys`: fields of the three lengths.
+    /// Checks a path that may leave the reach of its leg. `keys`: fields of the three lengths.
     fn foot(
         &mut self,
         path: &str,
@@ -373,7 +373,7 @@ impl<'a> Judge<'a> {
         self.refuse(&fields, &paths, (why, &allowed), advice)
     }
 
-    /// The largest length in one direction with which the path is in reach, in tenths of a millimetre.
+    /// The largest length in one direction for which the path is in reach, in tenths of a millimetre.
     fn farthest(&self, side: Side, asked: [f64; 3], i: usize, rate_rad_s: f32) -> Option<f64> {
         let with = |tenths: f64| {
             let mut asked = asked;
@@ -401,7 +401,7 @@ impl<'a> Judge<'a> {
         POSE.map(|path| facts.si(path).unwrap_or(f64::NAN).to_bits())
     }
 
-    /// Another gait.
+    /// Checks and takes over another gait.
     fn set_gait(&mut self, at: usize, gait: MasterGait) -> Result<(), ConfigError> {
         if replace(&mut self.gait, gait) == gait {
             return Ok(());
@@ -426,7 +426,7 @@ impl<'a> Judge<'a> {
         judged
     }
 
-    /// A parameter that a joint's board takes; what it refuses changes nothing.
+    /// Takes over a parameter that a joint's board accepts; a refused one changes nothing.
     fn write(&mut self, at: usize, node: u8, id: u16, raw: i32) -> Result<(), ConfigError> {
         let index = usize::from(node).wrapping_sub(1);
         let info = JOINT_PARAMS.iter().find(|info| info.id == id);
@@ -452,7 +452,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// All boards are armed with what they have.
+    /// Arms all boards with their parameters.
     fn arm(&mut self) -> Result<(), ConfigError> {
         self.disarmed = false;
         (0..self.boards.len()).try_for_each(|index| self.judge_board(index))
@@ -478,15 +478,15 @@ impl<'a> Judge<'a> {
             let called = format!(", the `{}` of board {}", info.name, index + 1);
             brought.insert(path, (format!("events[{at}].value"), called));
         }
-        // What is as wrong as it was is told once, whatever is written beside it.
+        // An error that stays the same is reported once, whatever else is written.
         let mut refused = take(&mut board.refused);
         let judged = self.judge(&parameters, &brought, false, &mut refused);
         self.boards[index].refused = refused;
         judged
     }
 
-    /// Judges the table with what the scenario has brought; `new_pose`: in another start pose, too. What
-    /// is `refused` already is left out, and what is told now is added to it.
+    /// Judges the table with the values that the scenario brought; `new_pose`: in another start pose, too.
+    /// Leaves out errors that are in `refused`, and adds those that it reports.
     fn judge(
         &mut self,
         parameters: &[ParameterInfo],
@@ -504,7 +504,7 @@ impl<'a> Judge<'a> {
         if found.is_empty() {
             found.extend(whole(&facts));
         }
-        // The robot is what it is: values of the scenario's own fields alone would mend it.
+        // The robot is fixed: only values of the scenario's own fields can mend it.
         let attempt = |values: &[Advised]| {
             let mut tried = parameters.to_vec();
             for Advised { path, value, .. } in values {
@@ -535,7 +535,7 @@ impl<'a> Judge<'a> {
             ));
         }
         for (one, ((why, allowed), advice)) in found.iter().zip(told) {
-            // What an earlier event is to blame for has been told there.
+            // Errors caused by an earlier event have been reported there.
             let is_own = one
                 .relation
                 .fields
@@ -567,7 +567,7 @@ impl<'a> Judge<'a> {
     ) -> Result<(), ConfigError> {
         let mut paths = found.relation.fields.to_vec();
         if let Rule::AtRest(_) = found.relation.rule {
-            // What stands or is carried depends on the pose.
+            // Standing and load depend on the pose.
             let missing = POSE
                 .iter()
                 .filter(|path| !found.relation.fields.contains(path));

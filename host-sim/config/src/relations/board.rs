@@ -8,7 +8,7 @@ use crate::derived::{DERIVED, limits};
 use crate::quantity::{brief, suffix};
 use crate::reader::range;
 
-/// A quantity that is made of several fields, within the limits of the board's parameter.
+/// A quantity computed from several fields, within the limits of the board's parameter.
 pub(super) fn within_limits(axis: &AxisParams, parameter: JointParam) -> Option<Broken> {
     let derived = DERIVED.iter().find(|row| row.parameter == parameter)?;
     if derived.fits(axis) {

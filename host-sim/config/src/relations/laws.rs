@@ -1,4 +1,4 @@
-//! Relations of a few fields that are more than an order.
+//! Relations of a few fields that are more than an order of size.
 
 use wheeleg_master::contact::Side;
 use wheeleg_master::layer1::params::{GaitParams as MasterGait, ParamError, Pattern};
@@ -11,11 +11,11 @@ use crate::law::PREDICTIVE;
 use crate::params::{FieldSpec, Params as _};
 use crate::quantity::{Dimension, brief, pretty};
 
-/// Shares of its track between which a wiper stands: beyond, a board takes it for torn off or
-/// shorted. As a commissioned board is told.
+/// Range of a wiper on its track, as shares of the track: beyond it, a board takes the sensor for torn off or
+/// shorted. Same as in a commissioned board.
 pub const SENSOR_TRACK: [f64; 2] = [0.01, 0.99];
 
-/// What no value of one field says.
+/// An error that no single field can mend.
 fn broken(figures: String, words: String) -> Option<Broken> {
     Some(Broken {
         figures,
@@ -52,10 +52,10 @@ pub(super) fn droop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// How far the density of a gas may be from that of an ideal one, share: tables are rounded.
+/// Largest deviation of a gas's density from that of an ideal one, share: tables are rounded.
 const DENSITY: f64 = 0.05;
 
-/// Density, pressure, gas constant and temperature of the reference are those of one gas.
+/// Density, pressure, gas constant and temperature of the reference belong to one gas.
 pub(super) fn density(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [density, pressure, constant, temperature] = [0, 1, 2, 3].map(|i| f.si(it.fields[i]));
     let (density, pressure, constant, temperature) = (density?, pressure?, constant?, temperature?);
@@ -65,7 +65,7 @@ pub(super) fn density(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if (low - ROUNDING..=high + ROUNDING).contains(&share) {
         return None;
     }
-    // Each field alone, up to where the share is allowed.
+    // Each field alone, up to the allowed share.
     let (near, bounds) = match share < low {
         true => (low, [Bound::From, Bound::UpTo, Bound::From, Bound::From]),
         false => (high, [Bound::UpTo, Bound::From, Bound::UpTo, Bound::UpTo]),
@@ -91,7 +91,7 @@ pub(super) fn density(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// A motor draws no more than its model means, driven against its supply at full speed.
+/// A motor draws no more current than its model allows, driven against its supply at full speed.
 pub(super) fn current(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [resistance, supply] = [0, 1].map(|i| f.si(it.fields[i]));
     let (resistance_ohm, supply_v) = (resistance?, supply?);
@@ -187,7 +187,7 @@ pub(super) fn track(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The wiper stands on its track with the rod in.
+/// The wiper is on its track with the rod in.
 pub(super) fn begin(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (offset_m, electrical_m) = (f.si(it.fields[0])?, f.si(it.fields[1])?);
     let least_m = SENSOR_TRACK[0] * electrical_m;
@@ -203,10 +203,10 @@ pub(super) fn begin(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The gait as the master has it, if the fields of this relation can be read.
+/// The gait in the master's form, if the fields of this relation can be read.
 fn gait(f: &Facts<'_>, it: &Relation) -> Option<MasterGait> {
     it.fields.iter().try_for_each(|path| f.si(path).map(drop))?;
-    // What else cannot be read has no part in the relation.
+    // Other fields, which may be unreadable, have no part in the relation.
     let value = |spec: &FieldSpec| match spec.dimension {
         Dimension::Flag => vec![0.0],
         _ => vec![f.si(&format!("gait.{}", spec.key)).unwrap_or(spec.min)],
@@ -217,7 +217,7 @@ fn gait(f: &Facts<'_>, it: &Relation) -> Option<MasterGait> {
     Some(gait.of_master(Pattern::Single(Side::Left)))
 }
 
-/// A push ends within its step, as the master has it.
+/// A push ends within its step, by the master's own calculation.
 pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (needs_us, has_us) = gait(f, it)?.violations().find_map(|error| match error {
         ParamError::PushTooLong { needs_us, has_us } => Some((needs_us, has_us)),
@@ -231,7 +231,7 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         Offer::new(f, period, Bound::From, push_s + needs_s),
         Offer::new(f, push, Bound::UpTo, period_s - needs_s),
     ];
-    // The speed v at which a trapezoid takes the time t that there is: s/v + v/a = t.
+    // The speed v at which a trapezoid takes the available time t: s/v + v/a = t.
     let (s, a, t) = (f.si(stroke)?, f.si(acceleration)?, period_s - push_s);
     let root = a * t * a * t - 4.0 * a * s;
     if root >= 0.0 {
@@ -249,7 +249,7 @@ pub(super) fn push(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The slow way of a foot down to the ground ends before the push begins, as the master has it.
+/// The slow descent of a foot to the ground ends before the push begins, by the master's own calculation.
 pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let [speed, lower, push, stroke] = [0, 1, 2, 3].map(|i| it.fields[i]);
     let gait = gait(f, it)?;
@@ -279,8 +279,8 @@ pub(super) fn touchdown(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// Of the three principal inertias of a body none exceeds the sum of the others: each is a
-/// sum of two of ∫x² dm, ∫y² dm, ∫z² dm.
+/// None of the three principal inertias of a body exceeds the sum of the others: each is a sum of two of ∫x²
+/// dm, ∫y² dm, ∫z² dm.
 fn inertias(inertia_kg_m2: [f64; 3]) -> Option<Broken> {
     let sum: f64 = inertia_kg_m2.iter().sum();
     let largest = inertia_kg_m2.into_iter().fold(0.0, f64::max);
@@ -314,12 +314,12 @@ pub(super) fn link_inertias(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     inertias(f.list(it.fields[0])?)
 }
 
-/// Denser than any metal that robots are made of, kg/m³: tungsten and gold have 19,300.
+/// Denser than any metal used in robots, kg/m³: tungsten and gold have 19,300.
 const DENSEST_KG_M3: f64 = 2e4;
 
-/// A body of a mass has a size, and so inertias. The smallest for its mass is a ball: of no body is
-/// the largest inertia below that of a ball. One that is long may be thin: its smallest inertia is
-/// at least that of a rod as long as the largest one says.
+/// A body of a mass has a size, and so inertias. A ball has the smallest ones for its mass: no body's largest
+/// inertia is below that of a ball. A long body may be thin: its smallest inertia is at least that of a rod
+/// whose length follows from the largest one.
 fn size(inertia_kg_m2: [f64; 3], mass_kg: f64) -> Option<Broken> {
     use std::f64::consts::PI;
     let largest = inertia_kg_m2.into_iter().fold(0.0, f64::max);
@@ -329,7 +329,7 @@ fn size(inertia_kg_m2: [f64; 3], mass_kg: f64) -> Option<Broken> {
     // Of a rod: m l²/12 across, m r²/2 along, and its mass is ρ π r² l.
     let length_m = (12.0 * largest / mass_kg).sqrt();
     let along = mass_kg * mass_kg / (2.0 * PI * DENSEST_KG_M3 * length_m);
-    // As it is printed, on its own side.
+    // As printed, on its own side.
     let upwards = |value: f64| 1.001 * value;
     let tonnes = brief(DENSEST_KG_M3 * 1e-3);
     if largest < ball {
@@ -408,7 +408,7 @@ pub(super) fn belly(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// What a track must be for a chassis that reaches so far to a side.
+/// The smallest track for a chassis that reaches this far to a side.
 fn wide_enough(f: &Facts<'_>, half_m: f64) -> Option<Broken> {
     let (track_m, width_m) = (f.si("spatial.track")?, f.si("spatial.wheel_width")?);
     let least_m = 2.0 * half_m + width_m;
@@ -460,14 +460,14 @@ pub(super) fn gravity(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// From so near to the end of the stroke that it is told, a board with a precharge presses its piston
-/// against the stop, mm; and so far beside the stop it takes it for pressed (`SEAT_TARGET` and
+/// Within the first distance of the configured end of the stroke, a board with a precharge presses its piston
+/// against the stop, mm; within the second of the stop it takes the piston for pressed (`SEAT_TARGET` and
 /// `SEATED_WITHIN` of the predictive law).
 pub const SEAT_MM: [f64; 2] = [0.5, 1.5];
 
-/// The stop against which a board presses is where it takes it to be.
+/// The stop against which a board presses is at its configured place.
 pub(super) fn seat(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
-    // Where a kind of joint has values of its own, those of all say nothing.
+    // If a kind of joint has its own values, those for all joints do not count.
     let own = |path: &str| {
         let key = path.rsplit_once('.').map_or(path, |(_, key)| key);
         let mut kinds = ["yaw", "horizontal", "vertical"].into_iter();
@@ -499,18 +499,18 @@ pub(super) fn seat(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The field that decides what boards of a kind have, their own or that of all boards, and its value.
+/// The field that sets a parameter for a kind of board, its own or that for all boards, and its value.
 fn decides<'a>(f: &Facts<'_>, own: &'a str, all: &'a str) -> Option<(&'a str, f64)> {
     let found = |path| f.si(path).map(|value| (path, value));
     found(own).or_else(|| found(all))
 }
 
-/// Where the gait needs its pistons is within what their boards are told, to what counts as settled.
+/// The gait keeps its pistons within the limits set in their boards, to the settling tolerance.
 pub(super) fn reach(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     reached(f, it, &[])
 }
 
-/// The same of those that the gait also draws in.
+/// The same for pistons that the gait also draws in.
 pub(super) fn reach_from_home(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     reached(f, it, &[0.0])
 }
@@ -543,7 +543,7 @@ fn reached(f: &Facts<'_>, it: &Relation, home_mm: &[f64]) -> Option<Broken> {
         pretty(least_mm),
         pretty(most_mm)
     );
-    // Both ends where both are wrong.
+    // Both ends if both are wrong.
     Some(Broken {
         figures,
         offers: vec![offers],
@@ -551,7 +551,7 @@ fn reached(f: &Facts<'_>, it: &Relation, home_mm: &[f64]) -> Option<Broken> {
     })
 }
 
-/// A board believes its piston to be as fast as it leads it.
+/// A board accepts measured speeds as high as those it commands.
 pub(super) fn credible(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (rate, rate_mm_s) = decides(f, it.fields[0], it.fields[1])?;
     let (slew, slew_mm_s) = decides(f, it.fields[2], it.fields[3])?;
@@ -567,10 +567,10 @@ pub(super) fn credible(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     )
 }
 
-/// The least timer with which a wheel board makes profiles (HCTL-1100 data sheet, sample timer).
+/// Smallest timer with which a wheel board makes profiles (HCTL-1100 data sheet, sample timer).
 const PROFILE_TIMER: f64 = 15.0;
 
-/// A wheel board that makes its own profiles has time for it.
+/// A wheel board that makes its own profiles has enough time for it.
 pub(super) fn profiles(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let (timer, streamed) = (f.si(it.fields[0])?, f.si(it.fields[1])?);
     if timer >= PROFILE_TIMER || streamed != 0.0 {

@@ -1,10 +1,9 @@
-//! What the fields of a file must be to each other, though each is within its own range.
+//! Relations between the fields of a file, each of which may be within its own range.
 //!
-//! [`RELATIONS`] is the table. Each entry names its fields and says what they must be; a check
-//! sees the listed values of the file, so that it works beside sections that are wrong or
-//! missing. Those of the whole plant come last, where nothing else is wrong. An [`Offer`] is told only
-//! if it was tried on the whole file ([`advice`]). What several fields decide together is told in words,
-//! which nobody tries.
+//! [`RELATIONS`] is the table. Each entry names its fields and their relation; a check sees the listed values
+//! of the file, so it works even if other sections are wrong or missing. Relations of the whole plant come
+//! last, once nothing else is wrong. An [`Offer`] is proposed only if it was tried on the whole file
+//! ([`advice`]). A limit that depends on several fields is given in words, and is not tried.
 
 mod advice;
 mod asked;
@@ -34,18 +33,18 @@ use crate::params::ParameterInfo;
 use crate::quantity::{brief, pretty, suffix};
 use crate::reader::Reader;
 
-/// To the rounding of conversions.
+/// Rounding of conversions.
 const ROUNDING: f64 = 1e-9;
 
-/// What some fields of a file must be to each other.
+/// A relation between some fields of a file.
 #[derive(Debug, Clone, Copy)]
 pub struct Relation {
     /// Name.
     pub name: &'static str,
-    /// Paths of the fields; the first is the one that a refusal points at. What a file has not got,
-    /// as a robot has no `moving.load`, is left out.
+    /// Paths of the fields; a refusal points at the first. Fields that a file lacks, as a robot has no
+    /// `moving.load`, are left out.
     pub fields: &'static [&'static str],
-    /// What is wrong where it does not hold.
+    /// The error if it does not hold.
     pub broken: &'static str,
     rule: Rule,
 }
@@ -61,44 +60,44 @@ enum Rule {
     Below,
     /// The first field is above the other, or the sum of the others.
     Above,
-    /// This parameter of a joint board, as it follows from the axis, is within its limits.
+    /// This parameter of a joint board, computed from the axis, is within its limits.
     BoardLimits(JointParam),
-    /// Something else of the fields, or of the cylinder that they make.
+    /// Another law of the fields, or of the cylinder that they describe.
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
-    /// Something of the whole robot, where nothing else is wrong.
+    /// A law of the whole robot, checked if nothing else is wrong.
     Whole(fn(&Facts<'_>, &PlantParams) -> Option<Broken>),
-    /// The same of the robot at rest in its start pose.
+    /// The same for the robot at rest in its start pose.
     AtRest(fn(&AtRest) -> Option<Broken>),
 }
 
 /// A relation that does not hold.
 #[derive(Debug, Default)]
 struct Broken {
-    /// The figures of it; may be empty.
+    /// Its figures; may be empty.
     figures: String,
     /// Sets of values with which this relation would hold.
     offers: Vec<Vec<Offer>>,
-    /// What is allowed beyond these; may be empty where there are offers.
+    /// Allowed values beyond these; may be empty if there are offers.
     words: String,
 }
 
-/// A relation of the table that a file breaks.
+/// A relation of the table that does not hold in a file.
 pub(crate) struct Found {
     relation: &'static Relation,
     broken: Broken,
 }
 
-/// What a file says.
+/// The contents of a file.
 struct Facts<'a> {
     parameters: &'a [ParameterInfo],
     moved: Option<&'a Moved<'a>>,
     axis: Option<&'a AxisParams>,
 }
 
-/// What was made of a file, as far as it could be read.
+/// The plant read from a file, as far as possible.
 #[derive(Default)]
 pub(crate) struct Read<'a> {
-    /// A cylinder with what it moves.
+    /// A cylinder and its load.
     pub moved: Option<Moved<'a>>,
     /// The axis, if it is one.
     pub axis: Option<&'a AxisParams>,
@@ -119,7 +118,7 @@ impl<'a> Facts<'a> {
         self.parameters.iter().find(|p| p.path == path)
     }
 
-    /// Unit in which a parameter is written, and its size in SI; a board's parameter stays in its.
+    /// Unit of a parameter in the file, and its size in SI; a board's parameter keeps its own.
     fn unit(&self, path: &str) -> Option<(f64, &str)> {
         let info = self.info(path)?;
         let factor = info.dimension.and_then(|d| d.factor(&info.unit));
@@ -132,19 +131,19 @@ impl<'a> Facts<'a> {
         Some(value * self.unit(path)?.0)
     }
 
-    /// Those of a list in SI.
+    /// The values of a list in SI.
     fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
         let list: [f64; N] = self.info(path)?.value.as_slice().try_into().ok()?;
         let (factor, _) = self.unit(path)?;
         Some(list.map(|value| value * factor))
     }
 
-    /// Up to, from or at a value in SI, for one field.
+    /// An offer for one field: up to, from or at a value in SI.
     fn offer(&self, path: &str, bound: Bound, si: f64) -> Vec<Offer> {
         vec![Offer::new(self, path, bound, si)]
     }
 
-    /// A value in SI as a file would have it at a path.
+    /// A value in SI, written as in a file at this path.
     fn format(&self, path: &str, si: f64) -> String {
         let (factor, unit) = self.unit(path).unwrap_or((1.0, ""));
         format!("{}{}", pretty(si / factor), suffix(unit))
@@ -152,7 +151,7 @@ impl<'a> Facts<'a> {
 }
 
 impl Relation {
-    /// Of the relations of fields those that do not hold.
+    /// Checks a relation between fields; `None` if it holds.
     fn check(&self, facts: &Facts<'_>) -> Option<Broken> {
         let first = self.fields[0];
         let value = |i: usize| facts.si(self.fields[i]);
@@ -221,7 +220,7 @@ impl Relation {
         }
     }
 
-    /// Why it does not hold, and what is allowed.
+    /// Why it does not hold, and the allowed values.
     fn message(&self, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) -> (String, String) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
@@ -250,7 +249,7 @@ impl Relation {
     }
 }
 
-/// Every relation that does not hold of the listed values and of the cylinder with what it moves.
+/// Every broken relation of the listed values and of the cylinder with its load.
 fn broken(facts: &Facts<'_>) -> Vec<Found> {
     let found = |relation: &'static Relation| {
         let broken = relation.check(facts)?;
@@ -259,9 +258,9 @@ fn broken(facts: &Facts<'_>) -> Vec<Found> {
     RELATIONS.iter().filter_map(found).collect()
 }
 
-/// The first relation that does not hold of the whole robot.
+/// The first broken relation of the whole robot.
 fn broken_whole(facts: &Facts<'_>, robot: &PlantParams) -> Option<Found> {
-    // A rest is looked for once, and only where a leg closes.
+    // The rest pose is computed once, and only if a leg closes.
     let at_rest = LazyCell::new(|| AtRest::new(facts, robot));
     RELATIONS.iter().find_map(|relation| {
         let broken = match relation.rule {
@@ -273,11 +272,11 @@ fn broken_whole(facts: &Facts<'_>, robot: &PlantParams) -> Option<Found> {
     })
 }
 
-/// Reports every relation that does not hold, with values that the file would be accepted with.
+/// Reports every broken relation, with values for which the file would be accepted.
 pub(crate) fn check(r: &mut Reader, read: &Read<'_>, attempt: &Try<'_>) {
     let facts = Facts::of(r, read);
     let mut found = broken(&facts);
-    // What the others name, that of the whole robot would name less well.
+    // The other relations name an error better than that of the whole robot.
     if r.is_clean() && found.is_empty() {
         found.extend(read.robot.and_then(|robot| broken_whole(&facts, robot)));
     }
@@ -290,7 +289,7 @@ pub(crate) fn check(r: &mut Reader, read: &Read<'_>, attempt: &Try<'_>) {
     }
 }
 
-/// What a file is refused for, to compare with the same file with other values in it.
+/// The errors of a file, to compare with those of the same file with other values.
 pub(crate) fn tried(
     r: &Reader,
     read: &Read<'_>,
@@ -313,7 +312,7 @@ pub(crate) fn tried(
     }
 }
 
-/// What the plant itself refuses, so that its answer, too, names file and field.
+/// Reports an error of the plant itself, so that it, too, names file and field.
 pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
     let Err(error) = built else { return };
     match error {
@@ -324,10 +323,10 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
             max,
         } => {
             let field = r.listed(name).unwrap_or_else(|| name.to_owned());
-            // In the unit of the file, where the field is one of it.
+            // In the file's unit, if the field is in the file.
             let (factor, unit) = r.unit_of(&field).unwrap_or((1.0, "in SI units".to_owned()));
             let what = if value > max { "much" } else { "little" };
-            // What the step must follow hangs on what moves with it.
+            // The motion that the step must follow depends on the moving mass.
             let moves = match field.split('.').next() {
                 Some("contact") => "link.vertical_rod.mass",
                 Some("wheel_contact") => "body.wheel_mass",

@@ -1,4 +1,4 @@
-//! Whether a step of the plant follows what is stiff: friction, end stops, air.
+//! Whether a step of the plant can follow stiff parts: friction, end stops, air.
 //!
 //! The plant advances by a kick, a drift and a kick of half a step each, with speeds predicted
 //! half a step ahead. On m a = −c v − k x this is stable while
@@ -25,10 +25,10 @@ const GAS_LIMIT: f64 = 2.0;
 const SHORTEST_STEP_S: f64 = 1e-6;
 /// Its field.
 const STEP: &str = "numerics.step";
-/// A piston runs into its stop this many times deeper than its full force presses it.
+/// A piston that hits its stop goes this many times deeper than under its full force at rest.
 const IMPACT: f64 = 2.0;
 
-/// One cylinder with what it moves.
+/// One cylinder and its load.
 pub(crate) struct Moved<'a> {
     /// The cylinder.
     pub cylinder: &'a CylinderParams,
@@ -36,7 +36,7 @@ pub(crate) struct Moved<'a> {
     pub gas: &'a GasParams,
     /// Its supply.
     pub supply: &'a SupplyParams,
-    /// What moves, kg.
+    /// Moving mass, kg.
     pub mass_kg: f64,
     /// Force of the load, N, without sign.
     pub load_n: f64,
@@ -44,7 +44,7 @@ pub(crate) struct Moved<'a> {
     pub step_s: f64,
 }
 
-/// The least mass that the step of an axis can follow \[kg\]; `None` where it follows the axis's own.
+/// Smallest mass that the step of an axis can follow \[kg\]; `None` if it follows the axis's own.
 #[must_use]
 pub fn least_mass_kg(axis: &AxisParams) -> Option<f64> {
     let moved = Moved::of(axis);
@@ -55,7 +55,7 @@ pub fn least_mass_kg(axis: &AxisParams) -> Option<f64> {
 }
 
 impl<'a> Moved<'a> {
-    /// That of an axis.
+    /// The cylinder of an axis.
     pub(crate) fn of(axis: &'a AxisParams) -> Self {
         Self {
             cylinder: &axis.cylinder,
@@ -79,7 +79,7 @@ impl Moved<'_> {
         self.piston_m2() * gauge_pa.max(0.0) + self.load_n
     }
 
-    /// Friction alone.
+    /// Only friction.
     fn of_friction(&self) -> Oscillator {
         let f = &self.cylinder.friction;
         Oscillator {
@@ -92,8 +92,8 @@ impl Moved<'_> {
     /// In its end stop.
     fn in_end_stop(&self) -> Oscillator {
         let (friction, stop) = (self.of_friction(), &self.cylinder.end_stop);
-        // Hunt–Crossley: k d (1 + λ d') damps with λ times the static force. The cushion acts on
-        // the way in alone: in half of an oscillation.
+        // Hunt–Crossley: k d (1 + λ d') damps with λ times the static force. The cushion acts only on the way
+        // in: in half of an oscillation.
         Oscillator {
             damping_n_s_m: friction.damping_n_s_m
                 + 0.5 * stop.cushion_damping_n_s_m
@@ -141,13 +141,12 @@ impl Oscillator {
         (0.9 * longest_s * 1e6).floor().max(1.0) * 1e-6
     }
 
-    /// A tenth above the mass for which the step is just too long.
+    /// A tenth above the mass for which the step is slightly too long.
     fn least_mass_kg(&self) -> f64 {
         (1.1 * self.number() * self.mass_kg * 1e4).ceil() * 1e-4
     }
 
-    /// What is wrong with one whose step is too long, and with which step or mass it and the other
-    /// would do.
+    /// The error for one whose step is too long, with a step or a mass that is enough for it and the other.
     fn broken(&self, other: &Self, f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         if self.number() < STEP_LIMIT {
             return None;
@@ -155,7 +154,7 @@ impl Oscillator {
         let mass = it.fields.last()?;
         let step_s = self.longest_step_s().min(other.longest_step_s());
         let mass_kg = self.least_mass_kg().max(other.least_mass_kg());
-        // Where neither range reaches: a tenth of the step, and the mass that this takes.
+        // If neither range is enough: a tenth of the step, and the mass that it needs.
         let short_s = (0.1 * self.step_s).max(SHORTEST_STEP_S);
         let stepped = |it: &Self| {
             Self {
@@ -183,19 +182,19 @@ impl Oscillator {
     }
 }
 
-/// The cylinder, if the relation's last field is that of its mass.
+/// The cylinder, if the relation's last field is its mass.
 fn moved<'a>(f: &'a Facts<'_>, it: &Relation) -> Option<&'a Moved<'a>> {
     f.info(it.fields.last()?)?;
     f.moved
 }
 
-/// A step follows friction.
+/// The step can follow friction.
 pub(super) fn friction(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let moved = moved(f, it)?;
     moved.of_friction().broken(&moved.in_end_stop(), f, it)
 }
 
-/// A step follows the end stop, where it follows friction alone.
+/// The step can follow the end stop, if it can follow friction alone.
 pub(super) fn end_stop(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let moved = moved(f, it)?;
     let friction = moved.of_friction();
@@ -212,12 +211,12 @@ enum Chamber {
     B,
 }
 
-/// A step follows the air of chamber A.
+/// The step can follow the air of chamber A.
 pub(super) fn gas_a(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     gas(f, it, Chamber::A)
 }
 
-/// A step follows the air of chamber B.
+/// The step can follow the air of chamber B.
 pub(super) fn gas_b(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     gas(f, it, Chamber::B)
 }
@@ -243,8 +242,8 @@ fn gas(f: &Facts<'_>, it: &Relation, chamber: Chamber) -> Option<Broken> {
     })
 }
 
-/// A piston that arrives goes this many times as deep into its stop as one that its full force rests
-/// there, with what its stop damps.
+/// A piston that arrives at its stop, which damps it, goes this many times deeper than one that its full
+/// force holds there.
 const ARRIVAL: f64 = 1.4;
 
 /// The stop holds the piston within the range of its model.
@@ -272,12 +271,12 @@ pub(super) fn depth(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     })
 }
 
-/// The piston runs into its stop; chamber A, which is there, must not vanish.
+/// A piston that runs into its stop must leave some volume of chamber A.
 pub(super) fn volume_a(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     volume(f, it, Chamber::A)
 }
 
-/// The same of chamber B.
+/// The same for chamber B.
 pub(super) fn volume_b(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     volume(f, it, Chamber::B)
 }
@@ -316,11 +315,11 @@ fn volume(f: &Facts<'_>, it: &Relation, chamber: Chamber) -> Option<Broken> {
     })
 }
 
-/// A step follows the reservoir, which the regulator fills and the dump valve empties.
+/// The step can follow the reservoir, which the regulator fills and the dump valve empties.
 pub(super) fn supply(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
     let moved = f.moved?;
     let (supply, gas) = (moved.supply, moved.gas);
-    // Choked flow over the droop: the regulator opens in proportion to what is missing.
+    // Choked flow over the droop: the regulator opens in proportion to the missing pressure.
     let flow_kg_s = supply.regulator_flow.conductance_m3_s_pa
         * gas.reference_density_kg_m3
         * supply.source_pressure_pa;
@@ -329,7 +328,7 @@ pub(super) fn supply(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
     if supply.reservoir_m3 > least_m3 {
         return None;
     }
-    // A tenth more than what just holds, in round figures.
+    // A tenth above the limit, in round figures.
     let more = 1.1 * least_m3 / supply.reservoir_m3;
     let step_s = (moved.step_s / more * 1e6).floor().max(1.0) * 1e-6;
     Some(Broken {

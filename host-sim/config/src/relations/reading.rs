@@ -5,7 +5,7 @@ use super::{Bound, Broken, Facts, Offer, Relation};
 use crate::derived::STEPS_AT_REST;
 use crate::quantity::{brief, pretty};
 
-/// A potentiometer with the piston in a stop, and how its board reads it.
+/// A potentiometer with the piston at a stop, and its board's reading.
 struct Calibrated {
     electrical_m: f64,
     offset_m: f64,
@@ -13,14 +13,14 @@ struct Calibrated {
     stroke_m: f64,
 }
 
-/// How far noise goes beyond its deviation.
+/// Peaks of noise, in standard deviations.
 const NOISE_PEAKS: f64 = 6.0;
 /// Codes of the whole converter.
 const CODES: f64 = 65_536.0;
 
 impl Calibrated {
-    /// From the first fields of a relation. Where a kind of joint has a calibration of its own, that
-    /// of all says nothing.
+    /// From the first fields of a relation. If a kind of joint has its own calibration, that for all joints
+    /// does not count.
     fn of(f: &Facts<'_>, it: &Relation) -> Option<Self> {
         let own = |kind: &&str| {
             let mut paths = f.parameters.iter().map(|p| p.path.as_str());
@@ -43,7 +43,7 @@ impl Calibrated {
         [0.0, self.stroke_m].map(|at_m| (self.offset_m + self.gain * at_m) / self.electrical_m)
     }
 
-    /// What a board measures at both stops, in the unit of its full scale.
+    /// Strokes that a board measures at both stops, in the unit of its full scale.
     fn measured(&self, full_scale_mm: f64, zero: f64) -> [f64; 2] {
         self.shares()
             .map(|share| (share - zero / CODES) * full_scale_mm)
@@ -54,12 +54,12 @@ impl Calibrated {
         self.stroke_of(measured_mm / full_scale_mm + zero / CODES)
     }
 
-    /// The stroke at which the wiper stands at a share of its track.
+    /// The stroke at which the wiper is at a share of its track.
     fn stroke_of(&self, share: f64) -> f64 {
         (share * self.electrical_m - self.offset_m) / self.gain
     }
 
-    /// A board that measures what is.
+    /// Offers for a board that measures the true stroke.
     fn calibrated(&self, f: &Facts<'_>, it: &Relation) -> Vec<Offer> {
         let full_scale_mm = self.electrical_m / self.gain * 1e3;
         let zero = (self.offset_m / self.electrical_m * CODES).round();
@@ -76,13 +76,13 @@ impl Calibrated {
     }
 }
 
-/// How far a reading may be from where the wiper stands, as a share of its track: by what of the
-/// sensor is not straight, and by the noise of the converter.
+/// Largest error of a reading, as a share of the track: from the sensor's nonlinearity, and from the
+/// converter's noise.
 fn reading_error(f: &Facts<'_>, [nonlinearity, noise, bits]: [&str; 3]) -> Option<f64> {
     Some(f.si(nonlinearity)? + NOISE_PEAKS * f.si(noise)? / f.si(bits)?.exp2())
 }
 
-/// So much noise that a reading is off by a share of the track at most, if any is little enough.
+/// The noise with which a reading is off by a share of the track at most, if any is small enough.
 fn less_noise(
     f: &Facts<'_>,
     [nonlinearity, noise, bits]: [&str; 3],
@@ -93,7 +93,7 @@ fn less_noise(
     (most >= 0.0).then(|| f.offer(noise, Bound::UpTo, most))
 }
 
-/// What a joint board reads at both stops are codes that it allows.
+/// A joint board's readings at both stops are codes that it allows.
 pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let (least, most) = (f.si(it.fields[4])?, f.si(it.fields[5])?);
@@ -105,7 +105,7 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     if is_held == [true, true] {
         return None;
     }
-    // Of the track what the board allows, less what it may read beside.
+    // The part of the track that the board allows, less the error of its readings.
     let (low, high) = (least / CODES + off, most / CODES - off);
     let room = f64::min(codes[0] - least, most - codes[1]) / CODES;
     let mut offers: Vec<Vec<Offer>> = less_noise(f, reading, room).into_iter().collect();
@@ -150,7 +150,7 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     })
 }
 
-/// What a joint board measures at both stops is a travel that it allows.
+/// The strokes that a joint board measures at both stops are within its allowed travel.
 pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);
@@ -194,7 +194,7 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     })
 }
 
-/// A joint that is drawn in, and one that stands out for the gait, measure as where they are.
+/// A joint that is drawn in, and one extended for the gait, measure close to their true strokes.
 pub(super) fn measured(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
     let sensor = Calibrated::of(f, it)?;
     let measured = sensor.measured(f.si(it.fields[4])?, f.si(it.fields[5])?);

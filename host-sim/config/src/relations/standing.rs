@@ -1,4 +1,4 @@
-//! Relations of a whole robot: whether its legs close, it stands, and its air carries it.
+//! Relations of a whole robot: its legs close, it stands, and its air carries it.
 
 use wheeleg_plant::dynamics::floating::FloatingRobot;
 use wheeleg_plant::dynamics::floating::state::FloatingState;
@@ -32,8 +32,8 @@ impl Triangle {
         }
     }
 
-    /// Between which lengths the third side closes with one that is `side_m` long: of the two the
-    /// angle between is limited.
+    /// Shortest and longest third side beside one that is `side_m` long: the angle between those two is
+    /// limited.
     fn other_side_m(&self, side_m: f64) -> [f64; 2] {
         let along_m = self.most_along * side_m;
         let square = self.reach_m * self.reach_m - side_m * side_m + along_m * along_m;
@@ -41,7 +41,7 @@ impl Triangle {
         [(root_m - along_m).max(along_m - root_m), along_m + root_m]
     }
 
-    /// What is wrong with a length of the yaw cylinder, where it is the triangle.
+    /// The error of a length of the yaw cylinder, if the triangle does not close.
     fn told(&self, yaw_m: f64) -> Option<String> {
         let mm = |metres: f64| brief(metres * 1e3);
         if self.crank_m >= self.reach_m {
@@ -66,7 +66,7 @@ impl Triangle {
     }
 }
 
-/// A leg closes its loop, where it starts and over the whole stroke of its yaw cylinder.
+/// A leg closes its loop, at its start and over the whole stroke of its yaw cylinder.
 pub(super) fn closes(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
     let start_m = robot.initial_stroke_m[0];
     let open = |yaw_m: f64| {
@@ -104,8 +104,8 @@ pub(super) fn closes(f: &Facts<'_>, robot: &PlantParams) -> Option<Broken> {
     })
 }
 
-/// The robot at rest on level ground in the pose in which the gait begins, as a run sets it down: one
-/// leg drawn back, the other held.
+/// The robot at rest on level ground in the pose in which the gait begins, as set down for a run: one leg
+/// drawn back, the other held.
 pub(super) struct AtRest {
     robot: PlantParams,
     plant: Plant,
@@ -113,7 +113,7 @@ pub(super) struct AtRest {
 }
 
 impl AtRest {
-    /// `None` where the plant cannot be built, or a field of the pose is missing.
+    /// `None` if the plant cannot be built, or a field of the pose is missing.
     pub(super) fn new(f: &Facts<'_>, robot: &PlantParams) -> Option<Self> {
         let [yaw, stroke, s5, s6] = ["yaw_s2", "stroke", "held_leg_s5", "held_leg_s6"]
             .map(|key| f.si(&format!("gait.{key}")));
@@ -130,7 +130,7 @@ impl AtRest {
     }
 }
 
-/// The robot stands where it starts.
+/// The robot stands at its start.
 pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
     let Err(PlantError::NotStanding | PlantError::OnChassis { .. }) = state else {
         return None;
@@ -166,7 +166,7 @@ pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
     })
 }
 
-/// Pistons under full pressure hold what a robot at rest needs of them.
+/// Pistons under full pressure carry the robot at rest.
 pub(super) fn carried(at_rest: &AtRest) -> Option<Broken> {
     let AtRest {
         robot,

@@ -71,7 +71,7 @@ const VOLUME: &str = "the piston would press the air before it to nothing in its
 /// Every relation between fields of robot and axis files.
 #[rustfmt::skip]
 pub const RELATIONS: &[Relation] = &[
-    // Pressures fall from the source over the regulator to the surroundings.
+    // Pressures fall from the source through the regulator to the surroundings.
     at_most("hysteresis of the supply's contact", &["supply.switch_off", "supply.switch_on"], HYSTERESIS),
     below("supply's contact", &["supply.switch_on", "supply.set_pressure"], NO_CONTACT),
     at_most("hysteresis of the source's contact", &["source_switch.off", "source_switch.on"], HYSTERESIS),
@@ -99,7 +99,7 @@ pub const RELATIONS: &[Relation] = &[
     at_most("start, vertical", &["start.vertical.stroke", "cylinder.stroke"], START),
     law("track of the sensor", &["sensor.potentiometer.electrical_stroke", "cylinder.stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain"], "the wiper would leave 99 % of its track, which a board takes for a broken wire", laws::track),
     law("begin of the sensor", &["sensor.potentiometer.offset", "sensor.potentiometer.electrical_stroke"], "the wiper would stand below 1 % of its track with the rod in, which a board takes for a short circuit", laws::begin),
-    // A step follows what is stiff.
+    // The step can follow stiff parts.
     law("step and friction", &["friction.bristle_damping", "friction.viscous", "friction.bristle_stiffness", "numerics.step", "moving.mass"], FRICTION, moved::friction),
     law("step and friction, robot", &["friction.bristle_damping", "friction.viscous", "friction.bristle_stiffness", "numerics.step", "link.vertical_rod.mass"], FRICTION, moved::friction),
     law("step and end stop", &["end_stop.stiffness", "end_stop.damping", "end_stop.cushion_damping", "friction.bristle_damping", "numerics.step", "moving.load", "moving.mass"], STOP, moved::end_stop),
@@ -110,7 +110,7 @@ pub const RELATIONS: &[Relation] = &[
     law("depth of the stop", &["end_stop.stiffness", "cylinder.stroke", "cylinder.bore", "supply.set_pressure", "moving.load"], "the stop does not hold the piston", moved::depth),
     law("air in the stop A", &["cylinder.dead_volume_a", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_a),
     law("air in the stop B", &["cylinder.dead_volume_b", "line.volume", "cylinder.bore", "end_stop.stiffness", "supply.set_pressure", "moving.load"], VOLUME, moved::volume_b),
-    // What a robot does before and in its gait.
+    // Before and during the gait.
     above("settling in time", &["homing.timeout", "homing.settle"], "no joint would be taken to be settled in time"),
     above("ready in time", &["start_up.limit", "start_up.rest", "homing.settle"], "the robot would never get ready in time"),
     below("returning load", &["reference.reload_start", "reference.reload_end"], "the foot's load would be back before it begins to return"),
@@ -129,7 +129,7 @@ pub const RELATIONS: &[Relation] = &[
     law("current of a motor", &["motor.resistance", "motor.supply"], "a winding would carry more current than its model is valid for", laws::current),
     law("friction of a motor", &["motor.friction", "motor.supply", "motor.torque_constant", "motor.resistance"], "a motor would never turn", laws::stall),
     law("speed of the wheels", &["gait.push_speed", "motor.supply", "motor.torque_constant", "motor.reduction", "body.wheel_radius"], "the wheels would not roll as fast as the gait pushes", laws::rolling),
-    // Bodies and what they touch.
+    // Bodies and their contacts.
     law("inertias of the chassis", &["spatial.chassis_roll_inertia", "body.chassis_pitch_inertia", "spatial.chassis_yaw_inertia"], NO_BODY, laws::chassis_inertias),
     law("inertias of a wheel", &["body.wheel_inertia", "spatial.wheel_transverse_inertia"], NO_BODY, laws::wheel_inertias),
     law("inertias of the yaw barrel", &["link.yaw_barrel.inertia"], NO_BODY, laws::link_inertias),
@@ -155,7 +155,7 @@ pub const RELATIONS: &[Relation] = &[
     law("chassis between the wheels", &["spatial.track", "spatial.wheel_width", "chassis_contact.from", "chassis_contact.to", "body.wheel_radius"], "the wheels would be in the chassis", laws::between),
     law("drawn chassis between the wheels", &["spatial.track", "spatial.wheel_width", "spatial.chassis_size"], "the wheels would be in the chassis as it is drawn", laws::drawn),
     law("ground below", &["body.gravity"], "the robot does not stand: its weight must point to the ground, at less than 45° from its normal", laws::gravity),
-    // What its boards measure.
+    // Readings of the boards.
     law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a broken wire", reading::codes),
     law("calibration", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "node.joint.sensor_min", "node.joint.sensor_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a fault of the sensor", reading::calibration),
     law("measured stroke", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_full_scale", "node.joint.sensor_zero", "gait.held_leg_s6", "homing.tolerance"], "a joint board would wait for a stroke that it never measures", reading::measured),
@@ -168,7 +168,7 @@ pub const RELATIONS: &[Relation] = &[
     law("speed of the horizontal boards", &["node.horizontal.sensor_rate", "node.joint.sensor_rate", "node.horizontal.slew_rate", "node.joint.slew_rate"], TOO_FAST, laws::credible),
     law("speed of the vertical boards", &["node.vertical.sensor_rate", "node.joint.sensor_rate", "node.vertical.slew_rate", "node.joint.slew_rate"], TOO_FAST, laws::credible),
     law("samples of the wheel boards", &["node.wheel.sample_timer", "gait.stream_wheels"], "wheels that are not led by the master follow profiles of their own, for which a board needs more time between its samples", laws::profiles),
-    // What the board of an axis can hold; of one field it is the field's own range.
+    // Data of an axis that its board can hold; a single field has this as its own range.
     board_limits("board's full scale", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.gain"], JointParam::SensorFullScale),
     board_limits("board's volume A", &["cylinder.dead_volume_a", "line.volume"], JointParam::DeadVolumeA),
     board_limits("board's volume B", &["cylinder.dead_volume_b", "line.volume"], JointParam::DeadVolumeB),

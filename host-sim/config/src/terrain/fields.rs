@@ -20,7 +20,7 @@ pub(super) const fn number(key: &'static str, range: [f64; 2], doc: &'static str
     FieldSpec::scalar(key, Dimension::Number, range, doc)
 }
 
-/// A part as it is read; what nobody asked for is told in the end.
+/// A part that is being read; fields that nobody asked for are reported in the end.
 pub(super) struct Fields<'a> {
     pub(super) entry: &'a Entry,
     /// Fields at the top of the file.
@@ -37,7 +37,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// Whether the part has this field, which it may have.
+    /// Whether the part has this optional field.
     pub(super) fn has(&mut self, key: &'static str) -> bool {
         if !self.known.contains(&key) {
             self.known.push(key);
@@ -45,13 +45,13 @@ impl<'a> Fields<'a> {
         self.entry.has(key)
     }
 
-    /// A quantity that the part must have, SI.
+    /// A required quantity of the part, SI.
     pub(super) fn required(&mut self, r: &mut Reader, spec: &FieldSpec) -> Option<f64> {
         self.has(spec.key);
         r.required(self.entry, spec)
     }
 
-    /// A quantity that the part may leave out, SI.
+    /// An optional quantity of the part, SI.
     pub(super) fn or(&mut self, r: &mut Reader, spec: &FieldSpec, default: f64) -> Option<f64> {
         if self.has(spec.key) {
             return r.required(self.entry, spec);
@@ -59,7 +59,7 @@ impl<'a> Fields<'a> {
         Some(default)
     }
 
-    /// Two values of one quantity that the part must have, SI.
+    /// A required pair of values of one quantity, SI.
     pub(super) fn pair(&mut self, r: &mut Reader, spec: &FieldSpec) -> Option<[f64; 2]> {
         let spec = FieldSpec {
             components: 2,
@@ -102,7 +102,7 @@ impl<'a> Fields<'a> {
         None
     }
 
-    /// A whole number that the part must have.
+    /// A required whole number of the part.
     pub(super) fn whole(
         &mut self,
         r: &mut Reader,
@@ -125,7 +125,7 @@ impl<'a> Fields<'a> {
         None
     }
 
-    /// Reports what this kind of part does not have.
+    /// Reports fields that this kind of part does not have.
     pub(super) fn reject_others(&self, r: &mut Reader) {
         r.reject_misplaced(self.entry, &self.known, self.top);
     }

@@ -1,4 +1,4 @@
-//! Data files that a scenario names.
+//! Data files named in a scenario.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,13 +13,13 @@ use crate::open_file;
 /// Largest data file, bytes.
 const LARGEST: u64 = 512 << 20;
 
-/// Where a scenario's data files are.
+/// Location of a scenario's data files.
 pub(crate) enum Files<'a> {
     /// Paths count from this folder.
     Below(PathBuf),
     /// They are part of the program: names and contents.
     BuiltIn(&'static [(&'static str, &'static [u8])]),
-    /// A plan holds them, by the names that its scenario has for them.
+    /// A plan holds them, by their names in its scenario.
     Held(&'a BTreeMap<String, Data>),
 }
 
@@ -40,7 +40,7 @@ impl Serialize for Data {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut digits = String::with_capacity(2 * self.0.len());
         for byte in &self.0 {
-            // A text takes whatever is written to it.
+            // Writing into a text cannot fail.
             let _ = write!(digits, "{byte:02x}");
         }
         serializer.serialize_str(&digits)
@@ -63,7 +63,7 @@ impl<'de> Deserialize<'de> for Data {
 }
 
 impl Files<'_> {
-    /// Those of a scenario file with this path.
+    /// The data files of a scenario file with this path.
     pub(crate) fn beside(scenario: &str) -> Self {
         Self::Below(Path::new(scenario).with_file_name(""))
     }
@@ -71,7 +71,7 @@ impl Files<'_> {
     /// The content of a file.
     ///
     /// # Errors
-    /// In words: there is none, it is no file, it is too large, it cannot be read.
+    /// In words: there is none, it is not a file, it is too large, it cannot be read.
     pub(crate) fn read(&self, name: &str) -> Result<Vec<u8>, String> {
         let folder = match self {
             Self::BuiltIn(all) => {
@@ -101,7 +101,7 @@ impl Files<'_> {
     }
 }
 
-/// The files that the ground of a scenario is made from.
+/// The data files for the ground of a scenario.
 pub(crate) fn named_files(text: &str) -> Vec<String> {
     let Ok(document) = Document::parse(text) else {
         return Vec::new();

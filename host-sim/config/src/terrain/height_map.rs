@@ -26,7 +26,7 @@ struct Values {
 }
 
 impl Values {
-    /// Where a row stands, as its reader finds it: both count from 1.
+    /// Place of a row for a message: both numbers count from 1.
     fn row(&self, row: usize) -> String {
         match self.lines.get(row - 1) {
             Some(line) => format!("line {line}"),
@@ -54,7 +54,7 @@ pub(super) fn height_map(
     let cell = fields.required(r, &cell);
     let origin = fields.pair(r, &origin);
     let offset = fields.or(r, &offset, 0.0);
-    // The numbers of a table are metres; those of a picture are nothing yet.
+    // Numbers in a table are metres; those of a picture have no scale yet.
     let scale = if is_picture {
         fields.required(r, &scale)
     } else {
@@ -145,10 +145,10 @@ fn is_picture(name: &str) -> bool {
     extension.is_some_and(|e| e.eq_ignore_ascii_case("png"))
 }
 
-/// Numbers parted by commas, semicolons or blanks; a `#` begins a remark.
+/// Numbers separated by commas, semicolons or blanks; a `#` begins a comment.
 ///
 /// # Errors
-/// In words, with line and column: remarks and empty lines count, as an editor counts them.
+/// In words, with line and column: comments and empty lines count, as in an editor.
 fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n');
@@ -210,8 +210,8 @@ fn table(bytes: &[u8]) -> Result<Values, Vec<String>> {
     }
 }
 
-/// Spreadsheets of many countries write decimal commas and part the numbers by semicolons: each
-/// comma would part a number in two.
+/// Spreadsheets of many countries write decimal commas and separate the numbers by semicolons: each comma
+/// would split a number in two.
 fn decimal_comma(line: usize, text: &str) -> String {
     format!(
         "line {line}: a file with semicolons and commas has decimal commas; write numbers with a \
@@ -232,9 +232,9 @@ fn shortened(text: &str) -> String {
 /// In words.
 fn picture(bytes: &[u8]) -> Result<Values, String> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    // Grey with fewer than eight bits comes as eight.
+    // Grey values of fewer than eight bits come as eight.
     decoder.set_transformations(png::Transformations::IDENTITY);
-    // The decoder names what it has found as programs name it.
+    // The decoder's messages are for programmers.
     let no_picture = |e: png::DecodingError| match e {
         png::DecodingError::LimitsExceeded => "the picture is too large".to_owned(),
         _ => "it is not a complete PNG picture".to_owned(),

@@ -1,6 +1,6 @@
-//! What a part of the terrain is made of.
+//! Materials of the terrain.
 //!
-//! A hard material is known by its friction, a soil by its name.
+//! A hard material is recognized by its friction, a soil by its name.
 
 use wheeleg_plant::soil::Soil;
 use wheeleg_plant::terrain::Material;
@@ -22,7 +22,7 @@ const HARD: [(&str, Material); 3] = [
     ("ice", ICE),
 ];
 
-/// All materials that have a name.
+/// All named materials.
 fn named() -> Vec<(&'static str, Material)> {
     let soils = Soil::NAMED.iter();
     let soft = soils.map(|(name, soil)| (*name, Material::soft(*soil)));

@@ -1,8 +1,8 @@
 //! The ground of a scenario: sections `[[terrain]]`, each a part with its material.
 //!
-//! Axes as MODEL.md: the world's origin is the start place, x ahead, y to the left, z up. Parts
-//! add up: a body touches each on its own. Where no part reaches everywhere (`plane`, `heightmap`),
-//! the others lie on a level floor of rock.
+//! Axes as in MODEL.md: the world's origin is the start place, x ahead, y to the left, z up. Parts add up: a
+//! body touches each on its own. If no part reaches everywhere (`plane`, `heightmap`), the others lie on a
+//! level floor of rock.
 
 mod fields;
 mod files;
@@ -28,15 +28,15 @@ pub(crate) use files::{Files, named_files};
 pub struct Ground {
     /// For the plant.
     pub terrain: Terrain,
-    /// Each part as the file has it, for logs and reports.
+    /// Each part as in the file, for logs and reports.
     pub parts: Vec<String>,
-    /// Where the parts that a section makes begin in the terrain, and the section; in that order.
+    /// Index of the first part of each section in the terrain, and the section; in that order.
     begins: Vec<(usize, usize)>,
 }
 
 impl Ground {
-    /// BLAKE3 of the terrain with all that data files and seeds made of it, 64 hexadecimal
-    /// digits; `None` for the plain floor of a scenario without parts.
+    /// BLAKE3 of the terrain with everything made from data files and seeds, 64 hexadecimal digits; `None`
+    /// for the plain floor of a scenario without parts.
     #[must_use]
     pub fn fingerprint(&self) -> Option<String> {
         let digest = || blake3::Hash::from(self.terrain.digest());
@@ -75,7 +75,7 @@ const KINDS: [(&str, Kind); 7] = [
 ];
 
 impl Kind {
-    /// Whether there is ground everywhere with such a part alone.
+    /// Whether such a part gives ground everywhere by itself.
     fn is_everywhere(self) -> bool {
         matches!(self, Self::Plane | Self::HeightMap)
     }
@@ -84,8 +84,8 @@ impl Kind {
 /// Reads all parts; `top` are the fields at the top of the file.
 pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     let mut parts = Vec::new();
-    // Of very many parts their entries would take as much memory again as the file itself: each
-    // is taken out of it when it is its turn.
+    // With very many parts their entries would take as much memory again as the file itself: each is taken
+    // out of it only when needed.
     let mut kinds = Vec::new();
     for i in 0..r.array_len("terrain") {
         let entry = r.entry("terrain", i);
@@ -99,12 +99,12 @@ pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
         let message = format!("`{}`: a terrain has one heightmap at most", second.path);
         r.problem(Some(second.span.clone()), message, "the second", None);
     }
-    // What lies on the ground needs the ground first.
+    // Parts that lie on the ground need the ground first.
     let (everywhere, lying): (Vec<_>, Vec<_>) = kinds
         .into_iter()
         .partition(|(kind, _)| kind.is_everywhere());
     let mut terrain = Terrain { parts: Vec::new() };
-    // Where the parts of each section begin.
+    // First part of each section.
     let mut begins = Vec::new();
     for (kind, i) in &everywhere {
         begins.push((terrain.parts.len(), *i));
@@ -132,8 +132,8 @@ pub(super) fn read(r: &mut Reader, top: &[&str], files: &Files<'_>) -> Ground {
     }
 }
 
-/// Reports parts that lie on each other: with the first that is too much. `begins`: number of the
-/// first part of each section, and of the section.
+/// Reports too many parts on top of each other, with the first excess one. `begins`: number of the first part
+/// of each section, and of the section.
 fn heaped(r: &mut Reader, heap: &Heap, begins: &[(usize, usize)]) {
     let section = |part: u32| {
         let after = begins.partition_point(|(first, _)| *first <= part as usize);
@@ -166,7 +166,7 @@ fn heaped(r: &mut Reader, heap: &Heap, begins: &[(usize, usize)]) {
     );
 }
 
-/// Reads one part; `below` is the ground that it lies on, `files` where its data are.
+/// Reads one part; `below` is the ground under it, `files` its data files.
 fn part(
     r: &mut Reader,
     kind: Kind,

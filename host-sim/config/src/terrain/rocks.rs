@@ -9,7 +9,7 @@ use crate::reader::Reader;
 /// Largest rock, m.
 const LARGEST_M: f64 = 5.0;
 
-/// Rocks on what is below.
+/// Rocks on the ground below.
 pub(super) fn rocks(
     r: &mut Reader,
     fields: &mut Fields<'_>,

@@ -6,9 +6,9 @@ use super::fields::{Fields, angle, length};
 use crate::params::FieldSpec;
 use crate::reader::Reader;
 
-/// How deep their feet are in the ground, m.
+/// Depth of their feet in the ground, m.
 const FOOT_M: f64 = 1.0;
-/// How far a step goes on, ahead and to each side, m.
+/// Extent of a step ahead and to each side, m.
 const FAR_M: f64 = 100.0;
 /// Highest top over the ground, m.
 const HIGHEST_M: f64 = 10.0;
@@ -33,7 +33,7 @@ const AZIMUTH: FieldSpec = angle(
     "direction of the ascent, from ahead to the left",
 );
 
-/// A place on the ground, and half the length and width of what stands there.
+/// A place on the ground, and half the length and width of the part on it.
 struct Foot {
     middle_m: [f64; 2],
     half_m: [f64; 2],
@@ -53,7 +53,7 @@ impl Foot {
         }
     }
 
-    /// Between two distances from the start place in a direction.
+    /// The place between two distances from the start in a direction.
     fn ahead([from_m, to_m]: [f64; 2], half_width_m: f64, azimuth: f64, below: &Terrain) -> Self {
         let far = 0.5 * (from_m + to_m);
         let middle = [far * azimuth.cos(), far * azimuth.sin()];
@@ -61,7 +61,7 @@ impl Foot {
         Self::at(middle, half, azimuth, below)
     }
 
-    /// What stands there, its top at these heights over the ground, rear and front.
+    /// The part on it, with its top at these heights above the ground, rear and front.
     fn up_to(&self, [rear_m, front_m]: [f64; 2]) -> Shape {
         let up = |height: f64| self.ground_m + height;
         Shape::Solid(Solid::ramp(
@@ -114,7 +114,7 @@ pub(super) fn ramp(r: &mut Reader, fields: &mut Fields<'_>, below: &Terrain) -> 
     Some(vec![foot?.up_to(heights?)])
 }
 
-/// One edge; the ground goes on higher behind it.
+/// One edge; behind it the ground continues higher.
 pub(super) fn step(r: &mut Reader, fields: &mut Fields<'_>, below: &Terrain) -> Option<Vec<Shape>> {
     let at = fields.required(r, &AT);
     let height = fields.required(r, &HEIGHT);

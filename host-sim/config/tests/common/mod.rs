@@ -1,4 +1,4 @@
-//! What is said of a file that is refused.
+//! Messages about a refused file.
 
 use wheeleg_config::ConfigError;
 

@@ -1,6 +1,6 @@
 //! Robot and axis files with other values.
 
-/// The robot of the paper with cylinders of 90 mm, standing: paths, values as they are written, and units.
+/// The robot of the paper with cylinders of 90 mm, standing: paths, values as written, and units.
 pub(crate) const SHORT: &[(&str, &str, &str)] = &[
     ("cylinder.stroke", "90.0", "mm"),
     ("gait.stroke", "90.0", "mm"),
@@ -10,8 +10,8 @@ pub(crate) const SHORT: &[(&str, &str, &str)] = &[
     ("node.joint.sensor_max", "95.0", "mm"),
 ];
 
-/// A file with other values; a key that its section has not got is put below the heading, a section that
-/// the file has not got at its end.
+/// A file with other values; a key missing in its section is put below the heading, a missing section at the
+/// end.
 pub(crate) fn with(text: &str, path: &str, value: &str, unit: &str) -> String {
     let (section, key) = path.rsplit_once('.').expect("a section and a key");
     let heading = format!("[{section}]\n");

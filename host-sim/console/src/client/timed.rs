@@ -1,22 +1,22 @@
-//! A socket that does not wait beyond an instant, however little trickles in.
+//! A socket that does not wait beyond a deadline, however little trickles in.
 
 use std::io::{ErrorKind, Read, Result, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// A TCP connection with a time for each read and write, and one for all of them together.
+/// A TCP connection with a time limit for each read and write, and one for all of them together.
 pub(super) struct Timed {
     tcp: TcpStream,
     /// Longest read.
     pub(super) look: Duration,
     /// Longest write.
     patience: Duration,
-    /// When all has an end.
+    /// Deadline of everything.
     pub(super) until: Option<Instant>,
 }
 
 impl Timed {
-    /// Each read and write may take so long, and all of them until then.
+    /// Each read and write may take `patience`, and all of them until `until`.
     pub(super) fn new(tcp: TcpStream, patience: Duration, until: Instant) -> Self {
         Self {
             tcp,
@@ -26,7 +26,7 @@ impl Timed {
         }
     }
 
-    /// What is left of a time.
+    /// The rest of a time.
     fn left(&self, of: Duration) -> Result<Duration> {
         let until = self
             .until

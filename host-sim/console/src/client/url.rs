@@ -23,9 +23,9 @@ pub struct Url {
     pub(super) host: String,
     /// Certificate of the server; without one it is reached by plain HTTP.
     certificate: Option<Fingerprint>,
-    /// It is to be reached with TLS.
+    /// The server uses TLS.
     tls: bool,
-    /// When the answers that are waited for have to be there.
+    /// Deadline of the expected answers.
     until: Option<Instant>,
 }
 
@@ -33,7 +33,7 @@ impl Url {
     /// Reads `http://HOST:PORT`, `https://HOST:PORT`, the same with `ws` and `wss`, or `HOST:PORT`.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Its error, in words.
     pub fn parse(text: &str) -> Result<Self, String> {
         let plain = ["http://", "ws://"]
             .iter()
@@ -44,7 +44,7 @@ impl Url {
         let host = plain.or(tls).unwrap_or(text).trim_end_matches('/');
         let port = host.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
         let name = host.rsplit_once(':').map_or("", |(name, _)| name);
-        // The numbers of IPv6 stand in brackets.
+        // IPv6 addresses are in brackets.
         let whole = match name.strip_prefix('[') {
             Some(name) => name
                 .strip_suffix(']')
@@ -64,7 +64,7 @@ impl Url {
         })
     }
 
-    /// The same, of the server that has the certificate with this fingerprint.
+    /// The same, for the server that has the certificate with this fingerprint.
     #[must_use]
     pub fn with_certificate(self, certificate: Fingerprint) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Url {
         }
     }
 
-    /// The same for what has to be answered within [`PATIENCE`] from now, over however many
+    /// The same, for requests that must be answered within [`PATIENCE`] from now, over any number of
     /// connections.
     #[must_use]
     pub fn prompt(self) -> Self {
@@ -83,12 +83,12 @@ impl Url {
         }
     }
 
-    /// When a request that begins now has to be answered.
+    /// Deadline of a request that begins now.
     pub(super) fn end(&self) -> Instant {
         self.until.unwrap_or_else(|| Instant::now() + PATIENCE)
     }
 
-    /// Whether others on the way could read what is sent: neither TLS, nor this computer's own.
+    /// Whether others on the way could read the traffic: no TLS, and not this computer itself.
     #[must_use]
     pub fn is_exposed(&self) -> bool {
         let name = self.host.rsplit_once(':').map_or("", |(name, _)| name);
@@ -102,7 +102,7 @@ impl Url {
         self.error_with(what, help)
     }
 
-    /// An error, and what can be done about it.
+    /// An error, and its remedy.
     pub(super) fn error_with(&self, what: impl ToString, help: &str) -> ConsoleError {
         ConsoleError::Link {
             url: format!("http{}://{}", if self.tls { "s" } else { "" }, self.host),
@@ -135,7 +135,7 @@ impl Url {
         let name = ServerName::try_from(name).map_err(|e| self.error(e))?;
         let connection = ClientConnection::new(config, name).map_err(|e| self.error(e))?;
         let mut stream = StreamOwned::new(connection, tcp);
-        // The handshake, while a read still waits: later ones are short looks.
+        // Finish the handshake now, while a read still blocks: later ones are short.
         while stream.conn.is_handshaking() {
             let done = stream.conn.complete_io(&mut stream.sock);
             done.map_err(|e| match e.kind() {
@@ -148,8 +148,8 @@ impl Url {
         Ok(Stream::Tls(Box::new(stream)))
     }
 
-    /// Addresses of the host. Whoever knows its name may take long to say so: the system's look-up has
-    /// no deadline of its own, and goes on in a thread that nobody waits for.
+    /// Addresses of the host. A name server may answer slowly: the system's look-up has no deadline of its
+    /// own, so it runs in a thread that nobody waits for.
     fn addresses(&self, end: Instant) -> Result<Vec<SocketAddr>, ConsoleError> {
         if let Ok(address) = self.host.parse() {
             return Ok(vec![address]);
@@ -178,8 +178,8 @@ impl Url {
     }
 }
 
-/// A connection to the first of these that answers. Each has its share of the time that is left: a
-/// firewall may keep silent for one of them, and `localhost` may have one at which nobody listens.
+/// A connection to the first of these that answers. Each has its share of the time left: a firewall may drop
+/// one of them silently, and nobody may listen at one of the addresses of `localhost`.
 fn connect(addresses: &[SocketAddr], end: Instant) -> std::io::Result<TcpStream> {
     let mut stream = Err(std::io::Error::other("no such host"));
     for (address, others) in addresses.iter().zip((1..=addresses.len()).rev()) {
@@ -210,7 +210,7 @@ impl Stream {
         }
     }
 
-    /// From now on a read is a short look, and all of them end then, or never.
+    /// Makes reads short from now on, with one deadline for all of them, or none.
     pub(super) fn look(&mut self, time: Duration, until: Option<Instant>) {
         let socket = self.socket();
         (socket.look, socket.until) = (time, until);
@@ -248,8 +248,8 @@ mod tests {
 
     use super::*;
 
-    /// Of the addresses of a name one is behind a firewall: here, a server that accepts nothing while
-    /// others wait for it already.
+    /// One of the addresses of a name is behind a firewall: here, a server that accepts nothing while others
+    /// already wait for it.
     #[test]
     fn an_address_that_keeps_silent_leaves_time_for_the_next() {
         let [silent, good] = [0, 1].map(|_| TcpListener::bind("127.0.0.1:0").expect("a port"));

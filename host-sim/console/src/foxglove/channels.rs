@@ -1,12 +1,12 @@
-//! The channels that viewers are offered: those of the registry, those derived from them, and the
-//! robot's description.
+//! The channels offered to viewers: those of the registry, those derived from them, and the robot's
+//! description.
 
 use serde_json::{Value, json};
 use wheeleg_telemetry::{Derived, channels, derived, json_schema};
 
-/// Topic of a channel that is asked for, not sent: what went into a run.
+/// Topic of a channel that is requested, not sent: the inputs of a run.
 const NOT_SENT: &str = "/run";
-/// Topic of events, which come in order.
+/// Topic of events, which are sent in order.
 const EVENTS: &str = "/events";
 
 /// A channel of a viewer.
@@ -37,13 +37,13 @@ impl Channel {
         (channel <= Self::description() && sent).then_some(channel)
     }
 
-    /// Whether all of its messages come, in order; of others the newest.
+    /// Whether all of its messages are sent, in order; of other channels only the newest.
     pub(crate) fn is_ordered(self) -> bool {
         let of_registry = channels().get(self.0 as usize);
         self == Self::of_derived(Derived::Log) || of_registry.is_some_and(|c| c.topic == EVENTS)
     }
 
-    /// Whether who comes later is sent its newest message at once.
+    /// Whether a later subscriber gets its newest message at once.
     pub(crate) fn is_kept(self) -> bool {
         let rate_hz = match channels().get(self.0 as usize) {
             Some(def) => def.rate_hz,

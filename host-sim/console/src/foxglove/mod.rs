@@ -1,6 +1,5 @@
-//! The socket for Foxglove and Lichtblick, after their published protocol: viewers see every
-//! channel, the robot and its parameters, and may stop. What moves the robot is given at the
-//! console alone.
+//! The socket for Foxglove and Lichtblick, by their published protocol: viewers see every channel, the robot
+//! and its parameters, and may stop. Commands that move the robot are given only at the console.
 
 mod channels;
 mod outbox;
@@ -26,5 +25,5 @@ pub(crate) const STOP_SERVICE: u32 = 1;
 /// Address of the one file.
 pub(crate) const URDF: &str = "package://wheeleg/wheeleg.urdf";
 
-/// Names of the protocol, newest first: they say the same.
+/// Names of the protocol, newest first: they mean the same.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];

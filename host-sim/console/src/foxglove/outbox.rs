@@ -1,5 +1,5 @@
-//! What waits for one viewer. Of samples and of the time the newest wins; of events the oldest go,
-//! and the viewer is told how many; a viewer that lets answers pile up is closed.
+//! Queue of messages for one viewer. Of samples and of the time the newest wins; of events the oldest are
+//! dropped, and the viewer gets their number; a viewer that lets answers pile up is closed.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -52,18 +52,18 @@ pub(crate) struct Queue {
     time_ns: Option<u64>,
     events: VecDeque<Data>,
     event_bytes: usize,
-    /// Events that went, and are not told yet.
+    /// Dropped events, not reported yet.
     lost: u64,
     newest: BTreeMap<Channel, Data>,
-    /// Channel that was sent last: the next one in order is the next, so that none starves.
+    /// Channel that was sent last: the next one in order follows, so that none starves.
     turn: Option<Channel>,
 }
 
-/// What waits for one viewer.
+/// Messages that wait for one viewer.
 pub(crate) type Outbox = Mailbox<Queue>;
 
 impl Outbox {
-    /// An answer, or something that the viewer must know.
+    /// Queues an answer, or a message that the viewer must get.
     pub(crate) fn answer(&self, message: Message) {
         self.put(|contents| {
             let queue = &mut contents.messages;
@@ -75,12 +75,12 @@ impl Outbox {
         });
     }
 
-    /// The time of the master, ns.
+    /// Queues the time of the master, ns.
     pub(crate) fn time(&self, t_ns: u64) {
         self.put(|contents| contents.messages.time_ns = Some(t_ns));
     }
 
-    /// A message of a channel.
+    /// Queues a message of a channel.
     pub(crate) fn data(&self, channel: Channel, subscription: u32, t_ns: u64, payload: Bytes) {
         let data = Data {
             subscription,
@@ -90,7 +90,7 @@ impl Outbox {
         self.put(|contents| contents.messages.add(channel, data));
     }
 
-    /// Nothing of subscriptions that have ended.
+    /// Drops the messages of ended subscriptions.
     pub(crate) fn forget(&self, ended: &BTreeSet<u32>) {
         let queue = &mut self.contents().messages;
         let goes_on = |data: &Data| !ended.contains(&data.subscription);
@@ -150,7 +150,7 @@ impl Waiting for Queue {
     }
 }
 
-/// Something for the person at the viewer; level 0: information, 1: warning, 2: error.
+/// A message for the person at the viewer; level 0: information, 1: warning, 2: error.
 pub(crate) fn status(level: u8, text: &str) -> Message {
     let message = json!({ "op": "status", "level": level, "message": text });
     Message::Text(message.to_string().into())
@@ -230,7 +230,7 @@ mod tests {
             assert!(outbox.contents().close.is_none());
             outbox.answer(status(0, ""));
         }
-        // What it goes on asking is not kept.
+        // Further requests are not kept.
         for _ in 0..ANSWERS_MAX {
             outbox.answer(status(0, ""));
         }

@@ -1,5 +1,5 @@
-//! Messages of a viewer as typed requests. What is read here came over the network: every answer
-//! is a value, nothing panics, and nothing grows beyond the message.
+//! Messages of a viewer as typed requests. They come over the network: every answer is a value, nothing
+//! panics, and nothing grows beyond the message.
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -11,7 +11,7 @@ pub const MESSAGE_MAX: usize = 32 * 1024;
 /// Most items that a message names: more than there are parameters or channels.
 pub const ITEMS_MAX: usize = 512;
 
-/// What a viewer asks.
+/// A viewer's request.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub enum Request {
@@ -29,14 +29,14 @@ pub enum Request {
     GetParameters {
         /// Names; none: all.
         parameter_names: Vec<String>,
-        /// Comes back with the answer.
+        /// Returned with the answer.
         id: Option<String>,
     },
     /// Other values of parameters.
     SetParameters {
         /// Which, and what.
         parameters: Vec<Setting>,
-        /// Comes back with the answer.
+        /// Returned with the answer.
         id: Option<String>,
     },
     /// Values of parameters whenever they change.
@@ -53,13 +53,13 @@ pub enum Request {
     FetchAsset {
         /// Its address.
         uri: String,
-        /// Comes back with the file.
+        /// Returned with the file.
         request_id: u32,
     },
     /// A call of a service; it comes as a binary message.
     #[serde(skip)]
     Call(Call),
-    /// What this server does not offer.
+    /// A request that this server does not offer.
     #[serde(other)]
     Other,
 }
@@ -71,7 +71,7 @@ impl Request {
         matches!(self, Self::Call(call) if call.service == STOP_SERVICE)
     }
 
-    /// Items that it names.
+    /// Number of items that it names.
     #[must_use]
     pub fn items(&self) -> usize {
         match self {
@@ -98,12 +98,12 @@ pub struct Subscription {
     pub channel_id: u32,
 }
 
-/// A parameter that is to be set.
+/// A parameter to set.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Setting {
     /// Name.
     pub name: String,
-    /// Value; none: it is to be removed.
+    /// Value; none removes it.
     pub value: Option<Value>,
 }
 
@@ -118,7 +118,7 @@ pub struct Call {
     pub encoding: String,
 }
 
-/// The message is none of the protocol.
+/// The message is not part of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Malformed;
 
@@ -132,7 +132,7 @@ const ENCODING_MAX: usize = 64;
 /// Reads a text message.
 ///
 /// # Errors
-/// [`Malformed`] if it is no JSON object of the protocol.
+/// [`Malformed`] if it is not a JSON object of the protocol.
 pub fn parse_text(text: &str) -> Result<Request, Malformed> {
     serde_json::from_str(text).map_err(|_| Malformed)
 }
@@ -140,7 +140,7 @@ pub fn parse_text(text: &str) -> Result<Request, Malformed> {
 /// Reads a binary message.
 ///
 /// # Errors
-/// [`Malformed`] if it is none of the protocol.
+/// [`Malformed`] if it is not part of the protocol.
 pub fn parse_binary(bytes: &[u8]) -> Result<Request, Malformed> {
     let (op, rest) = bytes.split_first().ok_or(Malformed)?;
     match *op {

@@ -18,11 +18,11 @@ use crate::progress::PROGRESS;
 use crate::session::{SILENCE, send_all};
 use wheeleg_access::rate::Bucket;
 
-/// What is said to a viewer that asks too much.
+/// Message to a viewer that asks too much.
 const TOO_MUCH: &str =
     "too many messages: at most 100 per second, where each KiB counts as one more";
 
-/// What a viewer is offered.
+/// Offers to a viewer.
 pub(crate) struct Viewing {
     /// Name of the robot.
     pub(crate) robot: String,
@@ -31,7 +31,7 @@ pub(crate) struct Viewing {
 }
 
 impl Viewing {
-    /// First words to a viewer.
+    /// First messages to a viewer.
     fn greeting(&self) -> [String; 3] {
         let info = json!({
             "op": "serverInfo",
@@ -90,11 +90,11 @@ pub(crate) async fn serve(mut socket: WebSocket, hub: Arc<Hub>, viewing: Viewing
         let read = async {
             let mut bucket = Bucket::new(Instant::now());
             while let Ok(Some(Ok(message))) = timeout(SILENCE, input.next()).await {
-                // Between two messages it is others' turn.
+                // Between two messages others run.
                 tokio::task::yield_now().await;
                 let mut may_ask = |bytes| bucket.take_for(bytes, Instant::now());
                 let request = match &message {
-                    // It is not even read: what it costs is its bytes.
+                    // It is not even parsed: it costs only its bytes.
                     Message::Text(text) if !may_ask(text.len()) => None,
                     Message::Text(text) => Some(parse_text(text)),
                     Message::Binary(bytes) => match parse_binary(bytes) {
@@ -128,7 +128,7 @@ pub(crate) async fn serve(mut socket: WebSocket, hub: Arc<Hub>, viewing: Viewing
     hub.leave_viewer(id);
 }
 
-/// Says what there is; false: the viewer is gone.
+/// Sends the list of offers; false: the viewer is gone.
 async fn greet(socket: &mut WebSocket, viewing: &Viewing) -> bool {
     for text in viewing.greeting() {
         let sent = timeout(PROGRESS, socket.send(Message::Text(text.into()))).await;

@@ -1,5 +1,5 @@
-//! Contacts with the ground on their way from the robot's thread to the hub, while a viewer wants
-//! them. Where the ring is full they are dropped: the next ones replace them anyway.
+//! Contacts with the ground on their way from the robot's thread to the hub, while a viewer wants them. If
+//! the ring is full they are dropped: the next ones replace them anyway.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,12 +42,12 @@ pub(crate) fn contacts() -> (ContactSink, ContactSource) {
 }
 
 impl ContactSource {
-    /// Whether contacts are wanted from now on.
+    /// Turns contacts on or off.
     pub(crate) fn want(&self, wanted: bool) {
         self.wanted.store(wanted, Ordering::Relaxed);
     }
 
-    /// The newest that came.
+    /// The newest contacts received.
     pub(crate) fn newest(&mut self) -> Option<Touching> {
         let mut newest = None;
         while let Ok(touching) = self.from.pop() {

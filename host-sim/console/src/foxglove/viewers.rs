@@ -1,4 +1,4 @@
-//! All viewers, as the hub has them: each message is made once, and only if somebody wants it.
+//! The hub's list of viewers: each message is made once, and only if somebody wants it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ struct Viewer {
     outbox: Arc<Outbox>,
     /// The viewer's numbers of its subscriptions.
     subscriptions: BTreeMap<Channel, u32>,
-    /// Parameters whose changes it is told.
+    /// Parameters to whose changes it has subscribed.
     parameters: BTreeSet<Place>,
 }
 
@@ -40,7 +40,7 @@ struct Kept {
 pub(crate) struct Viewers {
     all: BTreeMap<ViewerId, Viewer>,
     next: ViewerId,
-    /// The robot in the words of viewers.
+    /// The robot in Foxglove's formats.
     scene: Scene,
     contacts: ContactSource,
     kept: BTreeMap<Channel, Kept>,
@@ -81,7 +81,7 @@ impl Viewers {
         self.urdf.clone()
     }
 
-    /// A viewer comes.
+    /// Adds a viewer.
     pub(crate) fn enter(&mut self, outbox: &Arc<Outbox>) -> ViewerId {
         let id = self.next;
         self.next += 1;
@@ -94,20 +94,20 @@ impl Viewers {
         id
     }
 
-    /// A viewer is gone.
+    /// Removes a viewer.
     pub(crate) fn leave(&mut self, id: ViewerId) {
         self.all.remove(&id);
         self.ask_for_contacts();
     }
 
-    /// Closes everybody.
+    /// Closes all viewers.
     pub(crate) fn close(&self, why: crate::close::Close) {
         for viewer in self.all.values() {
             viewer.outbox.close(why);
         }
     }
 
-    /// Messages of channels from now on; of what is kept, the newest at once.
+    /// Sends messages of channels from now on; of kept channels, the newest at once.
     pub(crate) fn subscribe(&mut self, id: ViewerId, wanted: &[Subscription]) {
         let Some(viewer) = self.all.get_mut(&id) else {
             return;
@@ -133,7 +133,7 @@ impl Viewers {
         self.ask_for_contacts();
     }
 
-    /// No messages of these subscriptions from now on.
+    /// Ends these subscriptions.
     pub(crate) fn unsubscribe(&mut self, id: ViewerId, subscriptions: &[u32]) {
         if let Some(viewer) = self.all.get_mut(&id) {
             let ended: BTreeSet<u32> = subscriptions.iter().copied().collect();
@@ -153,7 +153,7 @@ impl Viewers {
         all.any(|viewer| viewer.subscriptions.contains_key(&channel))
     }
 
-    /// Whether the newest sample of a channel is of use.
+    /// Whether any viewer needs the newest sample of a channel.
     pub(crate) fn want_sample(&self, index: u16) -> bool {
         let channel = Channel::of_registry(index);
         channel.is_kept() || (!channel.is_ordered() && self.wants(channel))
@@ -173,7 +173,7 @@ impl Viewers {
     /// Takes every sample: the robot moves, an event happens.
     pub(crate) fn see(&mut self, index: u16, t_ns: u64, sample: &OwnedSample) {
         let sample_ref = sample.as_ref();
-        // What moves is noted always; it is drawn only if somebody looks.
+        // Motion is always recorded; it is drawn only for a viewer.
         let moves = matches!(sample_ref, SampleRef::Joint(_) | SampleRef::Wheel(_));
         if !moves && self.all.is_empty() {
             return;
@@ -199,7 +199,7 @@ impl Viewers {
         self.send_all(made);
     }
 
-    /// Draws the contacts that came.
+    /// Draws the newest contacts.
     pub(crate) fn draw_contacts(&mut self) {
         let Some(touching) = self.contacts.newest() else {
             return;
@@ -232,33 +232,33 @@ impl Viewers {
         }
     }
 
-    /// Tells everybody the time.
+    /// Sends all viewers the time.
     pub(crate) fn tell_time(&self, t_ns: u64) {
         for viewer in self.all.values() {
             viewer.outbox.time(t_ns);
         }
     }
 
-    /// Tells a viewer.
+    /// Sends a viewer a message.
     pub(crate) fn tell(&self, id: ViewerId, message: Message) {
         if let Some(viewer) = self.all.get(&id) {
             viewer.outbox.answer(message);
         }
     }
 
-    /// Tells a viewer of parameters.
+    /// Sends a viewer the values of parameters.
     pub(crate) fn tell_parameters(&self, id: ViewerId, names: &[String], request: Option<&str>) {
         let values = self.parameters.list(names);
         self.tell(id, parameter_values(&values, request));
     }
 
-    /// Changes of parameters from now on, or no longer; no names: all.
+    /// Starts or ends a subscription to changes of parameters; no names: all.
     pub(crate) fn follow(&mut self, id: ViewerId, names: &[String], follow: bool) {
         let Some(viewer) = self.all.get_mut(&id) else {
             return;
         };
         match (names.is_empty(), follow) {
-            // Who follows all of them already causes no work.
+            // A viewer that already follows all of them causes no work.
             (true, true) if viewer.parameters.len() == self.parameters.places().len() => {}
             (true, true) => viewer.parameters.clone_from(self.parameters.places()),
             (true, false) => viewer.parameters.clear(),
@@ -274,7 +274,7 @@ impl Viewers {
         }
     }
 
-    /// A board has told a value.
+    /// A board has reported a value.
     pub(crate) fn told(&mut self, place: Place, raw: i32) {
         let Some(name) = self.parameters.told(place, raw) else {
             return;

@@ -1,6 +1,6 @@
-//! Parameters that a viewer sets. It goes through a session of the console of its own, which takes
-//! the control, writes and releases it: the master, the recording and who else wants the control
-//! see an operator like any other.
+//! Parameters that a viewer sets. They go through a console session of their own, which takes control, writes
+//! and releases it: the master, the recording and other clients that want control see an operator like any
+//! other.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,7 +24,7 @@ const ANSWER: Duration = Duration::from_secs(3);
 /// How long a command may wait, µs.
 const VALID_US: u64 = 1_000_000;
 
-/// Sets parameters of disarmed boards, and tells the viewer what they are now.
+/// Sets parameters of disarmed boards, and sends the viewer their new values.
 pub(crate) async fn write(
     hub: Arc<Hub>,
     viewer: ViewerId,
@@ -38,7 +38,7 @@ pub(crate) async fn write(
             status(2, &format!("no further parameter is written: {why}")),
         );
     }
-    // What was not taken is told as it is.
+    // For values that were not written, the viewer gets the real ones.
     if !names.is_empty() {
         hub.tell_parameters(viewer, &names, request.as_deref());
     }
@@ -65,7 +65,7 @@ struct Session {
     asking: Asking,
     outbox: Arc<Outbox>,
     n: u64,
-    /// Who asks for the control: name and session.
+    /// The client that asks for control: name and session.
     heir: Option<(String, String)>,
 }
 
@@ -88,7 +88,7 @@ impl Session {
 
     async fn write_all(&mut self, writes: Vec<Value>) -> Result<(), String> {
         for args in writes {
-            // Now that nobody else can arm it.
+            // Checked now that nobody else can arm it.
             if self.hub.is_armed() {
                 return Err("the robot is armed: disarm it first".to_owned());
             }
@@ -103,7 +103,7 @@ impl Session {
         Ok(())
     }
 
-    /// Gives the control to whoever has asked for it, and else to nobody.
+    /// Hands control over to the client that has asked for it; without one, releases it.
     async fn release(&mut self) -> Result<(), String> {
         if let Some((_, session)) = self.heir.take()
             && self
@@ -113,7 +113,7 @@ impl Session {
         {
             return Ok(());
         }
-        // Whoever asked may be gone by now.
+        // The client that asked may be gone by now.
         self.carry_out("ReleaseControl", json!({})).await
     }
 
@@ -148,7 +148,7 @@ impl Session {
             };
             let message: Value = serde_json::from_str(&text).unwrap_or_default();
             if message["op"] == "state" {
-                // It sees the robot.
+                // This counts as having seen the robot.
                 let seen_us = message["master_us"].as_u64().unwrap_or_default();
                 let beat = Body::Beat { seen_us };
                 self.hub.ask(&self.asking, 0, beat, false).await;

@@ -1,4 +1,4 @@
-//! Who is in control, and requests from their begin to their end.
+//! Control of the robot, and requests from their begin to their end.
 
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,10 @@ use wheeleg_access::reason::Reason;
 use wheeleg_access::request::{HostCommand, Order, Spoken};
 
 const RELEASE: CommandCode = CommandCode::ReleaseControl;
-/// The holder of the control is told of those who ask for it so often at most: who asks without end, on
-/// however many connections, fills no queue of theirs.
+/// The holder of control is notified of requests for it at most this often: a client that asks without end,
+/// on however many connections, cannot fill the holder's queue.
 const ASKED: Duration = Duration::from_secs(1);
-/// Time of the master in which it has answered what it accepted about the control: at its next cycle.
+/// Master time within which it has answered an accepted request for control: at its next cycle.
 const CONTROL_US: u64 = 1_000_000;
 
 impl Inner {
@@ -47,8 +47,8 @@ impl Inner {
             }
             Order::Robot(command) => {
                 let takes = command.code() == CommandCode::TakeControl;
-                // Its answers may come in another order than it may expect: what is released behind a
-                // grant would leave the master with a holder of whom nobody here knows.
+                // The master's answers may come in an unexpected order: a release sent behind a grant would
+                // leave the master with a holder that nobody here knows.
                 if takes
                     && self
                         .pending
@@ -70,7 +70,7 @@ impl Inner {
                         return self.tell(id, &outcome(n, self.now_us(), &Answer::Revoked));
                     }
                     Err(Denied::Held) => {
-                        // Nobody is told for a holder who has ended; the next one is.
+                        // A holder who has ended is not notified; the next one is.
                         let holder = self.desk.holder().filter(|h| h.ended.is_none());
                         let holder = holder.map(|holder| holder.client);
                         let told = self
@@ -136,20 +136,20 @@ impl Inner {
                 }
                 let by = client.name.clone();
                 let Some(holder) = self.desk.holder().map(|holder| holder.name.clone()) else {
-                    // Where nobody is in control there is nothing to take away.
+                    // If nobody is in control, there is nothing to take away.
                     return self.tell_done(id, n);
                 };
                 let id = self.next_request;
                 (Input::Revoked { id, holder, by }, Asked::Revoke { hold })
             }
             Order::Host(command) => {
-                // Whoever sits at the robot's computer may break something while another drives.
+                // The person at the robot's computer may inject faults while another drives.
                 let breaks = matches!(command, HostCommand::Inject(_) | HostCommand::EndFault(_));
                 let may_break = breaks && client.is_local;
                 if !self.desk.may_command_host(id) && !may_break {
                     return self.tell(id, &self.held(n, now));
                 }
-                // The robot's thread judges the speed of a lease that was granted, not of one that will be.
+                // The robot's thread judges the speed for a granted lease, not for a future one.
                 let speeds =
                     matches!(command, HostCommand::Speed(speed) if speed > SPEED_OF_CONTROL);
                 let mut pending = self.pending.values();
@@ -193,7 +193,7 @@ impl Inner {
         self.next_request = self.next_request.wrapping_add(1);
     }
 
-    /// The answer to who wants what another holds.
+    /// The answer to a client that asks for control while another holds it.
     fn held(&self, n: u64, now: Instant) -> Value {
         let name = self.desk.name().unwrap_or_default();
         let text = match self.desk.holder().map(|holder| holder.ended) {
@@ -214,7 +214,7 @@ impl Inner {
         answer
     }
 
-    /// Time since the holder has seen the robot, ms of master time.
+    /// Time since the holder last saw the robot, ms of master time.
     pub(super) fn age_ms(&self) -> Option<u64> {
         let status = self.status?;
         let seen_us = status.lease_seen_us?;
@@ -239,7 +239,7 @@ impl Inner {
         match pending.map(|p| p.what) {
             Some(Asked::Take) if is_done => {
                 if !self.desk.grant(client, time_us) {
-                    // The master has granted what was revoked here. Nobody beats for it.
+                    // The master has granted control that was revoked here. Nobody sends beats for it.
                     message = outcome(n, time_us, &Answer::Revoked);
                 }
                 if let Some(holder) = self.desk.holder().filter(|h| h.client == client) {
@@ -266,7 +266,7 @@ impl Inner {
     }
 
     fn handed_over(&mut self, client: ClientId, heir: ClientId) {
-        // Where one of them is gone by now, it is a release.
+        // If one of them is gone by now, it is a release.
         self.desk.release(client);
         let [from, to] = [client, heir].map(|id| self.clients.get(&id));
         let (Some(from), Some(to)) = (from, to) else {
@@ -278,8 +278,8 @@ impl Inner {
         self.tell(heir, &offered);
     }
 
-    /// A client ends the control of whoever has it, or has asked for it: from now on nothing of theirs
-    /// reaches the robot, beats neither, so that the master ends the lease.
+    /// A client ends the control of the holder, or of the client that has asked for it: from now on none of
+    /// its commands or beats reach the robot, so the master ends the lease.
     fn revoke(&mut self, by: ClientId, hold: Duration) {
         let Some(client) = self.clients.get(&by) else {
             return;
@@ -291,7 +291,7 @@ impl Inner {
         self.revoked_by = Some(client.name.clone());
         let (holder, revoked) = (holder.client, json!({ "op": "revoked", "by": client.name }));
         self.tell(holder, &revoked);
-        // What it hands over is a release now: control is reserved already.
+        // Its hand-over is a release now: control is reserved already.
         for pending in self.pending.values_mut() {
             if matches!(pending.what, Asked::HandOver(_)) {
                 pending.what = Asked::Release;
@@ -335,8 +335,8 @@ impl Inner {
                 );
             }
         }
-        // Whoever asked is gone, and nobody else is told. What comes of a control that was asked for is
-        // waited for: the master may grant it yet.
+        // The asker is gone, and nobody else needs the answer. Requests for control stay pending: the master
+        // may still grant them.
         let clients = &self.clients;
         self.pending.retain(|_, p| {
             clients.contains_key(&p.client) || now - p.since < TICKET || p.what.is_of_control()

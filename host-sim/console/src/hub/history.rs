@@ -1,5 +1,5 @@
-//! The last minute of every channel, for who asks later: of channels with a rate at most 50 samples a
-//! second of master time, of those that are told on change every one.
+//! The last minute of every channel, for clients that ask later: of channels with a rate at most 50 samples a
+//! second of master time, of those that are sent on change every one.
 
 use std::collections::VecDeque;
 
@@ -9,11 +9,11 @@ use wheeleg_telemetry::channels;
 /// Longest time that is kept, s.
 pub(crate) const LONGEST_S: u8 = 60;
 const LONGEST_NS: u64 = LONGEST_S as u64 * 1_000_000_000;
-/// Between two samples of a channel with a rate, ns.
+/// Time between two samples of a channel with a rate, ns.
 const PERIOD_NS: u64 = 20_000_000;
-/// Bytes of a channel that are kept at most: a minute of the largest one has a third of them.
+/// Most bytes kept of a channel: three times a minute of the largest one.
 const BYTES_MAX: usize = 1 << 20;
-/// What a sample costs beside its bytes.
+/// Cost of a sample in addition to its bytes.
 const OVERHEAD: usize = 64;
 
 /// Samples of a channel.
@@ -27,7 +27,7 @@ struct Kept {
     samples: VecDeque<(u64, Bytes)>,
 }
 
-/// Who reads samples piece by piece: which comes next, and before which the last one was.
+/// A reader of samples piece by piece: the number of its next one, and its end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reader {
     channel: u16,
@@ -35,7 +35,7 @@ pub(crate) struct Reader {
     end: u64,
 }
 
-/// Samples of all channels, each as a frame has it.
+/// Samples of all channels, each as in a frame.
 pub(super) struct History(Vec<Kept>);
 
 impl History {
@@ -47,7 +47,7 @@ impl History {
         Self(channels().iter().map(|def| of(def.rate_hz == 0)).collect())
     }
 
-    /// Keeps a sample of this time, if it is one to be kept.
+    /// Keeps a sample of this time, if it is due.
     pub(super) fn see(&mut self, channel: u16, t_ns: u64, encode: impl FnOnce() -> Bytes) {
         let kept = &mut self.0[usize::from(channel)];
         if t_ns < kept.next_ns {
@@ -79,8 +79,7 @@ impl History {
         }
     }
 
-    /// The next samples of a reader, at most so many, the oldest first; those that have gone meanwhile
-    /// are left out.
+    /// The next samples of a reader, at most `most`, the oldest first; those dropped meanwhile are left out.
     pub(super) fn read(&self, reader: &mut Reader, most: usize) -> Vec<Bytes> {
         let Kept { first, samples, .. } = &self.0[usize::from(reader.channel)];
         let begin = reader.next.max(*first);
@@ -122,12 +121,12 @@ mod tests {
         assert!((3_000..=3_001).contains(&minute), "{minute}");
         assert_eq!(since(joint, 89_980_000_000), 1);
         assert_eq!(since(joint, 89_981_000_000), 0);
-        // Without a rate memory is the limit: the oldest go.
+        // Without a rate memory is the limit: the oldest are dropped.
         assert_eq!(since(events, 0), BYTES_MAX / (100 + OVERHEAD));
         assert_eq!(since(events, 89_999_000_000), 1);
     }
 
-    /// What it has not read goes as it does without it; it gets what was there when it began.
+    /// Unread samples are dropped as without a reader; it gets those that were there when it began.
     #[test]
     fn a_slow_reader_keeps_nothing_and_comes_to_an_end() {
         let events = index("/events");
@@ -143,7 +142,7 @@ mod tests {
         };
         assert_eq!(read(&history, 3), [2, 3, 4]);
         see(&mut history, 67);
-        // 5 and 6 are older than a minute by now; 67 came after its begin.
+        // 5 and 6 are older than a minute by now; 67 came after the reader began.
         assert_eq!(read(&history, 2), [7, 8]);
         assert_eq!(read(&history, 64), [9]);
         assert!(read(&history, 64).is_empty());

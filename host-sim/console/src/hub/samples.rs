@@ -1,4 +1,4 @@
-//! Samples: taken from the robot's ring, encoded once, and given to whoever wants them.
+//! Samples: taken from the robot's ring, encoded once, and given to every client that wants them.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -1,4 +1,4 @@
-//! The state of the robot, as everybody is told.
+//! The state of the robot, as sent to all clients.
 
 use axum::extract::ws::Utf8Bytes;
 use serde_json::{Value, json};

@@ -1,4 +1,4 @@
-//! Who has stopped the robot, as everybody is told.
+//! Who has stopped the robot, as shown to all clients.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,10 +13,10 @@ use super::Inner;
 use crate::live::{Signals, Status};
 use wheeleg_access::desk::ClientId;
 
-/// A stop is in SYNC after so long, or never.
+/// Time within which a stop is in SYNC, or never.
 const TAKEN: Duration = Duration::from_secs(1);
 
-/// By which way a stop comes.
+/// The way in which a stop comes.
 pub(crate) enum StopBy {
     /// A client of `/ws`.
     Client(ClientId),
@@ -26,13 +26,13 @@ pub(crate) enum StopBy {
     Foxglove,
 }
 
-/// Stops that were asked for and are not looked at yet. Nobody keeps this lock but for a moment, so a
-/// stop does not wait for it.
+/// Requested stops that are not handled yet. This lock is held only for a moment, so a stop does not wait for
+/// it.
 #[derive(Clone, Default)]
 pub(super) struct AskedStops(Arc<Mutex<Vec<(StopBy, u64)>>>);
 
 impl AskedStops {
-    /// Asks for a stop, and gives its number. Whoever sees what comes of it finds here who asked.
+    /// Asks for a stop, and returns its number, under which its effect is traced back to `by`.
     pub(super) fn stop(&self, signals: &Signals, by: StopBy) -> u64 {
         let mut asked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let number = signals.stop();
@@ -45,20 +45,20 @@ impl AskedStops {
     }
 }
 
-/// Who asks for a stop, as everybody is told.
+/// Sender of a stop, as shown to all clients.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "via", rename_all = "snake_case")]
 enum Stopper {
     /// A client of `/ws`: a page, `wheeleg ctl`, a program.
     Console {
-        /// As it calls itself.
+        /// The name it gave.
         name: String,
         /// Its session.
         session: String,
         /// What its key allows.
         role: &'static str,
     },
-    /// Who uses the HTTP API.
+    /// A user of the HTTP API.
     Api,
     /// A viewer by Foxglove's protocol.
     Foxglove,
@@ -79,14 +79,14 @@ pub(super) struct Stopped {
     latched: bool,
     #[serde(skip)]
     asked: Instant,
-    /// It was told as a command.
+    /// It was reported as a command.
     #[serde(skip)]
     told: bool,
 }
 
 impl Stopped {
-    /// Whether an event is this stop: its command, of which later ones are those of others, or
-    /// that all axes hold for it, which a robot that holds already does not tell.
+    /// Whether an event is this stop: its command (later ones belong to others), or the hold of all axes,
+    /// which a robot that already holds does not report.
     pub(super) fn is(&mut self, event: &EventSample) -> bool {
         match event.code {
             EventCode::Hold => event.detail == hold_name(&HoldReason::EmergencyStop),
@@ -102,22 +102,22 @@ impl Stopped {
 }
 
 impl Inner {
-    /// Gives the stops that were asked for their names.
+    /// Adds the names of their senders to the requested stops.
     pub(super) fn name_stops(&mut self) {
         for (by, number) in self.asked_stops.take() {
             self.stopped_by(by, number);
         }
     }
 
-    /// Somebody has asked for a stop: remembers the first.
+    /// Remembers the first request for a stop.
     fn stopped_by(&mut self, by: StopBy, number: u64) {
         let first = self.stopped.as_ref();
-        // While the clock stands, one that was taken is in no record yet.
+        // While the clock stands, an accepted stop is not in any record yet.
         let status = self.status.as_ref();
         let waits = |first: &Stopped| {
             status.is_some_and(|status| status.pace.paused && status.stops >= first.number)
         };
-        // One that was not taken in this time is none: the master was dead.
+        // A stop not accepted in this time never will be: the master was dead.
         if first
             .is_some_and(|first| first.latched || waits(first) || first.asked.elapsed() <= TAKEN)
         {
@@ -142,7 +142,7 @@ impl Inner {
         });
     }
 
-    /// A stop that was latched and is no more is over.
+    /// Ends a stop that was latched and no longer is.
     pub(super) fn look_at_stops(&mut self, status: &Status) {
         let over = self.stopped.as_mut().is_some_and(|stopped| {
             stopped.latched |= status.emergency_stop && status.stops >= stopped.number;
@@ -158,7 +158,7 @@ impl Inner {
 mod tests {
     use super::*;
 
-    /// However soon the robot takes a stop, it is known who asked for it.
+    /// However soon the robot accepts a stop, its sender is known.
     #[test]
     fn who_has_stopped_is_known_before_the_stop_is_seen() {
         const STOPS: u64 = 20_000;

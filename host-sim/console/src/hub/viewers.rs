@@ -1,4 +1,4 @@
-//! What viewers by Foxglove's protocol ask.
+//! Requests of viewers over Foxglove's protocol.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use super::{Asking, CLIENTS, Hub, Role, StopBy, StopsUnderWay};
 use crate::foxglove::{self, Call, Outbox, Request, Setting, ViewerId, status};
 use crate::foxglove::{STOP_SERVICE, URDF};
 
-/// Who looks.
+/// A viewer.
 pub(crate) struct Looking {
     /// Number of the viewer.
     pub(crate) id: ViewerId,
@@ -24,7 +24,7 @@ const SERVICE_ANSWER: u8 = 3;
 const ASSET: u8 = 4;
 
 impl Hub {
-    /// A viewer comes, if there is a place for it; the last one is for who may control.
+    /// Adds a viewer, if there is a place for it; the last one is for a client that may control.
     pub(crate) fn enter_viewer(&self, outbox: &Arc<Outbox>) -> Option<ViewerId> {
         let mut inner = self.inner();
         let free = inner.taken_places() < CLIENTS - 1;
@@ -44,12 +44,12 @@ impl Hub {
         Some(asking)
     }
 
-    /// A viewer is gone.
+    /// Removes a viewer.
     pub(crate) fn leave_viewer(&self, id: ViewerId) {
         self.inner().viewers.leave(id);
     }
 
-    /// What a viewer asks.
+    /// Handles a viewer's request.
     pub(crate) async fn look(self: &Arc<Self>, looking: &Looking, request: Request) {
         let id = looking.id;
         let request = match request {
@@ -108,7 +108,7 @@ impl Hub {
         let inner = self.inner();
         inner.viewers.tell(looking.id, status(2, text));
         if !names.is_empty() {
-            // The viewer shows what it wanted until it is told what is so.
+            // The viewer shows the requested values until it gets the real ones.
             let request = request.as_deref();
             inner.viewers.tell_parameters(looking.id, &names, request);
         }
@@ -133,17 +133,17 @@ impl Hub {
         });
     }
 
-    /// Tells a viewer.
+    /// Sends a viewer a message.
     pub(crate) fn tell_viewer(&self, id: ViewerId, message: Message) {
         self.inner().viewers.tell(id, message);
     }
 
-    /// Tells a viewer of parameters.
+    /// Sends a viewer the values of parameters.
     pub(crate) fn tell_parameters(&self, id: ViewerId, names: &[String], request: Option<&str>) {
         self.inner().viewers.tell_parameters(id, names, request);
     }
 
-    /// Arguments of the `WriteParameter` that sets a parameter, or what is wrong with it.
+    /// Arguments of the `WriteParameter` that sets a parameter, or the error in it.
     pub(crate) fn write(&self, name: &str, value: Option<&Value>) -> Result<Value, String> {
         self.inner().viewers.parameters.write(name, value)
     }

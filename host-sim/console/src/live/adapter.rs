@@ -1,10 +1,10 @@
-//! A serial adapter that collects bytes before it hands them on: on the bus every reply has its place in
-//! a cycle of 10 ms.
+//! A serial adapter that collects bytes before it passes them on, although on the bus every reply has its
+//! place in a cycle of 10 ms.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where Linux tells about serial ports.
+/// Where Linux describes serial ports.
 pub(super) const PORTS: &str = "/sys/class/tty";
 
 /// Longest time for which an adapter may collect bytes, ms.
@@ -31,7 +31,7 @@ impl fmt::Display for SlowAdapter {
 }
 
 impl SlowAdapter {
-    /// That of a port, by the system's `folder` of ports. None: it is quick enough, or does not say.
+    /// The adapter of a port, by the system's `folder` of ports. None: it is quick enough, or does not say.
     pub(super) fn at(port: &str, folder: &Path) -> Option<Self> {
         // Its name may be a link, such as those by an adapter's serial number.
         let device = std::fs::canonicalize(port).ok()?;

@@ -1,4 +1,4 @@
-//! What the robot's thread leads: a simulated robot, or the boards at the end of a line.
+//! The robot led by the robot's thread: a simulated one, or the boards at the end of a line.
 
 use wheeleg_config::RobotConfig;
 use wheeleg_config::Scenario;
@@ -13,11 +13,11 @@ use wheeleg_telemetry::Recorder;
 
 use super::Port;
 
-/// Both are large, and are not moved about.
+/// Boxed: both are large, and should not be moved about.
 pub(super) enum Machine {
     /// Boards, plant and master in this program, on a clock of its own.
     Simulated(Box<Session>),
-    /// The master here, its boards at a serial port, on the clock of the wall.
+    /// The master here, its boards at a serial port, in wall-clock time.
     Line(Box<LineMaster<PortLine>>),
 }
 
@@ -123,7 +123,7 @@ impl Machine {
     }
 }
 
-/// What can be done with a simulated robot alone.
+/// Error for actions that only a simulated robot allows.
 pub(super) fn only_simulated(what: &str) -> SimError {
     SimError::simulation(
         format!("{what} a simulated robot only: these boards are on a serial port"),

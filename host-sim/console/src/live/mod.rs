@@ -1,6 +1,5 @@
-//! The robot's own thread: it owns the session, keeps time, and waits for nobody. It takes no lock
-//! and writes no file; what comes and goes passes through rings, what matters most through atomics
-//! beside them.
+//! The robot's own thread: it owns the session, keeps time, and waits for nobody. It takes no lock and writes
+//! no file; messages pass through rings, the most important ones through atomics beside them.
 
 mod adapter;
 mod machine;
@@ -35,7 +34,7 @@ pub(crate) const SAMPLES: usize = 16_384;
 /// Reports that may wait for the hub.
 pub(crate) const REPORTS: usize = 1_024;
 
-/// What to simulate.
+/// Inputs of the simulation.
 #[derive(Debug, Clone)]
 pub struct Live {
     /// Ground, pose and seed.
@@ -46,9 +45,9 @@ pub struct Live {
     pub scenario_toml: String,
     /// The robot's file, for recordings.
     pub robot_toml: String,
-    /// Simulated over wall time; `None`: as fast as it goes.
+    /// Ratio of simulated to wall time; `None`: as fast as possible.
     pub speed: Option<f64>,
-    /// Whether the clock stands at first.
+    /// Whether the clock is paused at first.
     pub paused: bool,
     /// The serial port at which the boards are; `None`: they are simulated.
     pub port: Option<Port>,
@@ -59,21 +58,21 @@ pub struct Live {
 pub struct Port {
     /// Which.
     pub options: HilOptions,
-    /// Number of the master's first request; another at every start.
+    /// Number of the master's first request; different at every start.
     pub first_sequence: u16,
-    /// Where the system tells about its adapter.
+    /// Where the system describes its adapter.
     ports: PathBuf,
 }
 
 impl Port {
-    /// The port that `text` names, with its rate if that is another: `/dev/ttyUSB0@115200`.
+    /// The port named by `text`, with its rate if not the default: `/dev/ttyUSB0@115200`.
     ///
     /// # Errors
     /// [`SimError`] if it names none.
     pub fn parse(text: &str) -> Result<Self, SimError> {
         let mut first = [0; 2];
-        // Where the system has no chance to give, a board may take the first request for an old
-        // one; the master asks again.
+        // If the system has no random number, a board may take the first request for an old one; the master
+        // asks again.
         let _ = getrandom::fill(&mut first);
         Ok(Self {
             options: HilOptions::parse(text)?,
@@ -82,7 +81,7 @@ impl Port {
         })
     }
 
-    /// The same, of which another folder tells; for tests.
+    /// The same, described in another folder; for tests.
     #[doc(hidden)]
     #[must_use]
     pub fn told_of_in(self, ports: &Path) -> Self {
@@ -115,7 +114,7 @@ impl Live {
         Self::of(&source, &robot)
     }
 
-    /// The same of files that are read already.
+    /// The same from files that are read already.
     ///
     /// # Errors
     /// [`ConfigError`] if one is wrong.
@@ -132,14 +131,14 @@ impl Live {
     }
 }
 
-/// What the hub asks of the robot.
+/// A request of the hub to the robot.
 #[derive(Debug)]
 pub(crate) enum Input {
-    /// A command to the master, for the holder of the control.
+    /// A command to the master, for the holder of control.
     Request {
         /// Number of the request at the hub and at the master.
         id: u32,
-        /// Newest master time that the sender has been shown, µs.
+        /// Newest master time shown to the sender, µs.
         seen_us: u64,
         /// How long after it the command may begin, µs.
         valid_us: u64,
@@ -147,7 +146,7 @@ pub(crate) enum Input {
         command: Command,
         /// The same as its sender wrote it.
         spoken: Spoken,
-        /// Name of the client that takes the control.
+        /// Name of the client that takes control.
         by: Option<String>,
     },
     /// A command to the simulation.
@@ -157,32 +156,32 @@ pub(crate) enum Input {
         /// The command.
         command: HostCommand,
     },
-    /// The control was revoked, at the hub. The robot notices nothing; its recording does.
+    /// Control was revoked, at the hub. The robot does not notice; its recording does.
     Revoked {
         /// Number of the request at the hub.
         id: u32,
         /// Name of the client that was in control, or had asked for it.
         holder: String,
-        /// Name of the client that has revoked it.
+        /// Name of the client that revoked it.
         by: String,
     },
 }
 
-/// What the robot tells the hub.
+/// A report of the robot to the hub.
 #[derive(Debug)]
 pub(crate) enum Report {
-    /// How it is, once per bus cycle.
+    /// Its state, once per bus cycle.
     Status(Status),
-    /// What comes of a request.
+    /// The answer to a request.
     Answer {
         /// Number of the request.
         id: u32,
         /// Master time, µs.
         time_us: u64,
-        /// What.
+        /// The answer.
         answer: Answer,
     },
-    /// A board has told the value of a parameter.
+    /// A board has reported the value of a parameter.
     Parameter {
         /// Board.
         board: u8,
@@ -191,11 +190,11 @@ pub(crate) enum Report {
         /// Raw value.
         raw: i32,
     },
-    /// The simulation cannot go on.
+    /// The simulation cannot continue.
     Failed(Box<SimError>),
 }
 
-/// What comes of a request.
+/// The answer to a request.
 #[derive(Debug)]
 pub(crate) enum Answer {
     /// It is queued; its end comes later.
@@ -206,17 +205,17 @@ pub(crate) enum Answer {
     Rejected(Reject),
     /// Refused later.
     Refused(Refusal),
-    /// The clock stands.
+    /// The clock is paused.
     Paused,
-    /// The sender has seen the future.
+    /// The sender claims to have seen the future.
     SeenInFuture,
     /// The computer was suspended since the sender saw the robot.
     Suspended,
-    /// The control was revoked, and the sender's lease is not over.
+    /// Control was revoked, and the sender's lease is not over.
     Revoked,
     /// The master is dead.
     NoMaster,
-    /// The clock goes too fast for somebody in control.
+    /// The clock runs too fast for a client to be in control.
     TooFast,
     /// The serial adapter is too slow for the bus.
     SlowAdapter(Box<SlowAdapter>),
@@ -226,7 +225,7 @@ pub(crate) enum Answer {
     NotRecorded(String),
 }
 
-/// How the robot is, at the end of a bus cycle.
+/// State of the robot at the end of a bus cycle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Status {
     /// Master time, µs.
@@ -247,13 +246,13 @@ pub(crate) struct Status {
     pub(crate) phase: Phase,
     /// Step of the gait, from 0.
     pub(crate) step: u16,
-    /// Newest master time that the holder of the control has seen, µs.
+    /// Newest master time that the holder of control has seen, µs.
     pub(crate) lease_seen_us: Option<u64>,
     /// Boards 1 to 8.
     pub(crate) boards: [BoardStatus; 8],
-    /// How the clock goes.
+    /// Pace of the clock.
     pub(crate) pace: PaceStatus,
-    /// Stops that were asked for and are taken.
+    /// Number of requested stops that were accepted.
     pub(crate) stops: u64,
 }
 
@@ -273,18 +272,18 @@ pub(crate) struct BoardStatus {
     pub(crate) faults: FaultBits,
 }
 
-/// How the clock goes.
+/// Pace of the clock.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct PaceStatus {
-    /// Simulated over wall time that is asked for; `None`: as fast as it goes.
+    /// Requested ratio of simulated to wall time; `None`: as fast as possible.
     pub(crate) speed: Option<f64>,
-    /// The clock stands.
+    /// The clock is paused.
     pub(crate) paused: bool,
-    /// Simulated over wall time of the last second.
+    /// Ratio of simulated to wall time over the last second.
     pub(crate) factor: f64,
     /// How late the last cycle began, ms.
     pub(crate) late_ms: f64,
-    /// How late one of the last second began at most, ms.
+    /// Largest lateness of a cycle in the last second, ms.
     pub(crate) late_max_ms: f64,
     /// Cycles since the start that began more than 5 ms late, and their SYNC with them.
     pub(crate) late: u32,
@@ -297,7 +296,7 @@ pub(crate) struct PaceStatus {
 pub(crate) struct Moving {
     /// Index of the channel.
     pub(crate) channel: u16,
-    /// Number of the sample in its channel: a gap is what the ring had no room for.
+    /// Number of the sample in its channel: a gap means that the ring was full.
     pub(crate) number: u64,
     /// Simulated time, ns.
     pub(crate) t_ns: u64,
@@ -305,12 +304,12 @@ pub(crate) struct Moving {
     pub(crate) sample: OwnedSample,
 }
 
-/// What passes beside the rings, so that no full ring can hold it up.
+/// Messages beside the rings, so that no full ring can hold them up.
 #[derive(Debug, Default)]
 pub(crate) struct Signals {
-    /// Stops asked for.
+    /// Number of requested stops.
     stops: AtomicU64,
-    /// Newest master time that the holder of the control has seen, µs.
+    /// Newest master time that the holder of control has seen, µs.
     seen_us: AtomicU64,
     /// The robot's thread is to end.
     end: AtomicBool,
@@ -321,18 +320,18 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// Asks for a stop, and gives the number that [`Status::stops`] reaches when it is taken.
+    /// Asks for a stop, and returns the number that [`Status::stops`] reaches when it is accepted.
     pub(crate) fn stop(&self) -> u64 {
         self.stops.fetch_add(1, Ordering::SeqCst) + 1
     }
 
-    /// How many were asked for.
+    /// Number of requested stops.
     #[cfg(test)]
     pub(crate) fn stops(&self) -> u64 {
         self.stops.load(Ordering::SeqCst)
     }
 
-    /// The holder of the control has seen the robot.
+    /// The holder of control has seen the robot.
     pub(crate) fn beat(&self, seen_us: u64) {
         self.seen_us.store(seen_us, Ordering::Release);
     }
@@ -342,7 +341,7 @@ impl Signals {
         self.end.store(true, Ordering::SeqCst);
     }
 
-    /// So many clients and viewers are connected.
+    /// Sets the number of connected clients and viewers.
     pub(crate) fn connected(&self, clients: usize) {
         self.clients.store(clients, Ordering::Relaxed);
     }

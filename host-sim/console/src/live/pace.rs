@@ -11,20 +11,20 @@ const CATCH_UP: Duration = Duration::from_millis(100);
 const LATE: Duration = Duration::from_millis(5);
 /// Cycles that are caught up with at most.
 const BURST: u32 = 10;
-/// Time over which the pace is looked at.
+/// Time over which the pace is measured.
 const SECOND: Duration = Duration::from_secs(1);
-/// Cycles of a second whose lateness is looked at: all of them, at the fastest pace that is late at all.
+/// Cycles of a second whose lateness is measured: all of them, at the fastest pace that can be late at all.
 const CYCLES: usize = 1_024;
 
 /// When the next cycle is due.
 #[derive(Debug)]
 pub(super) struct Pace {
     cycle: Duration,
-    /// Wall time of a cycle; `None`: as fast as it goes.
+    /// Wall time of a cycle; `None`: as fast as possible.
     period: Option<Duration>,
     due: Instant,
     status: PaceStatus,
-    /// Begin of the second that is looked at, and its cycles.
+    /// Start of the measured second, and its cycles.
     since: Instant,
     cycles: u32,
     /// How late they began, ms.
@@ -49,13 +49,13 @@ impl Pace {
         pace
     }
 
-    /// How the clock goes.
+    /// Pace of the clock.
     pub(super) fn status(&self) -> PaceStatus {
         self.status
     }
 
-    /// Simulated over wall time from now on. The second that is looked at goes on, however often this is
-    /// called, and the next cycle comes no earlier than it was due.
+    /// Sets the ratio of simulated to wall time. The measured second goes on, however often this is called,
+    /// and the next cycle does not come before it was due.
     pub(super) fn set_speed(&mut self, speed: Option<f64>, now: Instant) {
         let had_period = self.period.is_some();
         self.set_period(speed);
@@ -70,7 +70,7 @@ impl Pace {
         self.period = speed.map(|speed| self.cycle.div_f64(speed));
     }
 
-    /// Lets the clock stand, or go on.
+    /// Pauses or resumes the clock.
     pub(super) fn pause(&mut self, paused: bool, now: Instant) {
         if replace(&mut self.status.paused, paused) == paused {
             return;
@@ -81,8 +81,7 @@ impl Pace {
         self.rebase(now);
     }
 
-    /// The next cycle is due now: nothing of what was missed is made up for, and the second that is
-    /// looked at begins anew.
+    /// The next cycle is due now: missed cycles are not made up for, and the observed second starts again.
     pub(super) fn rebase(&mut self, now: Instant) {
         self.due = now;
         self.late_ms.clear();
@@ -97,7 +96,7 @@ impl Pace {
         }
     }
 
-    /// A cycle begins. How late those of the last second were, if one is over.
+    /// Begins a cycle. Returns the lateness of the last second's cycles, if one is over.
     pub(super) fn begin(&mut self, now: Instant) -> Option<Lateness> {
         let late = match self.period {
             Some(period) => {
@@ -146,7 +145,7 @@ pub(super) struct Lateness {
 }
 
 impl Lateness {
-    /// Of at least one cycle, in any order.
+    /// From at least one cycle, in any order.
     fn of(late_ms: &mut [f64]) -> Self {
         late_ms.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| {
@@ -218,8 +217,8 @@ mod tests {
         assert!((factor - 2.0).abs() < 0.02, "{factor}");
     }
 
-    /// A client that sets the pace again and again neither keeps it from being measured nor makes the
-    /// robot faster.
+    /// A client that sets the pace again and again neither prevents its measurement nor makes the robot
+    /// faster.
     #[test]
     fn a_pace_that_is_set_in_every_cycle_is_measured_and_kept() {
         let start = Instant::now();
@@ -234,7 +233,7 @@ mod tests {
         assert!((199..=202).contains(&cycles), "{cycles} of 200");
         let factor = pace.status().factor;
         assert!((factor - 1.0).abs() < 0.02, "{factor}");
-        // From the slowest to a faster one nobody waits for the slow one.
+        // From the slowest pace to a faster one, nobody waits for the slow cycle.
         let now = start + Duration::from_secs(3);
         let mut slow = Pace::new(CYCLE, Some(0.1), false, now);
         burst(&mut slow, now);
@@ -242,7 +241,7 @@ mod tests {
         assert_eq!(slow.wait(now), CYCLE);
     }
 
-    /// Nor does one in which the clock stood count as a slow one.
+    /// Nor does a cycle with a paused clock count as a slow one.
     #[test]
     fn after_a_pause_the_pace_is_measured_anew() {
         let start = Instant::now();
@@ -266,7 +265,7 @@ mod tests {
         let mut pace = Pace::new(CYCLE, Some(1.0), false, start);
         let mut told = Vec::new();
         for n in 0..=200_u32 {
-            // One in a hundred is 40 ms late, which is caught up with; the rest by 2 ms.
+            // One in a hundred is 40 ms late, which is caught up with; the others are 2 ms late.
             let late_ms = if n % 100 == 50 { 40 } else { 2 };
             let now = start + CYCLE * n + Duration::from_millis(late_ms);
             told.extend(pace.begin(now));

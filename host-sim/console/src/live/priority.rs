@@ -1,12 +1,12 @@
-//! The priority of the robot's thread. Where the system permits it, the thread runs before all that
-//! is not in such a hurry, and a busy browser does not make it late.
+//! The priority of the robot's thread. Where the system permits it, the thread runs before less urgent ones,
+//! so that a busy browser does not make it late.
 
 /// Of 1 to 99: above ordinary programs, below what the system itself runs so.
 #[cfg(target_os = "linux")]
 const PRIORITY: u8 = 10;
 
-/// Asks for `SCHED_FIFO` for the thread that asks, and says whether it was granted. Refused, as it
-/// is for most users, the thread goes on as it is.
+/// Asks for `SCHED_FIFO` for the calling thread, and returns whether it was granted. If refused, as for most
+/// users, the thread goes on as it is.
 #[cfg(target_os = "linux")]
 pub(super) fn ask() -> bool {
     use thread_priority::unix::{
@@ -23,7 +23,7 @@ pub(super) fn ask() -> bool {
     set_thread_priority_and_policy(thread_native_id(), priority, policy).is_ok()
 }
 
-/// Other systems have none such.
+/// Other systems do not have it.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn ask() -> bool {
     false
@@ -33,7 +33,7 @@ pub(super) fn ask() -> bool {
 mod tests {
     use super::*;
 
-    /// What is said is so: the system knows the thread by policy 1 and this priority, or by policy 0.
+    /// The result is true: the system knows the thread by policy 1 and this priority, or by policy 0.
     #[test]
     fn what_was_granted_is_what_the_system_has() {
         let thread = std::thread::spawn(|| {

@@ -29,18 +29,18 @@ use crate::record::{Feed, FeedSink, Given};
 use wheeleg_access::host::SPEED_OF_CONTROL;
 use wheeleg_access::request::{HostCommand, Spoken};
 
-/// Both rings are read so often, ns of simulated time.
+/// How often both rings are read, ns of simulated time.
 const TICK_NS: u64 = 1_000_000;
-/// How often a recording gets the hash of everything until then, ns of simulated time.
+/// How often a recording gets the hash of everything so far, ns of simulated time.
 const HASH_NS: u64 = 1_000_000_000;
-/// Stack of the thread: a world is built on it in one piece.
+/// Stack of the thread: it must hold a world while it is built.
 const STACK: usize = 16 << 20;
-/// A robot that stood still for so long, unasked, was seen by nobody: the master's own timeout.
+/// A robot that stands still this long without being paused was out of sight: the master's own timeout.
 const BLIND: Duration = Duration::from_micros(OPERATOR_TIMEOUT_US as u64);
-/// Longest sleep, so that a stop is heard however slow the clock goes.
+/// Longest sleep, so that a stop is heard however slow the clock runs.
 const NAP: Duration = Duration::from_millis(5);
 
-/// Time of a clock that goes on while the computer is suspended, where the system has one.
+/// Time of a clock that runs while the computer is suspended, where the system has one.
 fn awake() -> Duration {
     #[cfg(target_os = "linux")]
     {
@@ -54,15 +54,15 @@ fn awake() -> Duration {
     }
 }
 
-/// A robot that lives in a thread of its own: what the hub has of it.
+/// The hub's side of a robot that lives in its own thread.
 pub(crate) struct Robot {
     /// Commands to it.
     pub(crate) inputs: rtrb::Producer<Input>,
-    /// What it tells.
+    /// Its reports.
     pub(crate) reports: rtrb::Consumer<Report>,
-    /// What it is seen to do.
+    /// Its samples.
     pub(crate) samples: rtrb::Consumer<Moving>,
-    /// What passes beside the rings.
+    /// Signals beside the rings.
     pub(crate) signals: Arc<Signals>,
     /// The thread.
     pub(crate) thread: JoinHandle<()>,
@@ -70,8 +70,7 @@ pub(crate) struct Robot {
     pub(crate) goes_first: bool,
 }
 
-/// Powers a robot up in a thread of its own. What it is given and what is sampled of it goes to
-/// `feed` as well.
+/// Powers a robot up in a thread of its own. Its inputs and samples also go to `feed`.
 ///
 /// # Errors
 /// [`SimError`] if it cannot be built.
@@ -93,7 +92,7 @@ pub(crate) fn start(live: Live, feed: Feed, contacts: ContactSink) -> Result<Rob
                 return;
             }
         };
-        // A clock that goes as fast as it can leaves nothing to others.
+        // A clock that runs as fast as possible would leave nothing to others.
         let goes_first = live.speed.is_some() && priority::ask();
         let _ = built.send(Ok(goes_first));
         let cycle = Duration::from_secs_f64(robot.bus.cycle_s);
@@ -159,25 +158,25 @@ struct Loop {
     inputs: rtrb::Consumer<Input>,
     reports: rtrb::Producer<Report>,
     signals: Arc<Signals>,
-    /// That of real boards.
+    /// The port of real boards.
     port: Option<Port>,
     cycle_ns: u64,
-    /// Time up to which has been simulated.
+    /// Simulated time reached.
     target_ns: u64,
-    /// Cycles still to be simulated although the clock stands.
+    /// Cycles still to be simulated although the clock is paused.
     steps: u32,
-    /// Stops that were asked for and heard.
+    /// Requested stops that were heard.
     stops_heard: u64,
-    /// Stops that the master has taken.
+    /// Stops that the master has accepted.
     stops: u64,
-    /// Newest beat that was given to the master.
+    /// Newest beat passed to the master.
     seen_us: u64,
     /// When it listened last.
     listened: Duration,
-    /// The computer was suspended under the operator, who is not heard again: the master ends the
-    /// lease, and all axes hold.
+    /// The computer was suspended under the operator, who is no longer heard: the master ends the lease, and
+    /// all axes hold.
     deaf: bool,
-    /// The simulation cannot go on.
+    /// The simulation cannot continue.
     failed: bool,
 }
 
@@ -208,12 +207,12 @@ impl Loop {
         self.feed.borrow_mut().close(self.recorded_us(), &hash);
     }
 
-    /// Time up to which everything is in the recording, µs.
+    /// Time up to which the recording is complete, µs.
     fn recorded_us(&self) -> u64 {
         self.target_ns / 1_000
     }
 
-    /// How the clock went over the last second.
+    /// Reports the pace of the last second.
     fn tell_pace(&mut self, lateness: &Lateness) {
         let pace = self.pace.status();
         let count = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
@@ -230,7 +229,7 @@ impl Loop {
         self.recorder.server(self.target_ns, &sample);
     }
 
-    /// The robot was given something now.
+    /// Records an input of the robot, now.
     fn given(&mut self, given: Given) {
         let ms = self.target_ns / TICK_NS;
         if let Some(sample) = given.sample(&self.pace.status()) {
@@ -316,7 +315,7 @@ impl Loop {
         self.machine.master().layer0().lease().is_held()
     }
 
-    /// Gives a stop that was asked for; it waits neither for a ring nor for the clock.
+    /// Passes on a requested stop, without waiting for a ring or for the clock.
     fn hear_stop(&mut self) {
         let asked = self.signals.stops.load(Ordering::SeqCst);
         if asked == self.stops_heard || self.failed {
@@ -330,7 +329,7 @@ impl Loop {
             command: Command::EmergencyStop,
         };
         self.given(Given::Stop(stop.id));
-        // A dead master takes none.
+        // A dead master accepts none.
         if let Some(Ok(_)) = self.machine.request(stop, &mut self.recorder) {
             self.stops = asked;
         }
@@ -365,7 +364,7 @@ impl Loop {
         if too_fast && request.command.code() == CommandCode::TakeControl {
             return Answer::TooFast;
         }
-        // Looked at each time: an adapter that is plugged in again has its old setting.
+        // Checked each time: an adapter that is plugged in again has its old setting.
         if request.command.code() == CommandCode::Arm
             && let Some(slow) = self.port.as_ref().and_then(Port::slow_adapter)
         {
@@ -446,7 +445,7 @@ impl Loop {
 
     fn answer(&mut self, id: u32, answer: Answer) {
         let time_us = self.now_us();
-        // A hub that does not listen is told nothing; the robot goes on.
+        // If the hub does not listen, the answer is lost; the robot continues.
         let _ = self.reports.push(Report::Answer {
             id,
             time_us,
@@ -477,7 +476,7 @@ impl Loop {
     }
 
     fn report_status(&mut self) {
-        // Answers go first where the hub does not keep up.
+        // Answers take precedence if the hub does not keep up.
         if self.reports.slots() < REPORTS / 2 {
             return;
         }
@@ -515,7 +514,7 @@ impl Loop {
     }
 }
 
-/// The recorder answers when its files are there.
+/// The recorder answers once its files are there.
 fn recorded(asked: Result<(), &str>) -> Answer {
     match asked {
         Ok(()) => Answer::Accepted,

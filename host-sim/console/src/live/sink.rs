@@ -1,5 +1,4 @@
-//! The sink of a live robot: samples go into a ring to the hub. Where it is full they are dropped
-//! and counted.
+//! The sink of a live robot: samples go into a ring to the hub. If it is full, they are dropped and counted.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -27,7 +26,7 @@ impl RingSink {
 
 impl Sink for RingSink {
     fn take(&mut self, taken: &Taken<'_>) {
-        // What went into a run is asked for, not sent.
+        // The inputs of a run are requested, not sent.
         if matches!(taken.sample, SampleRef::Provenance(_)) {
             return;
         }

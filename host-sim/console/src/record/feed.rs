@@ -11,12 +11,12 @@ use wheeleg_telemetry::{Contact, SampleRef, Sink, Taken};
 use super::{Given, Note, Shared, Touching};
 use crate::live::Moving;
 
-/// Places of the ring that samples leave for inputs, begin and end.
+/// Places in the ring that samples leave free for inputs, begin and end.
 const RESERVE: usize = 2_048;
 /// How long the end of a recording may wait for its place when the robot is switched off.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
-/// Takes what the robot is given and what is sampled of it.
+/// Takes the robot's inputs and samples.
 pub(crate) struct Feed {
     to: rtrb::Producer<Note>,
     shared: Arc<Shared>,
@@ -45,7 +45,7 @@ impl Feed {
         self.running
     }
 
-    /// Begins a recording, or says why not.
+    /// Begins a recording, or returns why not.
     pub(crate) fn begin(&mut self, request: u32, at_us: u64) -> Result<(), &'static str> {
         if self.is_running() {
             return Err("a recording is in progress: stop it first");
@@ -62,7 +62,7 @@ impl Feed {
         Ok(())
     }
 
-    /// Ends the recording, or says why not. `hash` is of everything since power-up.
+    /// Ends the recording, or returns why not. `hash` covers everything since power-up.
     pub(crate) fn end(
         &mut self,
         request: Option<u32>,
@@ -94,7 +94,7 @@ impl Feed {
         }
     }
 
-    /// Something for the log, if there is room.
+    /// Adds an item for the log, if there is room.
     fn note(&mut self, note: Note) {
         if self.to.slots() < RESERVE || self.to.push(note).is_err() {
             self.dropped += 1;
@@ -102,7 +102,7 @@ impl Feed {
         }
     }
 
-    /// The robot was given something when it had been simulated up to `ms`.
+    /// Records an input at the simulated time `ms`.
     pub(crate) fn given(&mut self, ms: u64, given: Given) {
         if self.to.push(Note::Input { ms, given }).is_err() {
             self.shared.gap.store(true, Ordering::Release);
@@ -110,12 +110,12 @@ impl Feed {
     }
 }
 
-/// The sink of a [`Feed`]: what is due in the log.
+/// The sink of a [`Feed`]: takes samples that are due in the log.
 pub(crate) struct FeedSink(pub(crate) Rc<RefCell<Feed>>);
 
 impl Sink for FeedSink {
     fn take(&mut self, taken: &Taken<'_>) {
-        // What went into a run stands in every recording, whenever it begins.
+        // Every recording holds the inputs of its run, whenever it begins.
         let head = matches!(taken.sample, SampleRef::Provenance(_));
         let mut feed = self.0.borrow_mut();
         if !taken.due || !(feed.running || head) {

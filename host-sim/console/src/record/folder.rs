@@ -1,5 +1,5 @@
 //! The folder of a recording: `log.mcap`, `inputs.jsonl`, the robot's and the scenario's file, and
-//! `recording.json`, which says what it is of and how it ended. A long log is cut into parts.
+//! `recording.json`, which says what was recorded and how it ended. A long log is split into parts.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Read as _, Write as _};
@@ -16,13 +16,13 @@ use crate::live::Moving;
 
 /// The log.
 pub(crate) const LOG: &str = "log.mcap";
-/// What the robot was given.
+/// The robot's inputs.
 pub(crate) const INPUTS: &str = "inputs.jsonl";
 /// The robot's file.
 pub(crate) const ROBOT: &str = "robot.toml";
 /// The scenario's file.
 pub(crate) const SCENARIO: &str = "scenario.toml";
-/// What the recording is of, and how it ended.
+/// Summary: what was recorded, and how it ended.
 pub(crate) const SUMMARY: &str = "recording.json";
 
 /// Length of a part of the log, ns: some 100 MB.
@@ -42,7 +42,7 @@ pub struct Summary {
     pub robot: String,
     /// Scenario: ground and pose.
     pub scenario: String,
-    /// Seed of all noise; in the file a text, since many readers of JSON hold no number above 2^53.
+    /// Seed of all noise; text in the file, since many JSON readers cannot hold numbers above 2^53.
     #[serde(with = "seed_text")]
     pub seed: u64,
     /// Master time of its begin, µs.
@@ -51,15 +51,15 @@ pub struct Summary {
     pub end_us: Option<u64>,
     /// Hash of everything from power-up to its end.
     pub hash: Option<String>,
-    /// Messages that the log lacks.
+    /// Messages missing in the log.
     pub dropped: u64,
-    /// All inputs since power-up are there.
+    /// It holds all inputs since power-up.
     pub repeatable: bool,
     /// Why it ended early.
     pub failure: Option<String>,
 }
 
-/// A seed as text; earlier recordings have a number.
+/// A seed as text; older recordings have a number.
 mod seed_text {
     use serde::{Deserialize, Deserializer, Serializer, de};
 
@@ -91,14 +91,14 @@ pub(super) struct Folder {
     part_ns: u64,
     /// Time at which the next part begins, ns.
     next_ns: u64,
-    /// What every part has at its head.
+    /// Messages at the head of every part.
     head: Vec<(u16, OwnedSample)>,
     scene: Scene,
     inputs: BufWriter<File>,
     line: Vec<u8>,
-    /// Messages that were not to be written.
+    /// Messages that were deliberately not written.
     lost: u64,
-    /// What will stand in `recording.json`.
+    /// Contents of the later `recording.json`.
     pub(super) summary: Summary,
 }
 
@@ -146,7 +146,7 @@ impl Folder {
         let (id, path) = numbered(root)?;
         let made = Self::begin(id, path.clone(), (about, begin_us), head, before);
         made.inspect_err(|_| {
-            // Half a recording is none.
+            // Half a recording is useless.
             let _ = fs::remove_dir_all(&path);
         })
     }
@@ -222,8 +222,8 @@ impl Folder {
             .map_or(Ok(()), |why| Err(why.to_string()))
     }
 
-    /// Begins the next part of the log where it is due: of a long recording each file stays one that can be
-    /// opened and sent, and whatever happens to the last one, the others are whole.
+    /// Begins the next part of the log when it is due: each file of a long recording stays small enough to
+    /// open and send, and if the last one is damaged, the others are whole.
     fn cut(&mut self, t_ns: u64) -> Result<(), String> {
         if t_ns < self.next_ns {
             return Ok(());
@@ -263,13 +263,13 @@ impl Folder {
         written.map_err(|e| said(&self.path.join(INPUTS), &e))
     }
 
-    /// Hands the inputs to the operating system: a killed program loses no more than since then.
+    /// Hands the inputs to the operating system: a killed program loses no more than those since then.
     pub(super) fn flush(&mut self) -> Result<(), String> {
         let flushed = self.inputs.flush();
         flushed.map_err(|e| said(&self.path.join(INPUTS), &e))
     }
 
-    /// Ends the recording. What can be written is written, whatever fails.
+    /// Ends the recording. Writes as much as it can, whatever fails.
     pub(super) fn finish(&mut self) -> Result<(), String> {
         let log = self.log.finish().map_err(|e| e.to_string());
         let inputs = self.flush();
@@ -297,7 +297,7 @@ impl Folder {
 /// Largest `recording.json`.
 const SUMMARY_MAX: u64 = 64 * 1024;
 
-/// Opens a file of a recording, which may be anybody's: a pipe may have no writer, a device no end.
+/// Opens a file of a recording, which may come from anybody: a pipe may have no writer, a device no end.
 ///
 /// # Errors
 /// What is wrong, with the path.
@@ -332,11 +332,11 @@ pub(crate) fn list(root: &Path, most: usize) -> Vec<(Summary, u64)> {
     names.sort_unstable_by(|a, b| b.cmp(a));
     let read = names.iter().filter_map(|name| {
         let folder = root.join(name);
-        // A link leads to what is no recording of this server.
+        // A link does not lead to a recording of this server.
         let is_folder = fs::symlink_metadata(&folder).is_ok_and(|about| about.is_dir());
         let summary = is_folder.then(|| summary(&folder).ok())??;
         let bytes = parts(&folder.join(LOG)).map(|part| fs::metadata(part).map_or(0, |m| m.len()));
-        // Whatever the file says.
+        // The folder's name counts, whatever the file says.
         let id = name.clone();
         Some((Summary { id, ..summary }, bytes.sum()))
     });
@@ -425,7 +425,7 @@ mod tests {
         let known = [(place, head.clone())];
         let mut folder = Folder::create(root.path(), &about, begin_s * 1_000_000, &known, None)
             .expect("a recording");
-        // Of one that begins with the power, the head comes later.
+        // In a recording from power-up on, the head comes later.
         folder
             .sample(&moving("/run", 0, head), false)
             .expect("written");
@@ -445,7 +445,7 @@ mod tests {
         assert_eq!(names, ["log.mcap", "log.2.mcap", "log.3.mcap"]);
         let robot = vec!["wheeleg-2003".to_owned(); 2];
         assert_eq!(contents(&log), (times.clone(), robot.clone(), true));
-        // Each is a log by itself.
+        // Each is a complete log.
         assert_eq!(
             contents(&files[1]),
             (times[100..200].to_vec(), robot.clone(), true)
@@ -454,7 +454,7 @@ mod tests {
             .iter()
             .map(|file| file.metadata().expect("there").len());
         assert_eq!(list(root.path(), 9)[0].1, bytes.sum::<u64>());
-        // Of one that had just begun nothing is missed, and it is told that the log breaks off.
+        // One that had just begun misses nothing, and its log is reported as broken off.
         fs::write(&files[2], "").expect("written");
         assert_eq!(contents(&log), (times[..200].to_vec(), robot, false));
     }

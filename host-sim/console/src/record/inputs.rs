@@ -1,14 +1,14 @@
-//! The file `inputs.jsonl` of a recording: a line of JSON for each thing that the robot was given.
+//! The file `inputs.jsonl` of a recording: a line of JSON for each input of the robot.
 //!
-//! `ms` is the simulated time, since power-up, up to which the robot had been simulated; lines of
-//! the same `ms` are in the order in which it took them.
+//! `ms` is the simulated time since power-up that the robot had reached; lines with the same `ms` are in the
+//! order in which it took them.
 
 use serde::{Deserialize, Serialize};
 
 use super::Given;
 use wheeleg_access::request::Spoken;
 
-/// Longest line: a frame of a client and what is around it.
+/// Longest line: a client's frame and its envelope.
 pub(crate) const LINE_MAX: usize = 8 * 1024;
 
 /// A line.
@@ -16,16 +16,16 @@ pub(crate) const LINE_MAX: usize = 8 * 1024;
 pub(crate) struct Line {
     /// Simulated time, ms.
     pub(crate) ms: u64,
-    /// What was given.
+    /// The input.
     #[serde(flatten)]
     pub(crate) input: Input,
 }
 
-/// What was given.
+/// An input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Input {
-    /// The operator has seen the robot as it was at this time, µs.
+    /// The operator has seen the robot's state of this time, µs.
     Beat(u64),
     /// A stop, by its number.
     Stop(u32),
@@ -35,12 +35,11 @@ pub(crate) enum Input {
     FaultBegins(String),
     /// A fault ends.
     FaultEnds(String),
-    /// The clock goes otherwise. The robot does not notice; it stands here for who reads.
+    /// The pace changes. The robot does not notice; recorded for readers.
     Pace(PaceInput),
-    /// The control was revoked. What comes of it the robot does by itself, as nobody beats; it stands
-    /// here for who reads.
+    /// Control was revoked. The robot then acts by itself, as beats stop coming; recorded for readers.
     Revoked(RevokedInput),
-    /// Hash of everything until now.
+    /// Hash of everything so far.
     Hash(String),
 }
 
@@ -53,17 +52,17 @@ pub(crate) struct CommandInput {
     pub(crate) deadline_us: u64,
     /// The command.
     pub(crate) spoken: Spoken,
-    /// Name of the client that takes the control; it stands here for who reads.
+    /// Name of the client that takes control; recorded for readers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) by: Option<String>,
 }
 
-/// How the clock goes.
+/// Pace of the clock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PaceInput {
-    /// Simulated over wall time; none: as fast as it goes.
+    /// Ratio of simulated to wall time; none: as fast as possible.
     pub(crate) speed: Option<f64>,
-    /// It stands.
+    /// It is paused.
     pub(crate) paused: bool,
 }
 
@@ -72,7 +71,7 @@ pub(crate) struct PaceInput {
 pub(crate) struct RevokedInput {
     /// Name of the client that was in control, or had asked for it.
     pub(crate) holder: String,
-    /// Name of the client that has revoked it.
+    /// Name of the client that revoked it.
     pub(crate) by: String,
 }
 
@@ -103,7 +102,7 @@ impl Line {
 
     /// The line with its end.
     pub(super) fn push_to(&self, out: &mut Vec<u8>) {
-        // Plain data is JSON: this cannot fail.
+        // Plain data is valid JSON: this cannot fail.
         if serde_json::to_writer(&mut *out, self).is_ok() {
             out.push(b'\n');
         }

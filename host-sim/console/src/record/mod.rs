@@ -1,10 +1,9 @@
-//! Recordings of a live robot. The robot's thread tells what it was given and what was sampled, in
-//! one ring; a thread of its own writes that into a folder. A slow or full disk costs data, counted
-//! and told, never a tick.
+//! Recordings of a live robot. The robot's thread puts its inputs and samples into one ring; a separate
+//! thread writes them to a folder. A slow or full disk costs data, counted and reported, never a tick.
 //!
-//! A recording can be repeated ([`crate::replay()`]): the seed and the robot are in its folder, and
-//! every input since power-up stands in it with the millisecond at which the robot's thread took
-//! it. So it may begin at any time; its log begins with it, its inputs with the power.
+//! A recording can be repeated ([`crate::replay()`]): its folder holds the seed, the robot and every input
+//! since power-up, with the millisecond at which the robot's thread took it. So it may begin at any time; its
+//! log begins with it, its inputs with the power.
 
 mod feed;
 pub(crate) mod folder;
@@ -29,13 +28,13 @@ use wheeleg_access::request::Spoken;
 pub(crate) use feed::{Feed, FeedSink};
 pub use folder::Summary;
 
-/// Where recordings go unless told otherwise.
+/// Default folder of recordings.
 pub const FOLDER: &str = "runs/live";
 
-/// What may wait for the disk: some seconds of the log.
+/// Items that may wait for the disk: some seconds of the log.
 const NOTES: usize = 32_768;
 
-/// What a recording is of.
+/// Subject of a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct About {
     /// Robot.
@@ -52,7 +51,7 @@ pub(crate) struct About {
     pub(crate) scene: Scene,
     /// Length of a part of its log, ns.
     part_ns: u64,
-    /// The same can be given to it once more.
+    /// The same inputs can be given to the robot again.
     pub(crate) repeatable: bool,
 }
 
@@ -76,7 +75,7 @@ impl About {
         })
     }
 
-    /// The same of real boards: nobody can give them the same once more.
+    /// The same for real boards, to which nobody can give the same inputs again.
     pub(crate) fn of_boards(self) -> Self {
         Self {
             scene: self.scene.of_boards(),
@@ -86,7 +85,7 @@ impl About {
     }
 }
 
-/// What the robot's thread tells.
+/// A note from the robot's thread.
 #[derive(Debug)]
 enum Note {
     /// A recording begins.
@@ -106,17 +105,17 @@ enum Note {
         at_us: u64,
         /// Hash of everything since power-up.
         hash: String,
-        /// Samples for which there was no room in the ring.
+        /// Samples that found the ring full.
         dropped: u64,
     },
-    /// The robot was given something.
+    /// An input of the robot.
     Input {
-        /// Simulated time up to which the robot had been simulated, ms.
+        /// Simulated time that the robot had reached, ms.
         ms: u64,
-        /// What.
+        /// The input.
         given: Given,
     },
-    /// Something for the log.
+    /// A sample for the log.
     Sample(Box<Moving>, bool),
     /// The contacts with the ground, for the log.
     Contacts(Box<Touching>),
@@ -130,10 +129,10 @@ struct Touching {
     lost: bool,
 }
 
-/// What a robot is given.
+/// An input of the robot.
 #[derive(Debug)]
 pub(crate) enum Given {
-    /// The operator has seen it as it was at this time, µs.
+    /// The operator has seen its state of this time, µs.
     Beat(u64),
     /// A stop, by its number.
     Stop(u32),
@@ -145,30 +144,30 @@ pub(crate) enum Given {
         deadline_us: u64,
         /// The command.
         spoken: Spoken,
-        /// Name of the client that takes the control.
+        /// Name of the client that takes control.
         by: Option<String>,
     },
     /// A fault begins, or ends.
     Fault(FaultSpec, bool),
-    /// The clock goes otherwise; the robot does not notice.
+    /// The pace changes; the robot does not notice.
     Pace {
-        /// Simulated over wall time.
+        /// Ratio of simulated to wall time.
         speed: Option<f64>,
-        /// It stands.
+        /// The clock is paused.
         paused: bool,
     },
-    /// The control was revoked; the robot notices that its operator beats no more.
+    /// Control was revoked; the robot notices that its operator's beats stop.
     Revoked {
         /// Name of the client that was in control, or had asked for it.
         holder: String,
-        /// Name of the client that has revoked it.
+        /// Name of the client that revoked it.
         by: String,
     },
-    /// Hash of everything until now: where a repetition is compared.
+    /// Hash of everything so far, to compare with a repetition.
     Hash(String),
 }
 
-/// How a recording stands.
+/// State of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Status {
     /// Its id.
@@ -179,14 +178,14 @@ pub(crate) struct Status {
     pub(crate) failure: Option<String>,
 }
 
-/// What all threads know of recordings. The robot's thread touches atomics alone.
+/// State of the recordings, shared by all threads. The robot's thread touches only atomics.
 #[derive(Debug, Default)]
 pub(crate) struct Shared {
     /// Number of the last recording that failed.
     failed: AtomicU64,
-    /// Samples of the recording for which there was no room.
+    /// Samples of the recording that found the ring full.
     dropped: AtomicU64,
-    /// An input since power-up found no room: nothing can be repeated any more.
+    /// An input since power-up found no room: nothing can be repeated from here on.
     gap: AtomicBool,
     status: Mutex<Option<Status>>,
     answers: Mutex<Vec<(u32, Result<(), String>)>>,
@@ -202,12 +201,12 @@ impl Shared {
         locked(&self.status).clone()
     }
 
-    /// Samples of the recording for which there was no room.
+    /// Samples of the recording that found the ring full.
     pub(crate) fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// What came of requests, until it is taken.
+    /// Takes the answers to requests.
     pub(crate) fn take_answers(&self) -> Vec<(u32, Result<(), String>)> {
         std::mem::take(&mut locked(&self.answers))
     }
@@ -222,7 +221,7 @@ pub(crate) struct Recordings {
     pub(crate) thread: JoinHandle<()>,
 }
 
-/// Refuses a place that can never be a folder; one that is not there yet is made for the first recording.
+/// Refuses a path that can never be a folder; a missing one is created for the first recording.
 fn ensure_can_be_made(root: &Path) -> Result<(), ConsoleError> {
     let there = root.ancestors().find(|path| path.exists());
     match there.filter(|path| !path.is_dir()) {
@@ -238,10 +237,10 @@ fn ensure_can_be_made(root: &Path) -> Result<(), ConsoleError> {
     }
 }
 
-/// Starts the thread that writes; with `at_once`, the first recording begins with the power.
+/// Starts the writing thread; with `at_once`, the first recording begins at power-up.
 ///
 /// # Errors
-/// [`ConsoleError::Other`] if no folder can be there, or the first recording's folder cannot be made.
+/// [`ConsoleError::Other`] if the path cannot be a folder, or the first recording's folder cannot be made.
 pub(crate) fn start(
     root: &Path,
     about: About,

@@ -1,5 +1,5 @@
-//! What a robot was given as samples of the channel `/session`, for who looks. The same, complete and
-//! for a repetition, stands in a recording's `inputs.jsonl`.
+//! The robot's inputs as samples of the channel `/session`, for viewers. A recording's `inputs.jsonl` holds
+//! them in full, for a repetition.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use super::Given;
 use crate::live::PaceStatus;
 
 impl Given {
-    /// The sample; none of beats, which come 20 times a second, and of hashes, which are not given.
+    /// The sample; none for beats, which come 20 times a second, and for hashes, which are not inputs.
     pub(crate) fn sample(&self, pace: &PaceStatus) -> Option<SessionSample> {
         let mut sample = SessionSample {
             speed: pace.speed.unwrap_or(f64::NAN),
@@ -25,7 +25,7 @@ impl Given {
                 sample.by = by.clone().unwrap_or_default();
                 let mut text = spoken.cmd.clone();
                 for (name, value) in &spoken.args {
-                    // Into a text it cannot fail.
+                    // Writing into a text cannot fail.
                     let _ = match value.as_str() {
                         Some(word) => write!(text, " {name}={word}"),
                         None => write!(text, " {name}={value}"),

@@ -15,7 +15,7 @@ use super::{About, Note, Shared, Status, locked};
 const PERIOD: Duration = Duration::from_millis(5);
 /// How often inputs are handed to the operating system.
 const FLUSH: Duration = Duration::from_millis(250);
-/// Inputs that are kept for a recording that begins later: more than ten hours of driving.
+/// Bytes of inputs kept for a recording that begins later: more than ten hours of driving.
 const KEPT_MAX: usize = 64 << 20;
 
 /// A recording under way.
@@ -30,9 +30,9 @@ pub(super) struct Writer {
     shared: Arc<Shared>,
     root: PathBuf,
     about: About,
-    /// What stands at the head of every log.
+    /// Messages at the head of every log.
     head: Vec<(u16, OwnedSample)>,
-    /// Inputs since power-up; none where they were too many.
+    /// Inputs since power-up; none if they were too many.
     kept: Option<Vec<u8>>,
     running: Option<Running>,
 }
@@ -57,7 +57,7 @@ impl Writer {
 
     pub(super) fn run(mut self) {
         loop {
-            // Asked before the ring is emptied: what came last is then in it.
+            // Checked before the ring is emptied: it then holds everything to the end.
             let over = self.notes.is_abandoned();
             while let Ok(note) = self.notes.pop() {
                 self.take(note);
@@ -68,7 +68,7 @@ impl Writer {
             self.flush();
             std::thread::sleep(PERIOD);
         }
-        // The robot's thread ended without a word.
+        // The robot's thread ended without notice.
         let _ = self.end(None);
     }
 
@@ -146,7 +146,7 @@ impl Writer {
         locked(&self.shared.answers).push((request, what));
     }
 
-    /// Ends the recording where the disk takes no more.
+    /// Ends the recording if the disk takes no more.
     fn check(&mut self, written: Option<Result<(), String>>) {
         let Some(Err(why)) = written else {
             return;
@@ -175,7 +175,7 @@ impl Writer {
         self.check(written);
     }
 
-    /// Ends the recording; `how`: time, hash and missing messages, where the robot told them.
+    /// Ends the recording; `how`: time, hash and missing messages, if the robot reported them.
     fn end(&mut self, how: Option<(u64, String, u64)>) -> Result<(), String> {
         let Some(mut running) = self.running.take() else {
             return Ok(());

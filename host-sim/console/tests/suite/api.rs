@@ -1,4 +1,4 @@
-//! What the HTTP API answers is what its OpenAPI document says.
+//! The HTTP API answers as its OpenAPI document says.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -8,7 +8,7 @@ use wheeleg_console::client::http;
 
 use crate::common::{TestRig, done, look};
 
-/// The schema of an answer, with all that it refers to.
+/// The schema of an answer, with everything that it refers to.
 fn schema(document: &Value, path: &str, method: &str, status: u16) -> jsonschema::Validator {
     let response = &document["paths"][path][method]["responses"][status.to_string()];
     let content = response["content"].as_object().expect("a content");
@@ -22,7 +22,7 @@ fn every_answer_is_as_the_document_says() {
     let rig = TestRig::new();
     let document: Value = serde_json::from_str(include_str!("../../openapi.json")).expect("JSON");
     let paths = document["paths"].as_object().expect("paths");
-    // A robot that is driven, has a fault, and is recorded has most to tell.
+    // A robot that is driven, has a fault, and is recorded gives the longest answers.
     let mut driver = rig.driver("driver");
     done(&mut driver, "RecordStart");
     let fault = json!({ "fault": "pot-open:joint3" });
@@ -66,7 +66,7 @@ fn every_answer_is_as_the_document_says() {
         "{answer}"
     );
     look(&mut driver, "state");
-    // The schema is strict: a field more or less is told.
+    // The schema is strict: an extra or missing field is reported.
     let state = rig.state();
     let strict = schema(&document, "/state", "get", 200);
     for name in ["armed", "recording", "boards"] {

@@ -7,13 +7,13 @@ use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
 use wheeleg_console::keys::Keys;
 use wheeleg_console::{ConsoleError, Live, Options, Server};
 
-/// Where a line to the server begins that is slower than this computer.
+/// Start of a line to the server that is slower than this computer.
 pub(crate) const RELAY: std::net::Ipv4Addr = std::net::Ipv4Addr::new(127, 0, 0, 2);
 
-/// A foreign page that may look by Foxglove's protocol.
+/// A foreign page that may watch over Foxglove's protocol.
 pub(crate) const PAGE: &str = "https://viewer.example";
 
-/// A server, its keys and where it listens.
+/// A server, its keys and its address.
 pub(crate) struct TestRig {
     pub(crate) server: Server,
     pub(crate) keys: Keys,
@@ -30,7 +30,7 @@ impl TestRig {
         Self::with(speed, false)
     }
 
-    /// A robot that is recorded from power-up on; without a speed as fast as it goes.
+    /// A robot that is recorded from power-up on; without a speed as fast as possible.
     pub(crate) fn recorded(speed: impl Into<Option<f64>>) -> Self {
         Self::with(speed.into(), true)
     }
@@ -49,7 +49,7 @@ impl TestRig {
         Self::start(live, false).expect("it starts")
     }
 
-    /// The same, of which it is not known whether it can be.
+    /// The same for a robot that may be impossible.
     #[cfg(unix)]
     pub(crate) fn try_of(live: Live) -> Result<(), ConsoleError> {
         Self::start(live, false).map(|_| ())
@@ -132,7 +132,7 @@ impl TestRig {
     pub(crate) fn driver(&self, name: &str) -> Client {
         self.until("ready", |state| state["ready"] == true);
         let mut client = self.control(name);
-        // What is shown must have come.
+        // The state must have come first.
         look(&mut client, "state");
         done(&mut client, "TakeControl");
         client.keep_control(true);

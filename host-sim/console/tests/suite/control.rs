@@ -1,4 +1,4 @@
-//! Who drives, and what comes of a driver who is gone.
+//! Control of the robot, and what happens when the driver is gone.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use wheeleg_telemetry::{JointSample, Sample as _};
 
 use crate::common::{TestRig, closed, done, look, refusal};
 
-/// Master time between the newest thing that the holder can have seen and the HOLD, µs.
+/// Master time from the newest state that the holder can have seen to the HOLD, µs.
 fn held_after(rig: &TestRig, seen_us: u64) -> u64 {
     let state = rig.until("held", |state| !state["hold"].is_null());
     assert_eq!(state["hold"], "operator_lost", "{state}");
@@ -30,7 +30,7 @@ fn take_arm_move_release() {
     done(&mut driver, "Disarm");
 }
 
-/// Master time of the first sample of joint 3 that is as wanted, ns.
+/// Master time of the first sample of joint 3 that satisfies `wanted`, ns.
 fn first(client: &mut Client, wanted: impl Fn(&[u8]) -> bool) -> u64 {
     let begin = Instant::now();
     loop {
@@ -68,7 +68,7 @@ fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
         .expect("an event");
     let took_ns = latched_ns - given["t_ns"].as_u64().expect("a time");
     assert!(took_ns <= 13_000_000, "{took_ns} ns");
-    // The stop of somebody who only looks, by another way.
+    // The stop of a client that only looks, by another way.
     let (status, _) = http(&rig.url, "POST", "stop", &rig.keys.view).expect("an answer");
     assert_eq!(status, 200);
     let hold = u32::from(NodeMode::Hold.code());
@@ -98,11 +98,11 @@ fn a_killed_client_is_noticed_by_the_master() {
     drop(driver);
     let after_us = held_after(&rig, seen_us);
     assert!(after_us <= 460_000, "{after_us} us");
-    // The log of events names who is gone.
+    // The log of events names the client that is gone.
     assert_eq!(rig.event("hold")["holder"], "driver");
     let state = rig.until("free", |state| state["control"].is_null());
     assert_eq!(state["armed"], false);
-    // Whoever comes back has no control, and the stop is latched.
+    // A client that comes back has no control, and the stop is latched.
     let mut back = rig.control("driver");
     look(&mut back, "state");
     assert_eq!(refusal(&mut back, "Stand", &json!({})), "not_in_control");
@@ -145,7 +145,7 @@ fn a_server_that_hangs_is_noticed_by_the_master() {
     assert!(after_us <= 470_000 + 60_000, "{after_us} us");
 }
 
-/// Whoever asks on a new connection each time is told of no more often.
+/// A client that asks on a new connection each time is not announced more often.
 #[test]
 fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     let rig = TestRig::new();
@@ -153,7 +153,7 @@ fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     let over = AtomicBool::new(false);
     let begin = Instant::now();
     let told = std::thread::scope(|threads| {
-        // It goes on driving, and hears of them.
+        // It continues to drive, and is notified of them.
         let hears = threads.spawn(|| {
             let mut told = 0;
             while !over.load(Ordering::Relaxed) {
@@ -166,7 +166,7 @@ fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
             let mut other = rig.control(&format!("other {number}"));
             look(&mut other, "state");
             let n = other.give("TakeControl", &json!({}), 1_000).expect("sent");
-            // A busy computer may have kept the driver from its beats.
+            // A busy computer may have delayed the driver's beats.
             let end = other.outcome(n);
             assert!(
                 matches!(end, Outcome::Done | Outcome::Refused { .. }),
@@ -183,8 +183,8 @@ fn who_asks_for_control_again_and_again_is_told_of_once_a_second() {
     );
 }
 
-/// Both come in one piece: the speed is judged by the lease that is about to be granted. The clock is
-/// slow, so that the grant takes its time.
+/// Both come in one piece: the speed is judged by the lease that is about to be granted. The clock is slow,
+/// so that the grant takes time.
 #[test]
 fn nobody_takes_control_and_speeds_up_before_it_is_granted() {
     let rig = TestRig::paced(Some(0.1));
@@ -195,7 +195,7 @@ fn nobody_takes_control_and_speeds_up_before_it_is_granted() {
     let take = client.give("TakeControl", &json!({}), 1_000).expect("sent");
     let args = json!({ "speed": 5.0 });
     let refused = refusal(&mut client, "Speed", &args);
-    // The grant may have come in between, and been passed over.
+    // The grant may have come in between, and been skipped.
     assert_eq!(refused, "too_fast", "{take}");
     let state = rig.until("in control", |state| !state["control"].is_null());
     assert_eq!(state["pace"]["speed"], 0.1);
@@ -215,7 +215,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     );
     assert_eq!(answer["holder"], "first");
     assert_eq!(look(&mut first, "asked")["by"], "second");
-    // Who asks without end is told of once a second.
+    // A client that asks without end is announced once a second.
     let begin = Instant::now();
     let mut told = 0;
     for _ in 0..40 {
@@ -229,7 +229,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     assert!(told <= begin.elapsed().as_secs() + 1, "{told} times");
     assert_eq!(refusal(&mut second, "Disarm", &json!({})), "not_in_control");
     assert_eq!(refusal(&mut second, "Pause", &json!({})), "control_held");
-    // Its beats keep the control of nobody.
+    // Its beats keep control for nobody.
     second.keep_control(true);
     first.keep_control(false);
     let seen_us = first.seen_us();
@@ -247,7 +247,7 @@ fn a_second_client_is_refused_by_name_and_may_stop() {
     assert!(state["control"].is_null(), "{state}");
 }
 
-/// Everybody is told who has stopped the robot, and is told no more once it is over.
+/// All clients see who has stopped the robot, until the stop is over.
 #[test]
 fn a_stop_has_a_name() {
     let rig = TestRig::new();
@@ -265,7 +265,7 @@ fn a_stop_has_a_name() {
     );
     assert_eq!(rig.event("hold")["stopped"], stopped);
     let stops = |event: &Value| event["command"] == 0x0123;
-    // Who stops a robot that is stopped has not stopped it.
+    // A client that stops a robot that is already stopped has not stopped it.
     let n = driver.send(json!({ "op": "stop" })).expect("sent");
     assert_eq!(driver.outcome(n), Outcome::Done);
     assert_eq!(rig.state()["stopped"], stopped);
@@ -323,7 +323,7 @@ fn commands_about_the_past_or_the_future_are_refused() {
     assert_eq!(rig.state()["armed"], true);
 }
 
-/// What a client had waiting when its connection broke it sends when it is back and in control again.
+/// When a client is back and in control again, it sends the commands that waited when its connection broke.
 #[test]
 fn a_thousand_commands_from_before_a_reconnection_are_each_refused() {
     let rig = TestRig::new();
@@ -356,10 +356,10 @@ fn a_thousand_commands_from_before_a_reconnection_are_each_refused() {
     for _ in 0..1_000 {
         let late = json!({ "seen_us": old_us, "valid_ms": 100, "cmd": "Disarm", "args": {} });
         last = driver.send(late).expect("sent");
-        // Answers are taken as they come: who lets them pile up is closed.
+        // Read answers as they come: a client that lets them pile up is closed.
         note(driver.read());
     }
-    // Those to what is too much come before those of the robot.
+    // Refusals of excess requests come before the robot's answers.
     let begin = Instant::now();
     while note(driver.read()) < last || begin.elapsed() < Duration::from_secs(1) {}
     let of = |reason| reasons.get(reason).copied().unwrap_or(0);
@@ -373,7 +373,7 @@ fn a_paused_robot_takes_a_stop_and_nothing_else() {
     let rig = TestRig::new();
     let mut driver = rig.driver("driver");
     let args = json!({ "cycles": 3 });
-    // A clock that goes steps by itself.
+    // A running clock steps by itself.
     assert_eq!(refusal(&mut driver, "Step", &args), "simulation");
     done(&mut driver, "Pause");
     let paused = rig.until("paused", |state| state["pace"]["paused"] == true);
@@ -387,7 +387,7 @@ fn a_paused_robot_takes_a_stop_and_nothing_else() {
     assert!(us(&stepped) - us(&paused) <= 31_000, "{stepped}");
 }
 
-/// More commands than the queue to the robot has places, none of which is answered yet.
+/// More commands than the queue to the robot has places, none of them answered yet.
 #[test]
 fn a_stop_passes_whatever_waits() {
     let rig = TestRig::new();
@@ -461,7 +461,7 @@ fn pace_and_faults_are_host_commands() {
     );
     let mut other = rig.control("other");
     assert_eq!(refusal(&mut other, "Pause", &json!({})), "control_held");
-    // At the robot's computer faults are for everybody with the control key.
+    // At the robot's computer, everybody with the control key may inject faults.
     let outcome = other.carry_out("EndFault", &fault, 500).expect("sent");
     assert_eq!(outcome, Outcome::Done);
     rig.until("ended", |state| state["faults"] == json!([]));
@@ -479,7 +479,7 @@ fn a_server_that_ends_says_so() {
     assert_eq!(closed(&mut viewer), 4006);
 }
 
-/// Waits until the state is as wanted, while a driver keeps looking.
+/// Waits until the state is as wanted, while a driver keeps watching.
 fn until_driven(rig: &TestRig, driver: &mut Client, wanted: impl Fn(&Value) -> bool) -> Value {
     let begin = Instant::now();
     loop {
@@ -492,7 +492,7 @@ fn until_driven(rig: &TestRig, driver: &mut Client, wanted: impl Fn(&Value) -> b
     }
 }
 
-/// One client drives, a second has asked it for the control: both, and the arguments of a hand-over to the second.
+/// One client drives, a second has asked for control: both, and the arguments of a hand-over to the second.
 fn asked_for_control(rig: &TestRig) -> (Client, Client, Value) {
     let mut first = rig.driver("first");
     let mut second = rig.control("second");
@@ -504,13 +504,13 @@ fn asked_for_control(rig: &TestRig) -> (Client, Client, Value) {
     (first, second, json!({ "to": asked["session"] }))
 }
 
-/// At the robot's own computer, where for 2 s others there alone may take control then.
+/// Revokes control at the robot's own computer, where only others there may then take it for 2 s.
 pub(crate) fn revokes(client: &mut Client) {
     let outcome = client.carry_out("Revoke", &json!({ "hold": 2 }), 1000);
     assert_eq!(outcome.expect("sent"), Outcome::Done);
 }
 
-/// The second has taken what the first has handed over: it drives on, and nothing was held meanwhile.
+/// The second has taken over from the first: it drives on, and nothing was held meanwhile.
 fn takes_over(rig: &TestRig, second: &mut Client) {
     done(second, "TakeControl");
     second.keep_control(true);
@@ -521,14 +521,14 @@ fn takes_over(rig: &TestRig, second: &mut Client) {
     );
 }
 
-/// A hand-over is a release for one other client: it alone may take the control, for 2 s.
+/// A hand-over is a release for one other client: only that one may take control, for 2 s.
 #[test]
 fn who_is_in_control_hands_it_over_to_one_other() {
     let rig = TestRig::new();
     let (mut first, mut second, to) = asked_for_control(&rig);
     let mut third = rig.control("third");
     let nothing = json!({});
-    // Only who has it gives it away, and to a client that is there and may drive.
+    // Only the holder may give control away, and only to a client that is there and may drive.
     assert_eq!(refusal(&mut third, "HandOver", &to), "not_in_control");
     for nobody in [
         json!("0000000000000000"),
@@ -565,7 +565,7 @@ fn what_is_handed_over_and_not_taken_is_free() {
     assert_eq!(outcome, Outcome::Done);
     first.keep_control(false);
     look(&mut second, "offered");
-    // Whoever it was reserved for goes: it is free at once.
+    // The client it was reserved for leaves: control is free at once.
     drop(second);
     let begin = Instant::now();
     loop {
@@ -579,7 +579,7 @@ fn what_is_handed_over_and_not_taken_is_free() {
     }
 }
 
-/// As if they had been lost: an armed robot holds, and nothing of theirs counts any more.
+/// As if its beats had been lost: an armed robot holds, and none of its messages count any more.
 #[test]
 fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     let rig = TestRig::new();
@@ -595,9 +595,9 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
     revokes(&mut local);
     assert_eq!(look(&mut driver, "revoked")["by"], "owner");
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
-    // It asks anew before it is gone: that gains nothing.
+    // It asks again before it is gone: that gains nothing.
     assert_eq!(refusal(&mut driver, "TakeControl", &nothing), "revoked");
-    // It goes on to beat all the while.
+    // It keeps sending beats all the while.
     let state = until_driven(&rig, &mut driver, |state| state["control"].is_null());
     assert_eq!(
         (&state["hold"], &state["armed"]),
@@ -608,7 +608,7 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
         (&event["holder"], &event["revoked_by"], &event["gone"]),
         (&json!("driver"), &json!("owner"), &json!(false))
     );
-    // For a while others at the robot's computer may take it; where they do not, everybody.
+    // For a while only others at the robot's computer may take control; then everybody.
     let reserved_for = &state["reserved_for"];
     assert_eq!(reserved_for["name"], "the robot's computer", "{state}");
     look(&mut driver, "state");
@@ -617,12 +617,12 @@ fn control_that_is_taken_away_ends_as_if_it_were_lost() {
         "control_held"
     );
     until_driven(&rig, &mut driver, |state| state["reserved_for"].is_null());
-    // Whoever looks at the robot may take it anew, and has to clear what happened.
+    // Any client may take control again, and has to clear what happened.
     done(&mut driver, "TakeControl");
     assert_eq!(refusal(&mut driver, "Arm", &nothing), "latched");
     done(&mut driver, "ClearFault");
     done(&mut driver, "Arm");
-    // Where nobody is in control nothing happens.
+    // If nobody is in control, nothing happens.
     done(&mut driver, "Disarm");
     done(&mut driver, "ReleaseControl");
     until_driven(&rig, &mut driver, |state| state["control"].is_null());
@@ -650,8 +650,8 @@ fn who_pauses_and_leaves_keeps_the_clock_from_nobody() {
     done(&mut other, "TakeControl");
 }
 
-/// Whoever asked while the holder was gone already is no sooner refused by the next one than that one
-/// is told.
+/// A client that asked when the holder was already gone is not refused by the next holder before that one is
+/// notified.
 #[test]
 fn who_asked_for_the_control_of_nobody_is_told_to_the_next_holder() {
     let rig = TestRig::new();
@@ -690,7 +690,7 @@ fn control_is_revoked_while_the_clock_stands() {
         (&json!("driver"), &json!("revoked"))
     );
     assert_eq!(refusal(&mut driver, "Stand", &nothing), "revoked");
-    // However long the clock stands, the control is reserved.
+    // However long the clock is paused, control stays reserved.
     std::thread::sleep(Duration::from_millis(2_500));
     done(&mut owner, "Resume");
     let state = until_driven(&rig, &mut owner, |state| state["control"].is_null());
@@ -701,7 +701,7 @@ fn control_is_revoked_while_the_clock_stands() {
     done(&mut owner, "TakeControl");
 }
 
-/// The master grants it all the same, at its next cycle; nobody has it with that.
+/// The master still grants it, at its next cycle; but nobody gets it.
 #[test]
 fn control_that_is_only_asked_for_is_revoked_as_well() {
     let rig = TestRig::new();
@@ -709,7 +709,7 @@ fn control_that_is_only_asked_for_is_revoked_as_well() {
     let mut owner = rig.control("owner");
     let mut asker = rig.control("asker");
     look(&mut owner, "state");
-    // A cycle takes 100 ms now: the time to revoke what is not granted yet.
+    // A cycle takes 100 ms now: enough time to revoke a request before it is granted.
     let slow = json!({ "speed": 0.1 });
     let outcome = owner.carry_out("Speed", &slow, 500).expect("sent");
     assert_eq!(outcome, Outcome::Done);
@@ -745,7 +745,7 @@ fn a_master_that_dies_with_what_it_accepted_leaves_the_control_free() {
             state["ready"] == true && state["control"].is_null()
         });
         look(&mut asker, "state");
-        // A cycle takes 100 ms now: the time for both.
+        // A cycle takes 100 ms now: enough time for both.
         asker
             .give("Speed", &json!({ "speed": 0.1 }), 500)
             .expect("sent");
@@ -767,7 +767,7 @@ fn a_master_that_dies_with_what_it_accepted_leaves_the_control_free() {
     done(&mut other, "TakeControl");
 }
 
-/// The master would grant it again to who has just handed it over.
+/// The master would grant it again to the client that has just handed it over.
 #[test]
 fn who_hands_over_does_not_take_it_back_in_the_same_breath() {
     let rig = TestRig::new();

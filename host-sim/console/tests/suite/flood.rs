@@ -1,4 +1,4 @@
-//! Who asks without end, with a key or without: it costs others neither time nor memory.
+//! Clients that send endless requests, with a key or without: they cost others neither time nor memory.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
@@ -24,14 +24,14 @@ fn viewer(rig: &TestRig) -> WebSocket<TcpStream> {
     tungstenite::client(request, stream).expect("let in").0
 }
 
-/// Level of a status that says that something was not done because too much is asked for.
+/// Level of a status about a request that was skipped because there were too many.
 const WARNING: u64 = 1;
 
 #[test]
 fn a_short_request_has_no_endless_answer() {
     let rig = TestRig::new();
     let mut viewer = viewer(&rig);
-    // Each would be told with the robot's whole description.
+    // Each answer would hold the robot's whole description.
     let names = vec!["/robot_description"; ITEMS_MAX];
     let asked = json!({ "op": "getParameters", "parameterNames": names, "id": "\"1\"" });
     viewer.send(Message::text(asked.to_string())).expect("sent");
@@ -70,7 +70,7 @@ fn a_viewer_names_so_many_items_at_a_time_and_sends_so_many_bytes() {
         let text = told["message"].as_str().expect("a text");
         assert!(text.contains(&ITEMS_MAX.to_string()), "{text}");
     }
-    // Few messages, and each as long as it may be: 6 at once, and 3 a second.
+    // Few messages, each as long as allowed: 6 at once, and 3 a second.
     let name = "x".repeat(31_000);
     let asked = json!({ "op": "getParameters", "parameterNames": [name], "id": "long" });
     let begin = Instant::now();
@@ -97,8 +97,8 @@ fn a_viewer_names_so_many_items_at_a_time_and_sends_so_many_bytes() {
     assert!((4..=most).contains(&answers), "{answers} {refused}");
 }
 
-/// Nothing that others ask for is in front of the stop of who has proved a key: here, all threads
-/// that serve requests and viewers are busy for seconds.
+/// No other request is in front of the stop of a client that has proved a key: here, all threads for requests
+/// and viewers are busy for seconds.
 #[test]
 fn a_stop_does_not_wait_for_what_others_ask() {
     let rig = TestRig::new();
@@ -112,7 +112,7 @@ fn a_stop_does_not_wait_for_what_others_ask() {
     assert!(begin.elapsed() < Duration::from_secs(4), "it waited");
 }
 
-/// Many requests come in one piece; after the first that is refused the connection ends.
+/// Many requests come in one piece; after the first refused one the connection ends.
 #[test]
 fn who_has_no_key_asks_once_on_a_connection() {
     let rig = TestRig::new();
@@ -129,12 +129,12 @@ fn who_has_no_key_asks_once_on_a_connection() {
         let all = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n").repeat(20);
         stream.write_all(all.as_bytes()).expect("sent");
         let mut answers = Vec::new();
-        // What was not read ends the connection with an error.
+        // Unread bytes end the connection with an error.
         let _ = stream.read_to_end(&mut answers);
         let answers = String::from_utf8_lossy(&answers);
         assert_eq!(answers.matches("HTTP/1.1 4").count(), 1, "{answers}");
     }
-    // Who has one goes on asking.
+    // A client with a key keeps sending requests.
     let key = rig.keys.view.to_hex();
     let mut stream = TcpStream::connect(address).expect("connected");
     let wait = stream.set_read_timeout(Some(Duration::from_secs(1)));
@@ -191,7 +191,7 @@ fn who_asks_without_end_holds_up_no_stop() {
     }
 }
 
-/// Of stops only some of a connection are under way; all are answered, and others' too.
+/// Only some stops of a connection are under way at a time; all are answered, and others' too.
 #[test]
 fn who_stops_without_end_holds_up_nobody() {
     let rig = TestRig::new();

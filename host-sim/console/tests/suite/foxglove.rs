@@ -12,7 +12,7 @@ use wheeleg_console::client::{Outcome, http};
 
 use crate::common::{PAGE, TestRig, done, look, refusal};
 
-/// What a viewer hears.
+/// A message to a viewer.
 #[derive(Debug)]
 enum Heard {
     Json(Value),
@@ -33,7 +33,7 @@ struct Viewer {
     info: Value,
 }
 
-/// How a viewer asks.
+/// A viewer's opening request.
 struct Ask<'a> {
     token: String,
     protocol: Option<&'a str>,
@@ -51,7 +51,7 @@ impl<'a> Ask<'a> {
 }
 
 impl Viewer {
-    /// Looks, or gives the status of the refusal.
+    /// Connects, or returns the status of the refusal.
     fn open(rig: &TestRig, ask: &Ask<'_>) -> Result<Self, u16> {
         let address = rig.server.address();
         let uri = format!("ws://{address}/foxglove?token={}", ask.token);
@@ -183,7 +183,7 @@ impl Viewer {
             .expect("sent");
     }
 
-    /// Values of parameters as they are answered to a request.
+    /// Values of parameters in the answer to a request.
     fn values(&mut self, request: Value) -> Value {
         let id = request["id"].clone();
         self.send(request);
@@ -248,7 +248,7 @@ fn every_channel_fits_its_schema_and_every_frame_is_a_link_of_the_robot() {
         jsonschema::validator_for(&schema).expect("a schema")
     };
     let validators: BTreeMap<u64, _> = topics.iter().map(|(id, c)| (*id, schema(c))).collect();
-    // Of a walk alone.
+    // Channels that only a walk has.
     let mut missing: BTreeSet<&str> = topics
         .values()
         .filter_map(|c| c["topic"].as_str())
@@ -309,7 +309,7 @@ fn every_channel_fits_its_schema_and_every_frame_is_a_link_of_the_robot() {
     }
 }
 
-/// Also where somebody at the console wants the newest of them.
+/// Also if somebody at the console wants the newest of them.
 #[test]
 fn a_viewer_is_told_an_event_once() {
     let rig = TestRig::new();
@@ -322,7 +322,7 @@ fn a_viewer_is_told_an_event_once() {
     viewer.subscribe_all();
     let events = viewer.channels.iter().find(|c| c["topic"] == "/events");
     let events = events.and_then(|c| c["id"].as_u64()).expect("a channel") + 100;
-    // It hears what it wants from now on.
+    // It gets what it asks for from now on.
     viewer.until("samples", |heard| {
         matches!(heard, Heard::Data { .. }).then_some(())
     });
@@ -452,7 +452,7 @@ fn a_viewer_may_stop_and_give_nothing_else() {
         (&failure["serviceId"], &failure["callId"]),
         (&json!(2), &json!(9))
     );
-    // Publishing, and what else the protocol has.
+    // Publishing, and the rest of the protocol.
     let mut publish = vec![1, 0, 0, 0, 0];
     publish.extend_from_slice(b"{}");
     viewer
@@ -514,7 +514,7 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     });
     assert_eq!(told["parameters"][0]["value"], other);
     rig.until("free", |state| state["control"].is_null());
-    // The board has it: the master has read back what it wrote.
+    // The board has it: the master has read it back.
     let mut driver = rig.control("driver");
     look(&mut driver, "state");
     done(&mut driver, "TakeControl");
@@ -530,7 +530,7 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     done(&mut driver, "ReleaseControl");
     rig.until("free", |state| state["control"].is_null());
     assert_eq!(writer.values(set(before.clone(), "a"))[0]["value"], other);
-    // Who writes at the console is seen by viewers as well.
+    // Viewers also see writes from the console.
     done(&mut driver, "TakeControl");
     done(&mut driver, "Disarm");
     let args = json!({ "board": 3, "parameter": "error_scale", "value": before });
@@ -546,7 +546,7 @@ fn parameters_are_read_by_all_and_written_disarmed_with_the_control_key_alone() 
     );
 }
 
-/// A viewer that writes on and on makes room for whoever wants to drive.
+/// A viewer that writes on and on makes room for a client that wants to drive.
 #[test]
 fn a_viewer_that_writes_hands_the_control_over_to_who_asks_for_it() {
     let rig = TestRig::new();
@@ -573,7 +573,7 @@ fn a_viewer_that_writes_hands_the_control_over_to_who_asks_for_it() {
     let why = refusal(&mut driver, "TakeControl", &json!({}));
     assert_eq!(why, "control_held");
     assert_eq!(look(&mut driver, "offered")["by"], "foxglove");
-    // Whoever writes waits for who was offered it.
+    // The writer waits for the client that was offered control.
     let one = json!({ "op": "setParameters", "parameters": all[..1], "id": "one" });
     writer.send(one);
     done(&mut driver, "TakeControl");
@@ -605,7 +605,7 @@ fn viewers_that_never_read_cost_nobody_anything_and_take_no_place_of_control() {
                 refused += 1;
             }
         }
-        // The last place is closed after the upgrade: it is kept for the control.
+        // The last place is closed after the upgrade: it is kept for a client that may control.
         if idle.len() + 1 >= 31 {
             break;
         }
@@ -622,7 +622,7 @@ fn viewers_that_never_read_cost_nobody_anything_and_take_no_place_of_control() {
             newest_ns = t_ns;
         }
     }
-    // The wall of a busy computer is not judged: 32 channels at 100 Hz would be 9,000.
+    // A busy computer's wall time is not judged: 32 channels at 100 Hz would be 9,000.
     assert!(samples > 500, "{samples}");
     let now_us = rig.state()["master_us"].as_u64().expect("a time");
     assert!(

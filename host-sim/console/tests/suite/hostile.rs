@@ -1,4 +1,4 @@
-//! Who has no key, a wrong one, or sends what is not of the contract.
+//! Clients without a key, with a wrong one, or with messages outside the contract.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -85,7 +85,7 @@ fn foreign_hosts_and_origins_are_refused_everywhere() {
                 "{path} {host} {origin}: {answer}"
             );
         }
-        // By a name of ours in one place, and of a stranger in another.
+        // One of our names in one place, and a stranger's in another.
         let request = format!(
             "GET http://evil.example{path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n"
         );
@@ -142,7 +142,7 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
         let mut client = rig.control("forger");
         client.send_raw(frame.clone()).expect("sent");
         let code = closed(&mut client);
-        // What is too large ends the connection before it is a frame.
+        // A message that is too large ends the connection before it becomes a frame.
         assert!(
             code == 4003 || (frame.len() > 4096 && code != 1000),
             "{code}"
@@ -180,7 +180,7 @@ fn forged_repeated_and_reordered_frames_close_and_do_nothing() {
     client.send(json!({ "op": "stop" })).expect("sent");
     assert_eq!(closed(&mut client), 4003);
     assert_eq!(rig.state()["emergency_stop"], false);
-    // The person at the server is told, by name and address.
+    // The person at the server sees its name and address.
     let told = rig.server.notices();
     let named = told
         .iter()
@@ -222,7 +222,7 @@ fn half_requests_and_half_handshakes_lose_their_place() {
     let upgrade = format!(
         "GET /ws HTTP/1.1\r\nHost: {address}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: wheeleg.console.v1\r\n\r\n"
     );
-    // A thousand, of which as many are open as a program may have.
+    // A thousand, with as many open as a program may have.
     for _ in 0..4 {
         let mut open = Vec::new();
         for i in 0..250 {
@@ -274,7 +274,7 @@ fn requests_without_an_end_and_idle_connections_lose_their_place() {
     );
 }
 
-/// Hundreds of files are asked for by each, and none is read.
+/// Each asks for hundreds of files, and reads none.
 #[test]
 fn who_asks_and_never_reads_loses_its_place() {
     let rig = TestRig::new();
@@ -293,7 +293,7 @@ fn who_asks_and_never_reads_loses_its_place() {
     gets_in(&rig);
 }
 
-/// Sockets that nobody has proved a key on take places, too: no more of them are open at a time.
+/// Sockets without a proved key take places, too: no more of them are open at a time.
 #[test]
 fn half_handshakes_take_no_more_places_than_others() {
     let rig = TestRig::new();
@@ -309,20 +309,20 @@ fn half_handshakes_take_no_more_places_than_others() {
             tungstenite::client(request, stream).ok()
         })
         .collect();
-    // Whoever comes gets a place; the oldest have lost theirs.
+    // Every newcomer gets a place; the oldest have lost theirs.
     let still = open
         .iter()
         .filter(|(socket, _)| is_open(socket.get_ref()))
         .count();
     assert!(still <= 96, "{still} of {}", open.len());
-    // The last were there for less than the time that a handshake may take.
+    // The last were there for less than the allowed time of a handshake.
     let quick = begin.elapsed() < Duration::from_secs(1);
     assert!(still >= 90 || !quick, "{still} of {}", open.len());
     assert!(open.len() >= 190, "{}", open.len());
     gets_in(&rig);
 }
 
-/// Whether the server has not ended a connection.
+/// Whether the server has kept a connection open.
 fn is_open(stream: &TcpStream) -> bool {
     let mut stream = stream;
     stream.set_nonblocking(true).expect("set");
@@ -336,8 +336,8 @@ fn is_open(stream: &TcpStream) -> bool {
     }
 }
 
-/// All places are taken from two addresses, and taken again as soon as one is lost: who comes from a
-/// third one stops the robot at once.
+/// All places are taken from two addresses, and taken again as soon as one is lost: a client from a third one
+/// can still stop the robot at once.
 #[test]
 fn whoever_takes_all_places_keeps_nobody_from_a_stop() {
     let rig = TestRig::new();
@@ -383,7 +383,7 @@ fn connected_from(from: &str, to: std::net::SocketAddr) -> Option<TcpStream> {
     })
 }
 
-/// Another user of the computer would be taken for the server by who asks for `localhost`.
+/// Clients that ask for `localhost` would take another user's program for the server.
 #[test]
 fn nobody_else_listens_where_localhost_leads() {
     let Ok(foreign) = std::net::TcpListener::bind("[::1]:0") else {
@@ -398,7 +398,7 @@ fn nobody_else_listens_where_localhost_leads() {
     let url = Url::parse(&format!("localhost:{port}")).expect("an address");
     let (status, _) = http(&url, "GET", "state", &rig.keys.view).expect("an answer");
     assert_eq!(status, 200);
-    // Where somebody listens already, a server does not start.
+    // If somebody already listens there, a server does not start.
     let listen = format!("127.0.0.1:{}", foreign.local_addr().expect("bound").port());
     let refused = listens_at(&rig, &listen).to_string();
     assert!(
@@ -407,7 +407,7 @@ fn nobody_else_listens_where_localhost_leads() {
     );
 }
 
-/// Why a server does not start that is to listen there.
+/// Why a server that should listen there does not start.
 fn listens_at(rig: &TestRig, listen: &str) -> wheeleg_console::ConsoleError {
     let live = wheeleg_console::Live::load("stand", None).expect("built in");
     let refused = wheeleg_console::Server::start(wheeleg_console::Options {
@@ -429,7 +429,7 @@ fn listens_at(rig: &TestRig, listen: &str) -> wheeleg_console::ConsoleError {
 fn who_takes_all_places_of_an_address_leaves_those_of_others() {
     let rig = TestRig::new();
     let address = rig.server.address();
-    // Over and over, as fast as it goes.
+    // Over and over, as fast as possible.
     let over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let attacker = std::thread::spawn({
         let over = std::sync::Arc::clone(&over);

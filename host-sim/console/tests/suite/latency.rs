@@ -1,5 +1,5 @@
-//! How long a command takes from the tick at which the robot's thread takes it to the SYNC frame that
-//! carries it, and to the board that has it: in simulated time, at every place of the bus cycle.
+//! Time of a command from the tick at which the robot's thread takes it to the SYNC frame that carries it,
+//! and to its board: in simulated time, at every place of the bus cycle.
 
 use serde_json::json;
 use wheeleg_access::request::{Order, Spoken};
@@ -12,13 +12,13 @@ use wheeleg_sim::{Boards, Session};
 use wheeleg_telemetry::{Recorder, Recording};
 
 const MS: u64 = 1_000_000;
-/// Of a bus cycle.
+/// Length of a bus cycle.
 const CYCLE_MS: u64 = 10;
 /// Bars of the specification.
 const IN_SYNC_MS: u64 = 11;
 const LATCHED_MS: u64 = 13;
 
-/// A robot of whom somebody is in control.
+/// A robot with somebody in control.
 struct Driven {
     session: Session,
     recorder: Recorder<'static>,
@@ -57,7 +57,7 @@ impl Driven {
         assert!(answer.expect("it lives").is_ok(), "{command:?}");
     }
 
-    /// One tick of the robot's thread after the other.
+    /// Runs ticks of the robot's thread.
     fn pass(&mut self, ms: u64) {
         for _ in 0..ms {
             self.session.beat(self.session.now_ns() / 1_000);
@@ -67,7 +67,7 @@ impl Driven {
         }
     }
 
-    /// Passes until something is so; the time of the SYNC frame of that cycle, ns.
+    /// Runs until the condition holds; returns the time of the SYNC frame of that cycle, ns.
     fn sync_ns(&mut self, there: impl Fn(&Session) -> bool) -> u64 {
         for _ in 0..100 {
             if there(&self.session) {
@@ -140,7 +140,7 @@ fn a_reference_is_in_sync_within_11_ms_and_latched_within_13_wherever_the_cycle_
         latched_ms.iter().all(|ms| *ms <= LATCHED_MS),
         "{latched_ms:?}"
     );
-    // Every place of the cycle was tried: what just misses a frame waits for the next one.
+    // Every place of the cycle was tried: a command that just misses a frame waits for the next one.
     let spread = in_sync_ms.iter().max().zip(in_sync_ms.iter().min());
     assert!(
         spread.is_some_and(|(max, min)| max - min >= 8),
@@ -162,8 +162,8 @@ fn a_stop_is_in_sync_within_11_ms_and_holds_within_13_wherever_the_cycle_is() {
         driven.pass(place_ms);
         let taken_ns = driven.session.now_ns();
         driven.ask(STOP_CLIENT, Command::EmergencyStop);
-        // The record that has it first is that of the cycle in which the stop came, made as the next one
-        // begins: that one's SYNC has the bit.
+        // The first record with the stop is that of the cycle in which it came, made as the next one begins:
+        // the SYNC of that one has the bit.
         let before_ns = driven.sync_ns(|s| s.record().is_some_and(|record| record.emergency_stop));
         let sync_ns = before_ns + CYCLE_MS * MS;
         driven.pass(20);

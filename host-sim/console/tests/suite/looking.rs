@@ -1,4 +1,4 @@
-//! What those see who only look, however slowly.
+//! What clients see that only look, however slowly.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpListener;
@@ -14,7 +14,7 @@ use crate::common::{RELAY, TestRig, done, look};
 
 /// Bytes a second of a slow line on an idle computer.
 const SLOW: usize = 2_000;
-/// Bytes that wait for a slow client at most: the server's buffer and the line's, which the system doubles.
+/// Most bytes that wait for a slow client: the server's buffer and the line's, which the system doubles.
 const WAITING: f64 = 24e3;
 
 /// A server whose port is free at the relay's address as well: a client names the port that the
@@ -30,7 +30,7 @@ fn rig_and_listener() -> (TestRig, TcpListener) {
         .expect("a free port")
 }
 
-/// A line to the server that becomes slow when it is told so, and counts its bytes from then on.
+/// A line to the server that becomes slow on demand, and counts its bytes from then on.
 fn relay(rig: &TestRig, listener: TcpListener) -> (Url, Arc<AtomicBool>, Arc<AtomicUsize>) {
     let server = rig.server.address();
     let slow = Arc::new(AtomicBool::new(false));
@@ -39,7 +39,7 @@ fn relay(rig: &TestRig, listener: TcpListener) -> (Url, Arc<AtomicBool>, Arc<Ato
     let counted = Arc::clone(&passed);
     std::thread::spawn(move || {
         let (mut client, _) = listener.accept().expect("a client");
-        // What waits at the end of a slow line is little.
+        // Little waits at the end of a slow line.
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build();
@@ -70,7 +70,7 @@ fn relay(rig: &TestRig, listener: TcpListener) -> (Url, Arc<AtomicBool>, Arc<Ato
     (Url::parse(&url).expect("an address"), slow, passed)
 }
 
-/// Bytes of the sample at the begin of `body`, by the list of channels alone.
+/// Bytes of the sample at the start of `body`, using only the list of channels.
 fn length(channel: u16, body: &[u8]) -> usize {
     let fields = channels()[usize::from(channel)].fields;
     fields.iter().fold(8, |at, field| {
@@ -93,7 +93,7 @@ fn every_sample_of_every_channel_comes_once_and_in_order() {
     let mut last = vec![None; channels().len()];
     let mut counts = vec![0_usize; channels().len()];
     let begin = Instant::now();
-    // Every board tells once in a while what it has heard.
+    // Every board reports now and then what it has heard.
     let silent = |counts: &[usize]| {
         let mut all = channels().iter().zip(counts);
         all.any(|(channel, count)| channel.written == Written::OnChange && *count == 0)
@@ -164,11 +164,11 @@ fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
         }
     }
     let (count, missed, seen_us) = reads_slowly.join().expect("it stays");
-    // 4 channels, 50 Hz, 30 s; the wall of a busy computer is not judged.
+    // 4 channels, 50 Hz, 30 s; a busy computer's wall time is not judged.
     assert!(seen > 3_000, "{seen}");
     assert_eq!(missed_by_quick, 0);
-    // What it sees is new: it lags by what waits on its line, at the pace that the line really had, and by no more of all
-    // that it could not get. That would be four fifths of the time.
+    // Its view is new: it lags by the bytes that wait on its line, at the line's true pace, and not by
+    // everything that it missed, which would be four fifths of the time.
     let lag_us = quick.seen_us() - seen_us;
     let pace_s = passed.load(Ordering::Relaxed) as f64 / lasting.as_secs_f64();
     assert!(
@@ -178,7 +178,7 @@ fn the_newest_wins_for_a_client_that_reads_slowly_and_others_see_nothing() {
     assert!(count > 0 && missed > 2 * count, "{missed} beside {count}");
 }
 
-/// It is told much, and says nothing but that it is there when it is asked.
+/// It receives much, and sends nothing but its answers to pings.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn who_only_looks_is_not_taken_for_gone() {

@@ -1,5 +1,5 @@
-//! The server over real sockets. What happens to the robot is judged in master time; the clock on
-//! the wall only bounds how long a test may take.
+//! The server over real sockets. Effects on the robot are judged in master time; wall-clock time only bounds
+//! how long a test may take.
 
 mod api;
 mod common;

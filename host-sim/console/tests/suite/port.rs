@@ -47,7 +47,7 @@ fn boards() -> Far {
     }
 }
 
-/// Its boards are at this port, and its adapter as these files tell.
+/// A robot whose boards are at this port, with its adapter described in `ports`.
 fn live(path: &str, ports: &Path) -> Live {
     Live {
         port: Some(Port::parse(path).expect("a port").told_of_in(ports)),
@@ -107,7 +107,7 @@ fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
     driver.keep_control(true);
     assert_eq!(refusal(&mut driver, "Arm", &json!({})), "slow_adapter");
     collects("1\n");
-    // A board that a busy computer kept from answering is lost for a moment.
+    // A board whose answer a busy computer delayed is lost for a moment.
     let begin = Instant::now();
     loop {
         match driver.carry_out("Arm", &json!({}), 1000).expect("sent") {

@@ -12,7 +12,7 @@ use wheeleg_console::{Files, Fingerprint, Live, Options, Protection, Server};
 
 use crate::common::{done, look};
 
-/// A name of the network, at which the server listens beside the loopback address.
+/// A name in the network, at which the server listens in addition to the loopback address.
 const NAME: &str = "robot.example";
 
 struct TestRig {
@@ -48,7 +48,7 @@ impl TestRig {
         self.server.address().port()
     }
 
-    /// It is reached by a name that this computer knows.
+    /// Its address, with a name that this computer knows.
     fn url(&self, scheme: &str) -> Url {
         Url::parse(&format!("{scheme}://localhost:{}", self.port())).expect("an address")
     }
@@ -84,7 +84,7 @@ fn with_tls_one_drives_and_who_pins_another_certificate_is_told() {
     look(&mut driver, "state");
     done(&mut driver, "TakeControl");
     done(&mut driver, "ReleaseControl");
-    // Somebody between, with a certificate of their own.
+    // Somebody in between, with their own certificate.
     let other = Fingerprint::parse(&"ab".repeat(32)).expect("digits");
     let wrong = Client::connect(
         &rig.url("https").with_certificate(other),
@@ -97,7 +97,7 @@ fn with_tls_one_drives_and_who_pins_another_certificate_is_told() {
     let unknown = Client::connect(&rig.url("https"), "control", "driver", &rig.keys.control);
     let error = unknown.err().expect("refused").to_string();
     assert!(error.contains("--fingerprint"), "{error}");
-    // No key is taken in clear.
+    // No key is accepted in clear.
     let answer = rig.get("/api/v1/state", "");
     assert!(!answer.starts_with("HTTP/1.1"), "{answer}");
 }
@@ -113,7 +113,7 @@ fn half_tls_handshakes_lose_their_place() {
         let Ok(mut stream) = TcpStream::connect(address) else {
             continue;
         };
-        // The begin of a ClientHello.
+        // The start of a ClientHello.
         let _ = stream.write_all(&[0x16, 0x03, 0x01, 0x02, 0x00]);
         open.push(stream);
     }
@@ -218,7 +218,7 @@ fn a_certificate_that_cannot_be_used_is_refused_by_its_file() {
     }
 }
 
-/// Base64, as PEM has it.
+/// Base64, as in PEM.
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::new();

@@ -1,5 +1,5 @@
-//! Recordings: what an operator did is repeated to the bit, however the recording ended; a folder
-//! that is none, or was tampered with, is told.
+//! Recordings: an operator's inputs repeat to the bit, however the recording ended; a folder that is no
+//! recording, or was tampered with, is reported.
 
 use std::fs;
 use std::ops::ControlFlow;
@@ -32,7 +32,7 @@ fn repeated(folder: &Path) -> Replayed {
     told(folder, None).expect("a recording")
 }
 
-/// What is told of it, with the problems of a file.
+/// The error for a folder, with the problems of its files.
 fn error(folder: &Path) -> String {
     let told = told(folder, None).expect_err("no recording");
     let related = told.related().into_iter().flatten();
@@ -86,7 +86,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     let first = first_difference(&folder.join("log.mcap"), &log).expect("two logs");
     assert_eq!(first, None);
 
-    // One digit of one command makes another session, and the second in which it does is told.
+    // One changed digit in one command makes another session; the second of the difference is reported.
     let other = copied(&folder);
     let inputs = other.path().join("inputs.jsonl");
     let text = fs::read_to_string(&inputs).expect("inputs");
@@ -118,7 +118,7 @@ fn a_session_under_an_operators_hands_is_repeated_to_the_bit() {
     assert!(told.compared >= 2, "{told:?}");
 }
 
-/// Who revoked whose control stands in the recording, and on `/session`.
+/// Who revoked whose control is in the recording, and on `/session`.
 #[test]
 fn a_revoked_control_is_recorded_and_repeats() {
     let rig = TestRig::recorded(1.0);
@@ -183,7 +183,7 @@ fn a_recording_begins_and_ends_when_it_is_asked_to_and_still_repeats() {
     let first = repeated(&folder(&rig, "0001"));
     assert!(first.is_same(), "{first:?}");
     assert!(first.summary.begin_us > 0 && first.inputs > 2);
-    // A viewer finds robot, ground and forces in a log that begins in the middle of a life.
+    // A viewer finds robot, ground and forces in a log that begins in mid-run.
     let log = folder(&rig, "0001").join("log.mcap");
     assert_eq!(attachments(&log).expect("a log")[0].name, "robot.urdf");
     let mut counts = [0; 5];
@@ -211,7 +211,7 @@ fn a_folder_that_cannot_be_made_is_told_and_the_robot_goes_on() {
     let mut driver = rig.driver("driver");
     assert_eq!(refusal(&mut driver, "RecordStart", &json!({})), "recording");
     let begin = Instant::now();
-    // The place can be freed, and then it can.
+    // Once the path is freed, it works.
     fs::remove_file(rig.home.path().join("recordings")).expect("removed");
     done(&mut driver, "RecordStart");
     done(&mut driver, "RecordStop");
@@ -268,7 +268,7 @@ fn a_folder_that_is_no_recording_or_was_tampered_with_is_told_by_file_and_line()
     fs::remove_file(&inputs).expect("removed");
     assert!(error(folder.path()).contains("inputs.jsonl"));
     let summary = folder.path().join("recording.json");
-    // A time after which nobody waits, and a robot that is none.
+    // A time so late that nobody waits for it, and an invalid robot.
     let sound = fs::read_to_string(&summary).expect("read");
     fs::write(&inputs, "").expect("written");
     let mut late: Value = serde_json::from_str(&sound).expect("JSON");

@@ -1,4 +1,4 @@
-//! The list of threats names tests that there are.
+//! The list of threats names existing tests.
 
 use std::path::Path;
 

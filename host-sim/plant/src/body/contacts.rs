@@ -1,4 +1,4 @@
-//! Where the robot can touch the ground, and what carries over from step to step.
+//! The contact points of the robot, and their state from step to step.
 //!
 //! | body | touches with |
 //! |---|---|
@@ -51,7 +51,7 @@ pub struct FootContact {
     pub switch_threshold_m: f64,
     /// Normal force of soil on a side of the sole that closes its switch \[N\]; half of it opens it.
     pub switch_force_n: f64,
-    /// Nails under the sole; they act in soil alone.
+    /// Nails under the sole; they act only in soil.
     pub nails: Nails,
 }
 
@@ -62,7 +62,7 @@ pub struct WheelContact {
     pub law: ContactLaw,
     /// Width \[m\].
     pub width_m: f64,
-    /// Height of the lugs over the rim \[m\]; they act in soil alone.
+    /// Height of the lugs over the rim \[m\]; they act only in soil.
     pub lug_m: f64,
     /// Rolling resistance: moment over load and radius.
     pub rolling_resistance: f64,
@@ -180,7 +180,7 @@ pub type Grips = [Grip; SLOTS];
 pub struct Step {
     /// Number of the part plus one; 0: none.
     pub part: u32,
-    /// What is left in the soil.
+    /// The print left in the soil.
     pub print: Print,
 }
 
@@ -192,14 +192,14 @@ pub type Steps = [Step; SOFT_SLOTS];
 pub struct Rut {
     /// Number of the part plus one; 0: none.
     pub part: u32,
-    /// What is left in the soil.
+    /// The rolling state left in the soil.
     pub rolling: Rolling,
 }
 
 /// The ruts of one wheel.
 pub type Ruts = [Rut; SOFT_SLOTS];
 
-/// What the contacts carry over.
+/// State of the contacts from step to step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContactStates {
     /// Spheres of the left and the right sole.
@@ -225,7 +225,7 @@ impl ContactStates {
         feet.chain(wheels).chain(&self.chassis).flatten()
     }
 
-    /// Soil as if everything in it had been pressed straight down to where it is, shear as it is.
+    /// Resets soil as if all parts in it had been pressed straight down to their places; shear stays.
     pub(super) fn press_soil_anew(&mut self) {
         let steps = self.steps.as_flattened_mut().as_flattened_mut();
         for step in steps.iter_mut().filter(|step| step.part != 0) {
@@ -238,7 +238,7 @@ impl ContactStates {
         }
     }
 
-    /// Adds the state to a hash. Soil adds to it only where something stands in it.
+    /// Adds the state to a hash. Soil adds to it only where a foot or wheel is in it.
     pub fn feed(&self, hasher: &mut StateHasher) {
         for grip in self.grips() {
             hasher.bytes(&grip.part.to_le_bytes());

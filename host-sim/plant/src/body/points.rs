@@ -1,10 +1,10 @@
-//! The contacts one by one, for those who look at them. The loop itself needs their sums alone.
+//! The contacts one by one, for callers that inspect them. The loop itself needs only their sums.
 
 use std::cell::RefCell;
 
 use nalgebra::Vector3;
 
-/// What of the robot touches.
+/// The part of the robot that touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Toucher {
     /// A sphere of a foot: 0 left, 1 right; 0 centre, 1 front, 2 left, 3 back, 4 right.
@@ -18,7 +18,7 @@ pub enum Toucher {
 /// One contact with one part of the terrain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPoint {
-    /// What touches.
+    /// The touching part.
     pub toucher: Toucher,
     /// Where \[m\], world axes.
     pub point_m: Vector3<f64>,
@@ -38,5 +38,5 @@ pub struct ContactPoint {
     pub soft: bool,
 }
 
-/// Where contacts are noted, if somebody looks.
+/// Where contacts are noted, if a caller wants them.
 pub(super) type Notes<'a> = Option<&'a RefCell<Vec<ContactPoint>>>;

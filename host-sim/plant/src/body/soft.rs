@@ -163,7 +163,7 @@ impl Soft {
         true
     }
 
-    /// A disc of a wheel, or a share of one, near a soft part. False: the surface is hard there.
+    /// A disc of a wheel, or a share of one, near a soft part. False: the surface there is hard.
     #[inline]
     pub(super) fn disc(
         &self,

@@ -17,12 +17,12 @@ use crate::error::PlantError;
 
 /// Longest step \[m, rad\].
 const STEP: f64 = 2e-3;
-/// Steps before it is given up; 0.3 m of fall.
+/// Steps before the search gives up; 0.3 m of fall.
 const STEPS: usize = 400;
-/// What counts as nothing \[N, N m\].
+/// Residual that counts as zero \[N, N m\].
 const NOTHING: f64 = 1e-9;
-/// Far from the origin a coordinate has no finer steps than its rounding: steps of the search that
-/// are no longer than this many of them are at the end.
+/// Far from the origin a coordinate is no finer than its rounding: search steps no longer than this many
+/// roundings have reached the end.
 const ROUNDINGS: f64 = 64.0;
 /// For the slope of the forces \[m, rad\].
 const DIFFERENCE: f64 = 1e-8;
@@ -33,7 +33,7 @@ const UPRIGHT: [usize; 3] = [0, 1, 5];
 const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
 
 impl BodyMechanics {
-    /// Puts the robot into the pose in which it stands, starting from where it is.
+    /// Puts the robot into its standing pose, starting from the present one.
     ///
     /// # Errors
     /// [`PlantError::NotStanding`] if it does not stand on its feet in this pose,
@@ -56,7 +56,7 @@ impl BodyMechanics {
         Ok(())
     }
 
-    /// Piston forces that hold the robot at rest in its pose, with its contacts as they are \[N\].
+    /// Piston forces that hold the robot at rest in its pose, with its present contacts \[N\].
     ///
     /// # Errors
     /// [`PlantError::Mechanics`] or [`PlantError::NonFinite`] if the pose cannot be.
@@ -113,7 +113,7 @@ impl BodyMechanics {
         }
     }
 
-    /// What pushes the chassis after a small shift, and the robot there.
+    /// The net force on the chassis after a small shift, and the robot there.
     fn unbalanced(
         &self,
         motion: &BodyMotion,

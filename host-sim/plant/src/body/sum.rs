@@ -1,4 +1,4 @@
-//! The forces of one body's contacts, as they are found.
+//! The forces of one body's contacts, summed as they are found.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use crate::contact::{ContactLaw, Touch};
 use crate::dynamics::floating::Wrench;
 use crate::terrain::{Material, Near};
 
-/// The forces of one body's contacts, as they are found.
+/// The forces of one body's contacts, summed as they are found.
 pub(super) struct Sum<'n> {
     /// Point about which the body's twists are \[m\].
     pub(super) reference_m: Vector3<f64>,
@@ -16,18 +16,18 @@ pub(super) struct Sum<'n> {
     pub(super) now: [Vector3<f64>; 2],
     /// Twist over the step that has just ended.
     pub(super) during: [Vector3<f64>; 2],
-    /// Length of that step \[s\]; 0: grips stay as they are.
+    /// Length of that step \[s\]; 0: grips stay unchanged.
     pub(super) step_s: f64,
     pub(super) wrench: Wrench,
     pub(super) normal_n: f64,
     /// Sum of the normal forces as vectors.
     pub(super) support_n: Vector3<f64>,
-    /// What touches, for the notes.
+    /// The touching part, for the notes.
     pub(super) toucher: Toucher,
     pub(super) notes: Notes<'n>,
 }
 
-/// What of a contact is not in its force.
+/// Facts of a contact beyond its force.
 pub(super) struct Noted<'a> {
     /// Number of the part, from 1.
     pub(super) number: u32,
@@ -68,7 +68,7 @@ impl Sum<'_> {
         self.wrench.moment_n_m += arm.cross(force_n);
     }
 
-    /// Notes a contact at `arm` from the reference, if somebody looks.
+    /// Notes a contact at `arm` from the reference, if a caller wants notes.
     #[inline]
     pub(super) fn note<'a>(
         &self,
@@ -163,7 +163,7 @@ impl<'a, 'n> Pressing<'a, 'n> {
         });
     }
 
-    /// Lets go of what is not touched; gives the deepest penetration \[m\].
+    /// Releases parts no longer touched; returns the deepest penetration \[m\].
     #[inline]
     pub(super) fn end(self) -> f64 {
         for (grip, touched) in self.grips.iter_mut().zip(self.touched) {

@@ -16,8 +16,7 @@ use crate::contact::ContactLaw;
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
 use crate::terrain::{Disc, Index, Near, Rim, Shape, Surface, Terrain};
 
-/// Rocks and solids farther than this from a foot are not looked for, where its height over the
-/// ground is asked for \[m\].
+/// The search for a foot's height over the ground ignores rocks and solids farther than this \[m\].
 const SIGHT_M: f64 = 0.3;
 /// More than the error of a distance \[m\].
 const ROUNDING_M: f64 = 1e-6;
@@ -48,7 +47,7 @@ pub struct FootLoad {
 }
 
 impl WheelLoad {
-    /// Of a wheel whose pose cannot be evaluated.
+    /// For a wheel whose pose cannot be evaluated.
     pub const UNKNOWN: Self = Self {
         normal_n: f64::NAN,
         slip_m_s: f64::NAN,
@@ -57,7 +56,7 @@ impl WheelLoad {
 }
 
 impl FootLoad {
-    /// Of a foot whose pose cannot be evaluated.
+    /// For a foot whose pose cannot be evaluated.
     pub const UNKNOWN: Self = Self {
         force_n: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
         normal_n: f64::NAN,
@@ -79,7 +78,7 @@ pub struct Loads {
     pub chassis_n: f64,
 }
 
-/// The contacts with what does not change, prepared once.
+/// The constant data of the contacts, prepared once.
 #[derive(Debug, Clone)]
 pub struct Touching {
     params: RobotContacts,
@@ -92,11 +91,11 @@ pub struct Touching {
     soft: Soft,
     /// No point of the chassis is farther from its origin.
     chassis_reach_m: f64,
-    /// How far the ground has gone down under the feet alone \[m\].
+    /// How far the ground has sunk under the feet only \[m\].
     sunk_under_feet_m: f64,
 }
 
-/// A law whose friction is at most this.
+/// The law with its friction limited to this value.
 fn limited(mut law: ContactLaw, mu: Option<f64>) -> ContactLaw {
     if let Some(mu) = mu {
         law.mu_static = law.mu_static.min(mu);
@@ -121,7 +120,7 @@ fn lift(steps: &mut [Step]) {
     }
 }
 
-/// Velocities of the robot: now, and over the step of so many seconds that has just ended.
+/// Velocities of the robot: now, and over the step just ended, with its length.
 #[derive(Clone, Copy)]
 struct Moving<'a> {
     kin: &'a FloatingKin,
@@ -193,7 +192,7 @@ impl Touching {
         &self.terrain
     }
 
-    /// Limits the friction of both soles on hard ground; `None` gives them their own again.
+    /// Limits the friction of both soles on hard ground; `None` restores their own.
     pub fn limit_foot_friction(&mut self, mu: Option<f64>) {
         self.laws[0] = limited(self.params.foot.law, mu).shared_by(SPHERES);
     }
@@ -203,7 +202,7 @@ impl Touching {
         self.laws[1] = limited(self.params.wheel.law, mu).shared_by(DISCS);
     }
 
-    /// Lets the ground go down by `depth_m` under the feet alone; 0 brings it back.
+    /// Lowers the ground by `depth_m` under the feet only; 0 restores it.
     pub fn sink_under_feet(&mut self, depth_m: f64) {
         self.sunk_under_feet_m = depth_m;
     }
@@ -214,9 +213,9 @@ impl Touching {
         self.index.top_near_m(&self.terrain.parts, place, reach_m)
     }
 
-    /// One sphere or point against the ground, of which what is farther than `reach_m` from it is no
-    /// matter; gives its deepest penetration into hard parts \[m\]. `soft` is asked for each soft
-    /// part, and is false where that part is hard.
+    /// One sphere or point against the ground, ignoring parts farther than `reach_m`; returns its deepest
+    /// penetration into hard parts \[m\]. `soft` is called for each soft part, and returns false where that
+    /// part is hard.
     #[inline]
     fn press_point(
         &self,
@@ -235,7 +234,7 @@ impl Touching {
         pressing.end()
     }
 
-    /// One disc against the ground; what soft parts it touches goes to the patches.
+    /// One disc against the ground; contacts with soft parts go to the patches.
     #[inline]
     fn press_disc(
         &self,
@@ -310,9 +309,8 @@ impl Touching {
         centre
     }
 
-    /// Forces of the ground, `kin` being the robot as it is, `now` its velocity. After a step of
-    /// `step_s` seconds at the velocity `during`, grips and switches follow first; a step of 0
-    /// leaves them as they are.
+    /// Forces of the ground for the robot at `kin` with velocity `now`. After a step of `step_s` seconds at
+    /// the velocity `during`, grips and switches follow first; a step of 0 leaves them unchanged.
     #[must_use]
     pub fn loads(
         &self,
@@ -332,7 +330,7 @@ impl Touching {
         self.all(&moving, states)
     }
 
-    /// The contacts one by one, `kin` being the robot as it is, `now` its velocity.
+    /// The contacts one by one, for the robot at `kin` with velocity `now`.
     #[must_use]
     pub fn points(
         &self,
@@ -348,7 +346,7 @@ impl Touching {
             step_s: 0.0,
             notes: Some(&points),
         };
-        // A step of 0 changes the bristles of a copy by rounding alone.
+        // A step of 0 changes the bristles of a copy only by rounding.
         let _ = self.all(&moving, &mut states.clone());
         points.into_inner()
     }

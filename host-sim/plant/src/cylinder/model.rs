@@ -13,7 +13,7 @@ use crate::valve::{NEVER_NS, ValveParams, ValveState, ValveTiming};
 pub struct CylinderForces {
     /// pA AA − pB AB − p_atm A_rod.
     pub pressure_n: f64,
-    /// Seal friction as it acts on the piston (against its motion).
+    /// Seal friction on the piston (against its motion).
     pub friction_n: f64,
     /// End stops and cushions.
     pub end_stop_n: f64,
@@ -28,7 +28,7 @@ impl CylinderForces {
     }
 }
 
-/// Gas rates of a cylinder and what they take from its surroundings.
+/// Gas rates of a cylinder and the flows they take from its surroundings.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CylinderRates {
     pub(crate) a: ChamberRates,
@@ -270,7 +270,7 @@ impl CylinderModel {
         self.forces_with(&friction, pressures_pa, state.bristle_m, (stroke_m, v_m_s))
     }
 
-    /// The same with pressures \[Pa\] and friction that are known.
+    /// The same with known pressures \[Pa\] and friction.
     #[inline]
     pub(crate) fn forces_with(
         &self,
@@ -289,7 +289,7 @@ impl CylinderModel {
         }
     }
 
-    /// Gas rates with the valves as they stand.
+    /// Gas rates with the present valve states.
     #[inline]
     pub(crate) fn rates(
         &self,

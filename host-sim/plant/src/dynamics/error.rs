@@ -10,15 +10,15 @@ pub enum DynamicsError {
     Leg {
         /// 0 left, 1 right.
         leg: usize,
-        /// What the kinematics found.
+        /// The error of the kinematics.
         source: KinematicsError<f64>,
     },
     /// A coordinate, rate or force that is NaN or infinite.
     #[error("{name}[{index}] = {value} is not finite")]
     NonFinite {
-        /// `position`, `velocity`, `force`, `acceleration`, or what overflowed.
+        /// `position`, `velocity`, `force`, `acceleration`, or the overflowed quantity.
         name: &'static str,
-        /// Coordinate number; body or leg number for what overflowed there, column of a mass matrix.
+        /// Coordinate number; body or leg number of an overflow there, column of a mass matrix.
         index: usize,
         /// The value.
         value: f64,

@@ -36,7 +36,7 @@ pub(super) fn hermite(share: f64, width: f64) -> [f64; 4] {
 }
 
 impl Grid {
-    /// From `first`, a power of two above 0, over so many cells.
+    /// From `first`, a power of two above 0, over this many cells.
     pub(super) fn new(first: f64, cells: usize) -> Self {
         Self {
             first: first.to_bits() >> SHIFT,
@@ -58,7 +58,7 @@ impl Grid {
         let cell = cell.min(self.cells - 1);
         let low = self.node(cell);
         let width = self.node(cell + 1) - low;
-        // A power of two, whose inverse is known from its exponent.
+        // A power of two; its exponent gives the inverse.
         let inverse = f64::from_bits((2046 << 52) - width.to_bits());
         let share = ((x - low) * inverse).clamp(0.0, 1.0);
         Place {

@@ -32,7 +32,7 @@ pub struct Soil {
     pub shear_damping_n_s_m: f64,
 }
 
-/// What the four soils have in common.
+/// Common properties of the four soils.
 const COMMON: Soil = Soil {
     kc_n_m: 0.0,
     kphi_n_m: 0.0,

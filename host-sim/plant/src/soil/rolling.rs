@@ -1,4 +1,4 @@
-//! A wheel on soil from step to step: slip as a state, where soil is piled up, the depth of the rut.
+//! A wheel on soil from step to step: slip as a state, the side of the piled-up soil, the depth of the rut.
 //!
 //! # Slip
 //!
@@ -40,7 +40,7 @@ const ROLLED: f64 = 0.5;
 /// Shear displacement where the pressure is largest, over that at the lowest point.
 const SHEARED: f64 = 0.6;
 
-/// What a wheel has left in the soil.
+/// State that a wheel has left in the soil.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Rolling {
     /// Slip coordinate along the wheel, −1..1: positive pushes it forward.
@@ -79,7 +79,7 @@ pub struct Rolled {
     pub moved: Motion,
 }
 
-/// What the soil does to a wheel. Forces act at the axle but the lateral one, which acts at the rim.
+/// Forces of the soil on a wheel. They act at the axle, except the lateral one, which acts at the rim.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RollingForce {
     /// Along the normal \[N\].
@@ -149,7 +149,7 @@ impl RollingLaw {
         }
     }
 
-    /// Follows the motion of the step that has just ended, and gives the force.
+    /// Follows the motion of the step just ended, and returns the force.
     #[must_use]
     #[inline]
     pub fn force(&self, state: &mut Rolling, touch: &Rolled) -> RollingForce {

@@ -39,7 +39,7 @@ pub struct Nails {
     pub diameter_m: f64,
     /// Length below the sole \[m\].
     pub length_m: f64,
-    /// Way at which 63 % of what they hold sideways is mobilised \[m\].
+    /// Displacement that mobilises 63 % of their lateral strength \[m\].
     pub shear_m: f64,
 }
 
@@ -64,12 +64,12 @@ impl Nails {
     }
 }
 
-/// What a sole has left in the soil.
+/// State that a sole has left in the soil.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Print {
     /// Share of the pad's friction that is mobilised, along the sliding.
     pub rubbed: Vector3<f64>,
-    /// Share of what the nails hold, along the sliding.
+    /// Share of the nails' strength, along the sliding.
     pub raked: Vector3<f64>,
     /// Deepest sinkage of the pad \[m\].
     pub deepest_m: f64,
@@ -167,7 +167,7 @@ impl SoleLaw {
         }
     }
 
-    /// Follows the motion of the step that has just ended, and gives the force.
+    /// Follows the motion of the step just ended, and returns the force.
     #[must_use]
     #[inline]
     pub fn force(&self, print: &mut Print, touch: &Stepped) -> SoleForce {

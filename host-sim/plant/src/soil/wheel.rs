@@ -45,7 +45,7 @@ pub struct Wheel {
     pub lug_m: f64,
 }
 
-/// What soil does to a wheel that rolls forward.
+/// Forces of soil on a wheel that rolls forward.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WheelForces {
     /// Normal force N \[N\].

@@ -24,7 +24,7 @@ use crate::hash::StateHasher;
 const CLOSE: f64 = 1e-13;
 /// Most steps to a root.
 const STEPS: usize = 40;
-/// Angles of the rim that are tried where Newton's method does not settle.
+/// Rim angles tried where Newton's method does not settle.
 const TRIES: usize = 48;
 
 /// An ellipsoid with one vertical axis.
@@ -131,8 +131,8 @@ impl Ellipsoid {
         )
     }
 
-    /// Newton's method for the rim; gives the point of the rim as well. `None` if it does not
-    /// settle at a least distance.
+    /// Newton's method for the rim; also returns the point of the rim. `None` if it does not settle at a
+    /// least distance.
     fn on_rim(&self, rim: &Rim, start: Vector3<f64>) -> Option<(Found, Vector3<f64>)> {
         let squares = self.squares();
         let r = rim.radius_m;
@@ -168,8 +168,8 @@ impl Ellipsoid {
         None
     }
 
-    /// Whether a plane square to the rock's surface towards the disc's centre tells the two apart.
-    /// Most rocks near a wheel need no more than this; where it is false, they may be apart as well.
+    /// Whether a plane square to the rock's surface towards the disc's centre separates the two. Most rocks
+    /// near a wheel need no more than this; where it is false, they may still be apart.
     #[must_use]
     #[inline]
     pub fn is_clear_of(&self, disc: &Disc) -> bool {

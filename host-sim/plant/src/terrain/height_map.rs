@@ -94,7 +94,7 @@ pub(super) struct Place {
     pub(super) z: f64,
     /// Slopes along X and Y.
     pub(super) slope: [f64; 2],
-    /// Second derivatives by XX, XY, YY \[1/m\]; zero if nobody asked.
+    /// Second derivatives by XX, XY, YY \[1/m\]; zero unless requested.
     pub(super) bend: [f64; 3],
 }
 
@@ -129,9 +129,9 @@ fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 }
 
 impl HeightMap {
-    /// From heights \[m\] as a picture has them: rows from the top of the picture, where Y is
-    /// largest, down; columns along X. `origin_m` is the place of the lower left value, X and Y;
-    /// `cell_m`, above 0, the distance of neighbours.
+    /// From heights \[m\] in the order of a picture: rows from its top, where Y is largest, down; columns
+    /// along X. `origin_m` is the place of the lower left value, X and Y; `cell_m`, above 0, the distance of
+    /// neighbours.
     ///
     /// # Errors
     /// [`HeightMapError`] if it is no rectangle of 2 to 4096 rows and columns, or steeper than
@@ -265,7 +265,7 @@ impl HeightMap {
         }
     }
 
-    /// The four rows of four values around a cell at the map's edge, which goes on level.
+    /// The four rows of four values around a cell at the map's edge, which continues level.
     #[cold]
     fn rows_at_edge(&self, i: usize, j: usize) -> [[f64; 4]; 4] {
         let [columns, rows] = [(i, self.columns), (j, self.rows)].map(|(cell, count)| {
@@ -290,12 +290,12 @@ impl HeightMap {
 }
 
 impl HeightMap {
-    /// No place of it is higher \[m\].
+    /// Height that no place of it exceeds \[m\].
     pub(super) fn highest_m(&self) -> f64 {
         self.top_m
     }
 
-    /// No place of it within `reach_m` of this one is higher \[m\].
+    /// Height that no place within `reach_m` of this one exceeds \[m\].
     #[inline]
     pub(super) fn highest_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
         let cell = |at_m: f64, axis: usize, count: usize| {

@@ -1,5 +1,5 @@
-//! Which parts of the terrain may touch a body: a grid of cells over all parts of limited size, and a
-//! coarser one for those that are much larger than most.
+//! Finds the parts of the terrain that may touch a body: a grid of cells over all parts of limited size, and
+//! a coarser one for those much larger than most.
 //!
 //! Each part is in every cell that its box covers. A query looks at the cells below the body and
 //! at the boxes in them, so its cost depends on how many parts are near, not on how many there
@@ -13,8 +13,8 @@ use super::surface::{Bounds, Surface};
 
 /// Parts that would cover more cells belong to the coarser grid.
 const CELLS: u64 = 64;
-/// Where cells of which each has its place in memory would be this many times larger than the parts,
-/// those with parts alone are kept: a crowd of parts and a few far away would else share one cell.
+/// Where a dense grid would need cells this many times larger than the parts, only cells with parts are kept:
+/// otherwise a crowd of parts and a few far away would share one cell.
 const SPARSE: f64 = 8.0;
 /// Cells are at most this many times smaller for it: their numbers stay whole.
 const FINEST: f64 = 4096.0;
@@ -38,8 +38,7 @@ pub struct Index {
     origin_m: [f64; 2],
     cell_m: [f64; 2],
     size: [u32; 2],
-    /// Where the items of a cell begin; one more at the end. Empty where cells without parts are left
-    /// out.
+    /// Where the items of a cell begin; one more at the end. Empty if cells without parts are left out.
     begins: Vec<u32>,
     /// The cell of each item, in their order, where `begins` is empty.
     cells: Vec<u64>,
@@ -64,7 +63,7 @@ impl Index {
             }
         }
         let mut index = Self::of(limited);
-        // Those that no grid tells apart are asked everywhere, too.
+        // Parts that no grid separates are also checked everywhere.
         everywhere.append(&mut index.everywhere);
         Self {
             everywhere,
@@ -112,7 +111,7 @@ impl Index {
         index.lay(span, [typical; 2], limited.len());
         index.fill(&limited, &mut large);
         if index.items.is_empty() && !limited.is_empty() {
-            // Long and thin, all of them: cells of their shape.
+            // All of them long and thin: cells of their shape.
             large.truncate(much_larger);
             let widths = [0, 1].map(|i| {
                 let mut widths: Vec<f64> = limited.iter().map(|(_, b)| wide(b, i)).collect();
@@ -128,7 +127,7 @@ impl Index {
         }
         large.sort_unstable_by_key(|(number, _)| *number);
         if index.items.is_empty() {
-            // Parts without a width: no grid tells them apart.
+            // Parts without a width: no grid separates them.
             index.everywhere = large.into_iter().map(|(number, _)| number).collect();
         } else if !large.is_empty() {
             let coarse = Self::of(large);
@@ -138,8 +137,8 @@ impl Index {
         index
     }
 
-    /// Cells over `span`, as large as `count` parts of a `typical` size, but not many more cells than
-    /// parts: else those that have any are kept alone.
+    /// Cells over `span`, as large as `count` parts of a `typical` size, but not many more cells than parts:
+    /// otherwise only cells with parts are kept.
     fn lay(&mut self, span: [f64; 2], typical: [f64; 2], count: usize) {
         let most = 65_536.0 + 16.0 * count as f64;
         let of_parts = (typical[0] * typical[1]).sqrt();
@@ -216,7 +215,7 @@ impl Index {
         self.items = items;
     }
 
-    /// The same of cells of which only those with parts are kept.
+    /// The same when only cells with parts are kept.
     fn fill_sparse(&mut self, placed: &[(u32, Bounds, Covered)]) {
         let mut all = Vec::new();
         for (part, bounds, covered) in placed {
@@ -245,7 +244,7 @@ impl Index {
         begin as usize..end as usize
     }
 
-    /// Cells below a rectangle; `None`: it is beside the grid.
+    /// Cells below a rectangle; `None` if it is beside the grid.
     #[inline]
     fn covered(&self, low_m: [f64; 2], high_m: [f64; 2]) -> Option<Covered> {
         let mut covered = [[0; 2]; 2];
@@ -282,8 +281,8 @@ impl Index {
         });
     }
 
-    /// As [`Self::near`]; `f` gives the distance beyond which further parts are no matter \[m\],
-    /// at most the one before.
+    /// As [`Self::near`]; `f` returns the distance beyond which further parts do not matter \[m\], at most
+    /// the previous one.
     #[inline]
     pub fn nearest(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32) -> f64) {
         let mut reach_m = reach_m;
@@ -314,7 +313,7 @@ impl Index {
         let Some([from, to]) = self.covered(corner(-*reach_m), corner(*reach_m)) else {
             return;
         };
-        // A part in several of these cells is given in the first of them.
+        // A part in several of these cells is reported in the first of them.
         let mut look = |item: &Item, cell: [u32; 2]| {
             let first = [item.first[0].max(from[0]), item.first[1].max(from[1])];
             let meets = |i: usize| {
@@ -426,7 +425,7 @@ mod tests {
         (0..count).map(batten).collect()
     }
 
-    /// However many parts there are, a query looks at those near it, and finds what is to be found.
+    /// With any number of parts, a query looks only at those near it, and misses none of them.
     #[test]
     fn a_query_looks_at_near_parts_alone() {
         for (name, make) in [

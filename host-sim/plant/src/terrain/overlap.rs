@@ -1,5 +1,4 @@
-//! How many parts lie over one place: a body there asks each of them at every step, and is pushed
-//! by each.
+//! Counts the parts over one place: a body there checks each of them at every step, and each pushes it.
 
 use super::surface::Surface as _;
 use super::{Index, Part};
@@ -12,11 +11,11 @@ pub const MOST_OVER_A_PLACE: usize = 64;
 pub struct Heap {
     /// The place, X and Y \[m\].
     pub place_m: [f64; 2],
-    /// The parts, as far as they were counted; at least one more than may be.
+    /// The parts counted so far; at least one more than allowed.
     pub parts: Vec<u32>,
 }
 
-/// A part under whose middle too many others lie. Those that are anywhere count everywhere.
+/// Finds the middle of a part with too many parts over it. Unlimited parts count everywhere.
 #[must_use]
 pub fn heap(parts: &[Part], index: &Index) -> Option<Heap> {
     let unlimited = parts.iter().filter(|part| part.shape.bounds().is_none());

@@ -1,10 +1,9 @@
 //! Where the rim of a disc is deepest in a height map.
 //!
-//! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands
-//! on two at most in its plane. The two highest are followed: one step of Newton's method in every
-//! step of the plant keeps a peak, which moves by some micrometres meanwhile. Every millisecond
-//! all of the lower rim is looked at anew, so that a bump which has come near is found before it
-//! touches.
+//! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands on two at
+//! most in its plane. The two highest are followed: one step of Newton's method in every step of the plant
+//! keeps a peak, which moves by some micrometres meanwhile. Every millisecond the whole lower rim is searched
+//! again, so that a bump which has come near is found before it touches.
 //!
 //! Two peaks that run into each other are one. Each then bears less, to half, so that the force
 //! does not jump.
@@ -18,7 +17,7 @@ use super::height_map::HeightMap;
 use super::surface::{Disc, Near, Surface};
 use crate::hash::StateHasher;
 
-/// Angles at which the rim is looked at.
+/// Sampled angles of the rim.
 const LOOKS: usize = 25;
 /// Farthest of them from the lowest point \[rad\]: 84°.
 const SIDE: f64 = 1.466_076_571_675_237;
@@ -29,19 +28,19 @@ static DIRECTIONS: LazyLock<[(f64, (f64, f64)); LOOKS]> = LazyLock::new(|| {
         (angle, libm::sincos(angle))
     })
 });
-/// Time until it is looked at again \[s\].
+/// Time until the next search \[s\].
 const AGAIN_S: f64 = 1e-3;
-/// Peaks farther than this above the ground are let go \[m\].
+/// Peaks farther than this above the ground are dropped \[m\].
 const NEAR_M: f64 = 0.02;
 /// Peaks nearer to each other share the load \[rad\]: 15°.
 const SHARING: f64 = 0.261_799_387_799_149_4;
 /// Peaks nearer than this are one \[rad\].
 const ONE: f64 = 1e-3;
-/// A peak that is found this near to one that was followed is that one \[rad\].
+/// A new peak this near to a followed one is the same peak \[rad\].
 const SAME: f64 = 0.1;
 /// Longest step of Newton's method \[rad\].
 const STEP: f64 = 0.05;
-/// Steps on a peak that has just been found.
+/// Newton steps on a new peak.
 const FIRST: usize = 8;
 
 impl Surface for HeightMap {
@@ -80,9 +79,9 @@ impl Surface for HeightMap {
 pub struct Rim {
     /// Angles from the lowest point of the disc, about its axis \[rad\]. A peak keeps its place.
     angle_rad: [f64; 2],
-    /// Which of them there are.
+    /// Which of them exist.
     there: [bool; 2],
-    /// Time until the whole rim is looked at again \[s\].
+    /// Time until the next search of the whole rim \[s\].
     due_s: f64,
 }
 
@@ -115,7 +114,7 @@ impl Axes {
     }
 }
 
-/// The ground at one angle of a rim, and where Newton's method would go from there.
+/// The ground at one angle of a rim, and the next angle of Newton's method.
 struct Look {
     /// Slopes of the ground along X and Y, and how they change along the rim \[1/rad\].
     slope: [f64; 2],
@@ -222,7 +221,7 @@ impl Rim {
         }
     }
 
-    /// Follows the peaks over a step of so many seconds; 0: the disc as it is.
+    /// Follows the peaks over a step of this many seconds; 0: the disc as it is.
     pub fn follow(&mut self, map: &HeightMap, disc: &Disc, step_s: f64) -> [Option<RimTouch>; 2] {
         self.due_s -= step_s;
         // Half a nanosecond, for rounding: plant steps are whole nanoseconds.

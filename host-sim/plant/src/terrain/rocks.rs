@@ -11,7 +11,7 @@ pub const MOST_ROCKS: usize = 200_000;
 /// Places that are tried for a rock.
 const TRIES: usize = 2000;
 
-/// What a field of rocks is like. Sizes are drawn evenly from their range. No two rocks overlap.
+/// Parameters of a field of rocks. Sizes are drawn evenly from their range. No two rocks overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RockField {
     /// From and to, along X \[m\].
@@ -51,7 +51,7 @@ pub enum RockError {
 struct Rock {
     radii_m: Vector3<f64>,
     heading_rad: f64,
-    /// Radius of the circle around what is seen of it from above \[m\].
+    /// Radius of the circle around its visible part from above \[m\].
     seen_m: f64,
 }
 
@@ -115,7 +115,7 @@ impl RockField {
     }
 }
 
-/// Circles that are taken, in cells at least as large as the largest, and not many more of them.
+/// Occupied circles, in cells at least as large as the largest, and not many more cells than circles.
 struct Taken {
     origin_m: [f64; 2],
     cell_m: f64,

@@ -1,10 +1,10 @@
 //! A convex body with flat faces: block, step, ramp.
 //!
-//! The body is what lies below all of its faces' planes. Its closest place to a point outside is
-//! the foot of the perpendicular on one face, on the line of two faces, or the corner of three:
-//! the nearest of those that belong to the body. With at most six faces that is a short search,
-//! and exact. A disc is searched in its own plane, where the body is a polygon: a contact on an
-//! edge of the body then has the exact normal, from edge to axle.
+//! The body lies below the planes of all its faces. Its closest place to a point outside is the foot of the
+//! perpendicular on one face, on the line of two faces, or the corner of three: the nearest of those that
+//! belong to the body. With at most six faces that is a short, exact search. A disc is searched in its own
+//! plane, where the body is a polygon: a contact on an edge of the body then has the exact normal, from edge
+//! to axle.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -101,7 +101,7 @@ impl Solid {
         }
     }
 
-    /// Its corners seen from above, in turn \[m\].
+    /// Its corners from above, in order \[m\].
     #[must_use]
     pub fn outline_m(&self) -> [[f64; 2]; 4] {
         // Faces 1 to 4 are the walls: front, rear, left, right.

@@ -1,4 +1,4 @@
-//! What every kind of ground can tell of itself.
+//! Queries that every kind of ground answers.
 
 use nalgebra::Vector3;
 
@@ -43,10 +43,10 @@ pub trait Surface {
     /// Closest place to a disc; `None` if its plane does not meet the body.
     fn to_disc(&self, disc: &Disc) -> Option<Near>;
 
-    /// No part of it is higher \[m\].
+    /// Height that no part of it exceeds \[m\].
     fn top_m(&self) -> f64;
 
-    /// No part of it within this distance along X and Y is higher \[m\].
+    /// Height that no part of it within this distance along X and Y exceeds \[m\].
     fn top_near_m(&self, _x_m: f64, _y_m: f64, _reach_m: f64) -> f64 {
         self.top_m()
     }

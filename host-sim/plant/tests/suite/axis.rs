@@ -142,8 +142,8 @@ fn second_order_in_the_step() {
 
 #[test]
 fn edges_are_exact_not_rounded_to_the_grid() {
-    // The mass let in by one pulse depends on its length to the microsecond:
-    // open time = pulse - t_on + t_off, whatever the grid.
+    // The mass of one pulse depends on its length to the microsecond: open time = pulse - t_on + t_off, for
+    // any grid.
     let filled = |us: u16, step_ns: u64| {
         let mut p = mid_stroke(2e5, 2e5);
         p.cylinder.b_blocked();

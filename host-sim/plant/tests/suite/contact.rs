@@ -1,4 +1,4 @@
-//! The contact law alone: unilateral, dissipative, sticking.
+//! The contact law in isolation: unilateral, dissipative, sticking.
 
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

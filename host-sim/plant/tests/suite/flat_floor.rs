@@ -1,5 +1,5 @@
-//! The floating robot on a level floor: against the robot in eight coordinates, and against what
-//! mechanics says of energy, rolling, falling and turning.
+//! The floating robot on a level floor: compared with the robot in eight coordinates, and with the mechanics
+//! of energy, rolling, falling and turning.
 
 use nalgebra::Vector3;
 use wheeleg_plant::assembly::{Assembly, AssemblyState, Mechanics};
@@ -54,7 +54,7 @@ fn program(t: f64) -> [f64; 3] {
     [b5, b6, 0.18 * step + pushed]
 }
 
-/// Valve times and duties that make a robot follow the program from what it shows.
+/// Valve times and duties that make a robot follow the program from its observed state.
 fn follow(t: f64, strokes: &[f64; 6], travel: f64) -> Inputs {
     let [b5, b6, x] = program(t);
     let targets = [0.09, b5, b6, 0.09, 0.09, 0.18];
@@ -336,7 +336,7 @@ fn a_wheel_without_grip_spins() {
         plant.tick(&mut state, &inputs).unwrap();
     }
     let o = plant.outputs(&state);
-    // Coulomb friction is all that drives it.
+    // Only Coulomb friction drives it.
     let most = 0.02 * G * 0.3 * 1.2;
     assert!(
         o.velocity_m_s[0] > 0.0 && o.velocity_m_s[0] < most,
@@ -353,13 +353,13 @@ fn a_wheel_without_grip_spins() {
 fn wheels_climb_an_edge_at_the_torque_of_statics() {
     use wheeleg_plant::terrain::{Material, Part, Shape, Solid};
     let mut params = icy_feet(free_wheels());
-    // Stiff, so that the edge is as high as it is.
+    // Stiff, so that the edge keeps its height.
     params.contacts.wheel.law.stiffness_n_m *= 20.0;
     params.contacts.wheel.law.bristle_stiffness_n_m *= 20.0;
     let (r, h): (f64, f64) = (params.body.wheel_radius_m, 0.02);
     let sine = (r - h) / r;
     let cosine = (1.0 - sine * sine).sqrt();
-    // Under the wheels alone, just not touching yet.
+    // Only under the wheels, just not touching yet.
     for y in [-0.28, 0.28] {
         let edge = r * cosine + 1e-4;
         params.terrain.parts.push(Part {

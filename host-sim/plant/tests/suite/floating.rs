@@ -78,7 +78,7 @@ fn fast_and_reference_give_the_same_numbers() {
         }
     }
     println!("I, bias, contact, forward, inverse, energy, momentum, points: {worst:?}");
-    // The condition of the mass matrix stands between the two accelerations.
+    // The condition of the mass matrix separates the two accelerations.
     assert!(worst.iter().all(|w| *w <= 1e-11), "{worst:?}");
 }
 
@@ -352,7 +352,7 @@ fn number(size: f64) -> impl Strategy<Value = f64> {
     ]
 }
 
-/// A finite answer, or a refusal that carries what it refused.
+/// A finite answer, or a refusal with the refused value.
 fn right<T>(
     answer: Result<T, DynamicsError>,
     is_finite: impl Fn(&T) -> bool,

@@ -89,8 +89,8 @@ fn a_rock_from_samples_converges_to_the_rock() {
     let [coarse, middle, fine] = [error(8), error(16), error(32)];
     println!("distance, normal, disc: {coarse:?} {middle:?} {fine:?}");
     for i in 0..3 {
-        // A sixteenth, with room for where the samples happen to lie. The depth of 0.1 mm itself
-        // is told to second order.
+        // A sixteenth, with room for the positions of the samples. The depth of 0.1 mm itself is accurate to
+        // second order.
         assert!(fine[i] < 0.1 * coarse[i] + 1e-7, "{i}: {coarse:?} {fine:?}");
         assert!(fine[i] < 1e-3);
     }

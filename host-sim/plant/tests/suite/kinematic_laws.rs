@@ -139,7 +139,7 @@ fn twists_and_their_rates_are_those_of_the_places() {
     );
 }
 
-/// Rows of the constraint matrix K of K t = 0: what the joints forbid, from the places alone.
+/// Rows of the constraint matrix K of K t = 0: motions that the joints forbid, from the places alone.
 struct Constraints {
     rows: Vec<Vec<f64>>,
     columns: usize,

@@ -1,4 +1,4 @@
-//! Odd numbers as input of a dynamics engine, and what answers to them may be.
+//! Odd numbers as input of a dynamics engine, and the permitted answers.
 
 use proptest::prelude::*;
 use wheeleg_plant::dynamics::DynamicsError;
@@ -35,7 +35,7 @@ pub(crate) fn finite<'a>(values: impl IntoIterator<Item = &'a f64>) -> bool {
     values.into_iter().all(|v| v.is_finite())
 }
 
-/// A refusal tells the value that caused it, or which overflow did.
+/// A refusal names the value that caused it, or the overflow.
 pub(crate) fn named(error: &DynamicsError) -> bool {
     let text = error.to_string();
     match error {

@@ -27,7 +27,7 @@ fn driving(duty: [f64; 2]) -> Inputs {
     }
 }
 
-/// Rolling without drive takes its coefficient times load times distance, nothing else does.
+/// Undriven rolling loses its coefficient times load times distance, and nothing else.
 #[test]
 fn rolling_loses_its_coefficient_times_load_and_distance() {
     let lost = |coefficient: f64| {
@@ -59,7 +59,7 @@ fn rolling_loses_its_coefficient_times_load_and_distance() {
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
 }
 
-/// Dropped from 20 mm it comes to rest as it stood; the ground has taken most of the energy.
+/// Dropped from 20 mm it comes to rest in its standing pose; the ground has taken most of the energy.
 #[test]
 fn a_dropped_robot_comes_to_rest_and_the_ground_takes_its_energy() {
     let params = wheeleg_2003();
@@ -104,11 +104,11 @@ fn wheels_climb_an_edge_at_the_torque_of_statics() {
     for height in [0.01, 0.015, 0.02] {
         let mut params = wheeleg_2003();
         params.contacts.wheel.rolling_resistance = 0.0;
-        // Hardly sinks in, so that the lever is that of the drawing.
+        // Hardly sinks in, so that the lever matches the drawing.
         params.contacts.wheel.law.stiffness_n_m = 6e6;
         let r = params.body.wheel_radius_m;
         let lever = (r * r - (r - height) * (r - height)).sqrt();
-        // Narrow: the wheels alone meet it, the feet stand beyond.
+        // Narrow: only the wheels meet it, the feet stand beyond.
         let edge = Solid::block([lever + 0.101, 0.0], [0.1, 1.0], 0.0, [-1.0, height]);
         params.terrain.parts.push(Part {
             shape: Shape::Solid(edge),
@@ -144,7 +144,7 @@ fn wheels_climb_an_edge_at_the_torque_of_statics() {
     }
 }
 
-/// Different speeds of the wheels turn the robot about the centre that they give.
+/// Different wheel speeds turn the robot about the centre that follows from them.
 #[test]
 fn the_radius_of_a_turn_is_speed_over_yaw_rate_of_the_wheels() {
     let params = wheeleg_2003();

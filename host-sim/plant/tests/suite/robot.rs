@@ -245,7 +245,7 @@ fn feet_carry_what_the_moments_about_the_axle_say() {
     let kin = body.prepare(&state.core.motion.state, &down).unwrap();
     let weight = body.params().robot.total_mass_kg() * 9.81;
     let o = plant.outputs(&state);
-    // The wheels' load acts right below the axle, that of a sole where its spheres have it.
+    // The wheels' load acts directly below the axle, a sole's load at its spheres.
     let scene = plant.assembly.mechanics.scene(&state.core.motion).unwrap();
     let sole = &scene.loads.contacts.feet[0];
     let axle = o.position_m[0];
@@ -310,7 +310,7 @@ fn drives_at_the_speed_the_motor_characteristic_gives() {
     let drag = -(o.foot_force_n[0][0] + o.foot_force_n[1][0]) + 4.0 * speed + rolling;
     let push = (o.wheel_torque_n_m[0] + o.wheel_torque_n_m[1]) / 0.15;
     assert!((push / drag - 1.0).abs() < 0.02, "{push} {drag}");
-    // It rolls: far from the friction of its tyres nothing slips but the bristles' give.
+    // It rolls: far from the friction limit of its tyres only the bristles yield.
     assert!(o.wheel_slip_m_s.iter().all(|s| s.abs() < 1e-3 * speed));
     // Winding equation at that speed.
     let motor_rad_s = o.wheel_rate_rad_s[0] * m.reduction;
@@ -336,8 +336,8 @@ fn drives_at_the_speed_the_motor_characteristic_gives() {
 
 #[test]
 fn halving_the_step_changes_the_gait_little() {
-    // A lift over its first second: contact breaks, stick turns to slip; only first
-    // order can be asked for, and little of it.
+    // A lift over its first second: contact breaks, stick turns to slip; the test can require only first
+    // order, and little of it.
     let stroke = |step_ns| {
         let mut params = wheeleg_2003();
         params.step_ns = step_ns;

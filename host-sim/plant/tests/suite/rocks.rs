@@ -86,7 +86,7 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
         if least < -2e-3 {
             continue;
         }
-        // The walk is never nearer, and misses by what its mesh misses.
+        // The walk is never nearer, and misses by its mesh error.
         assert!(near.distance_m <= least + 1e-9, "{near:?} {least}");
         assert!(near.distance_m > least - 2e-3, "{near:?} {least}");
         // The point is of the disc, and the rock is there.
@@ -108,7 +108,7 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
         }
     }
     assert!(rims > 500 && sides > 100, "{rims} {sides}");
-    // Most of those that are apart are told without the search.
+    // Most pairs that are apart are recognized without the search.
     assert!(2 * clear > apart, "{clear} {apart}");
 }
 
@@ -148,7 +148,7 @@ fn field() -> RockField {
 fn a_field_covers_its_share_with_rocks_of_its_sizes_that_do_not_overlap() {
     let field = field();
     let rocks = field.scatter(|x, _| 0.1 * x).unwrap();
-    // What is seen of a sphere that shows a third of its height has 8/9 of its area.
+    // The visible part of a sphere that shows a third of its height has 8/9 of its area.
     let seen: f64 = rocks
         .iter()
         .map(|r| std::f64::consts::PI * r.radii_m().x.powi(2) * 8.0 / 9.0)
@@ -206,7 +206,7 @@ fn a_field_that_cannot_be_is_refused() {
     assert_eq!(many.scatter(|_, _| 0.0), Err(RockError::TooMany));
 }
 
-/// Parts of very different sizes: what is near is found, whatever the grid.
+/// Parts of very different sizes: near ones are found on any grid.
 #[test]
 fn the_index_misses_nothing_and_gives_nothing_twice() {
     let mut rng = Pcg64Mcg::seed_from_u64(5);
@@ -242,7 +242,7 @@ fn the_index_misses_nothing_and_gives_nothing_twice() {
 }
 
 /// Parts that are all very long and thin, along one axis or both, and a crowd with a few far away: each is
-/// found where it is.
+/// found at its place.
 #[test]
 fn long_thin_and_far_parts_are_found() {
     let part = |centre: [f64; 2], radii: [f64; 3]| {
@@ -289,7 +289,7 @@ fn long_thin_and_far_parts_are_found() {
     }
 }
 
-/// A search that narrows as it finds gives the same least distance from fewer parts.
+/// A search that narrows as it goes gives the same least distance from fewer parts.
 #[test]
 fn a_search_that_narrows_finds_the_nearest_part() {
     let mut rng = Pcg64Mcg::seed_from_u64(6);

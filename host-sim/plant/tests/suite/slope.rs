@@ -27,7 +27,7 @@ fn static_loads_on_planes_are_those_of_moments() {
         let total: Vector3<f64> = contacts.all().iter().map(|w| w.force_n).sum();
         let error = total - Vector3::new(0.0, 0.0, weight);
         assert!(error.norm() < 1e-6 * weight, "{degrees}: {error}");
-        // Along and across the slope, from the place where the wheels touch it.
+        // Along and across the slope, from the wheels' contact place.
         let (up, out) = (
             Vector3::new(slope.cos(), 0.0, slope.sin()),
             Vector3::new(-slope.sin(), 0.0, slope.cos()),
@@ -78,7 +78,7 @@ fn the_start_is_an_equilibrium_whichever_way_the_slope_runs() {
         let error = total - Vector3::new(0.0, 0.0, weight);
         assert!(error.norm() < 1e-6, "{azimuth}: {error}");
         let o = plant.outputs(&state);
-        // The chassis lies as the plane does, within what contacts and legs give way.
+        // The chassis is parallel to the plane, within the give of contacts and legs.
         let slope = 15.0_f64.to_radians();
         let across = azimuth.to_radians();
         let up = state.core.motion.state.orientation * Vector3::z();
@@ -93,7 +93,7 @@ fn the_start_is_an_equilibrium_whichever_way_the_slope_runs() {
     }
 }
 
-/// Tip-back is at 24.2 degrees with the legs drawn in; the plant says so in words.
+/// Tip-back is at 24.2 degrees with the legs drawn in; the plant's error says so.
 #[test]
 fn too_steep_a_start_is_refused() {
     let plant = Plant::new(&on(26.0, 0.0)).unwrap();
@@ -167,7 +167,7 @@ fn a_start_on_the_chassis_is_refused() {
     assert_eq!(on_ramp(30.0, -0.6).unwrap_err(), PlantError::NotStanding);
 }
 
-/// A block between corners and edges of the chassis, which no contact of it would feel.
+/// A block between corners and edges of the chassis, which none of its contacts would feel.
 #[test]
 fn a_block_inside_the_chassis_is_refused() {
     let with_block = |top_m: f64| {

@@ -1,4 +1,4 @@
-//! Soft soil alone: against independent integrals, tables against integrals, states at rest and in
+//! Soft soil in isolation: against independent integrals, tables against integrals, states at rest and in
 //! motion.
 
 use nalgebra::Vector3;
@@ -329,7 +329,7 @@ fn nails_go_in_and_hold_as_the_resistive_forces_say() {
     }
 }
 
-/// Force along X on a sole at this depth that was dragged along X so far.
+/// Force along X on a sole at this depth dragged this far along X.
 fn drag(law: &SoleLaw, depth_m: f64, way_m: f64) -> f64 {
     let mut print = law.pressed(depth_m);
     let step = Vector3::x() * 1e-5;
@@ -381,7 +381,7 @@ fn a_sole_leaves_a_print_and_nails_pull_it_back() {
         (least, most) = (least.min(force), most.max(force));
     }
     println!("{least}..{most} N, {work} J lost");
-    // Half of what they took to go in, and the pad carries nothing on the way out.
+    // Half of their insertion force, and the pad carries nothing on the way out.
     let nails = at_rest(&law, 0.0);
     assert!(
         (least + 0.5 * nails * 0.062 / 0.06).abs() < 0.1 * nails,

@@ -37,7 +37,7 @@ struct Cart {
 }
 
 impl Cart {
-    /// Set down where it is carried, at rest.
+    /// Set down at the depth that carries it, at rest.
     fn set_down(law: &RollingLaw) -> Self {
         let (mut low, mut high) = (0.0, 0.1);
         for _ in 0..60 {
@@ -365,7 +365,7 @@ fn a_rut_is_plastic_and_left_behind() {
     let loaded = law
         .force(&mut RollingLaw::pressed(deepest), &touch(deepest, 0.0))
         .normal_n;
-    // What is given back is a triangle over 5 % of the sinkage.
+    // The returned part is a triangle over 5 % of the sinkage.
     let rebound = 0.5 * 0.05 * deepest * loaded;
     println!("{work} J lost, {rebound} J back, {loaded} N");
     assert!(work > 10.0 * rebound);

@@ -1,5 +1,4 @@
-//! From values to pixels, and what lines, rasters and maps have in common: frame,
-//! grid, numbers and marks.
+//! From values to pixels, and the common parts of lines, rasters and maps: frame, grid, numbers and marks.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +16,7 @@ pub(super) enum Grid {
     Covered,
 }
 
-/// Where a panel draws.
+/// The drawing area of a panel.
 pub(super) struct Axes {
     x: Scale,
     y: Scale,
@@ -34,7 +33,7 @@ struct Scale {
 impl Scale {
     fn at(&self, value: f64) -> f64 {
         let ((v0, v1), (p0, p1)) = (self.values, self.pixels);
-        // A range without length, or with more than numbers can tell, has everything in its middle.
+        // A range without length, or too large for numbers, has everything in its middle.
         let share = (value - v0) / (v1 - v0);
         let share = if v1 > v0 && share.is_finite() {
             share
@@ -51,7 +50,7 @@ impl Scale {
             return Vec::new();
         }
         let count = |step: f64| (hi / step).floor() - (lo / step).ceil() + 1.0;
-        // Of a range that is larger or smaller than any, there are no such multiples.
+        // A range beyond all limits has no such multiples.
         let decade = (hi - lo).log10().floor().clamp(-300.0, 300.0) as i32;
         let decades = (decade - 2..=decade + 1).map(|k| 10_f64.powi(k));
         let steps = decades.flat_map(|ten| [1.0, 2.0, 5.0].map(|m| m * ten));
@@ -138,8 +137,8 @@ impl Axes {
     }
 }
 
-/// The marks that can be told apart: inside `range`, and the first of each pixel. A run may have
-/// a hundred thousand.
+/// The marks that can be distinguished: inside `range`, and the first of each pixel. A run may have a hundred
+/// thousand.
 pub(super) fn seen(marks: &[f64], range: (f64, f64)) -> Vec<f64> {
     let scale = Scale {
         values: range,

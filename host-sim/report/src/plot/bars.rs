@@ -1,4 +1,4 @@
-//! Horizontal bars: one row per thing compared, one column per quantity.
+//! Horizontal bars: one row per compared item, one column per quantity.
 
 use super::svg::{Anchor, SMALL, Stroke, Svg};
 use super::{Colour, LEFT, WIDTH, colour};
@@ -7,19 +7,19 @@ use super::{Colour, LEFT, WIDTH, colour};
 pub struct Bars {
     /// Name and colour of each row.
     pub rows: Vec<(String, Colour)>,
-    /// One column of bars a quantity.
+    /// One column of bars per quantity.
     pub columns: Vec<Column>,
 }
 
 /// One quantity.
 pub struct Column {
-    /// What it is, with the unit.
+    /// The quantity, with its unit.
     pub title: String,
     /// Length of each row's bar; longer than `full` is drawn as `full`.
     pub values: Vec<Option<f64>>,
-    /// What stands behind each bar.
+    /// Text behind each bar.
     pub texts: Vec<String>,
-    /// Value of a bar over the whole column.
+    /// Value of a bar across the whole column.
     pub full: f64,
     /// A limit to be kept.
     pub limit: Option<f64>,

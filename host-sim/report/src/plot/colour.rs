@@ -17,17 +17,17 @@ impl fmt::Display for Colour {
 pub const INK: Colour = Colour(0x2B, 0x33, 0x3D);
 /// Lines of the grid.
 pub const GRID: Colour = Colour(0xE4, 0xE7, 0xEB);
-/// Ground of a figure.
+/// Background of a figure.
 pub const PAPER: Colour = Colour(0xFF, 0xFF, 0xFF);
 /// The reference model.
 pub const MODEL: Colour = Colour(0x9A, 0x5C, 0x86);
 /// The reference model, shifted in time.
 pub const DELAYED: Colour = Colour(0xC9, 0xA5, 0xBD);
-/// The robot: what was measured is ink, everywhere.
+/// The robot: measured curves are ink, everywhere.
 pub const ROBOT: Colour = Colour(0x16, 0x1B, 0x20);
 /// A signal before its filter.
 pub const RAW: Colour = Colour(0x9A, 0xA3, 0xAD);
-/// What the master commands: what was asked is blue, everywhere.
+/// Commands of the master: commanded curves are blue, everywhere.
 pub const COMMAND: Colour = Colour(0x00, 0x72, 0xB2);
 /// A second curve of a panel.
 pub const SECOND: Colour = Colour(0x12, 0x8A, 0x6B);

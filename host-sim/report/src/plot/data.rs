@@ -6,8 +6,8 @@ use super::axes::seen;
 use super::simplify::simplified;
 use super::{Content, Panel, Series};
 
-/// Most stretches of a curve, each told by its smallest and its largest value: no peak is lost,
-/// and a report stays small.
+/// Most stretches of a curve, each drawn by its smallest and its largest value: no peak is lost, and a report
+/// stays small.
 const STRETCHES: usize = 500;
 /// A curve may be off by this share of its axis: a quarter of a pixel of a high panel.
 const INVISIBLE: f64 = 1e-3;
@@ -41,7 +41,7 @@ struct SeriesData<'a> {
 }
 
 impl<'a> PanelData<'a> {
-    /// The data of a panel of lines; none for other contents, whose picture is all there is.
+    /// The data of a panel of lines; none for other contents, which have only their picture.
     pub(crate) fn of(panel: &'a Panel) -> Option<Self> {
         let Content::Lines(lines) = &panel.content else {
             return None;
@@ -94,7 +94,7 @@ impl<'a> SeriesData<'a> {
     }
 }
 
-/// Smallest and largest value of every stretch, in the order in which they come.
+/// Smallest and largest value of every stretch, in their order.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= 2 * STRETCHES {
         return points.to_vec();

@@ -36,7 +36,7 @@ pub fn line(label: &str, colour: Colour, width: u32, points: Vec<(f64, f64)>) ->
 pub struct Lines {
     /// The curves, drawn in this order.
     pub series: Vec<Series>,
-    /// Which of them the picture's legend names; a page has room for all.
+    /// The lines named in the picture's legend; a page has room for all.
     pub(super) named: Range<usize>,
     /// Horizontal lines with a meaning.
     pub(super) limits: Vec<f64>,

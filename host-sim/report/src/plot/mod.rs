@@ -25,7 +25,7 @@ use svg::{Stroke, Svg};
 
 use crate::ReportError;
 
-/// What a panel holds.
+/// Contents of a panel.
 pub enum Content {
     /// Curves over a common abscissa.
     Lines(Lines),
@@ -75,13 +75,13 @@ pub struct Panel {
     pub x_range: (f64, f64),
     /// Vertical marks, such as the time of an event.
     pub marks: Vec<f64>,
-    /// What they mean, for the legend.
+    /// Meaning of the marks, for the legend.
     pub marked: &'static str,
-    /// What is drawn.
+    /// Its contents.
     pub content: Content,
     /// Height in pixels.
     pub height: u32,
-    /// Whether the abscissa is the clock of the page: its cursor then shows there, too.
+    /// Whether the abscissa is the page's clock: then its cursor is shown there, too.
     pub on_clock: bool,
     /// Label of the abscissa of a raster; lines have their own.
     raster_x: &'static str,
@@ -94,7 +94,7 @@ pub struct Figure {
     pub id: String,
     /// Heading of the figure.
     pub title: String,
-    /// What the reader sees in it.
+    /// Explanation for the reader.
     pub caption: String,
     /// From top to bottom.
     pub panels: Vec<Panel>,
@@ -168,7 +168,7 @@ impl Figure {
     }
 }
 
-/// Refuses PNG in a program that cannot write it, before what would be drawn is computed.
+/// Refuses PNG in a program that cannot write it, before any figure is computed.
 ///
 /// # Errors
 /// [`ReportError::NoPng`] in a program that was built without the feature `png`.
@@ -200,7 +200,7 @@ impl Panel {
         }
     }
 
-    /// Names the abscissa of lines and rasters, where time has a zero of its own.
+    /// Labels the abscissa of lines and rasters whose time has its own zero.
     pub fn over(mut self, x_label: &'static str) -> Self {
         if let Content::Lines(lines) = &mut self.content {
             lines.x_label = x_label.to_owned();
@@ -209,7 +209,7 @@ impl Panel {
         self
     }
 
-    /// Leaves the legend of the picture to another panel, but for the lines `named`.
+    /// Leaves the picture's legend to another panel, except for the lines `named`.
     pub fn name_only(&mut self, named: std::ops::Range<usize>) {
         if let Content::Lines(lines) = &mut self.content {
             lines.named = named;
@@ -258,7 +258,7 @@ mod tests {
 
     fn figure() -> Figure {
         let wave = (0..500).map(|i| f64::from(i) * 0.02);
-        // Too quick for any of its points to be left out.
+        // Too quick for any of its points to be dropped.
         let wave = wave.map(|t| (t, 3.0 * (40.0 * t).sin())).collect();
         let lines = vec![line("a < b", colour::MODEL, 2, wave)];
         let row = RasterRow {

@@ -1,4 +1,4 @@
-//! PNG of a figure, for those who ask for it.
+//! PNG of a figure, on request.
 
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -8,7 +8,7 @@ use resvg::{tiny_skia, usvg};
 /// PNG files are drawn at this multiple of the figure's size.
 const SCALE: u32 = 2;
 
-/// The built-in font, so that pictures need none of the machine and are alike everywhere.
+/// The built-in font, so that pictures need no font of the machine and look the same everywhere.
 fn options() -> &'static usvg::Options<'static> {
     static OPTIONS: OnceLock<usvg::Options<'static>> = OnceLock::new();
     OPTIONS.get_or_init(|| {

@@ -8,7 +8,7 @@ use super::{Colour, LEFT, Panel, colour};
 pub struct RasterRow {
     /// Text beside the row.
     pub label: String,
-    /// Colour of what is on.
+    /// Colour of the "on" state.
     pub colour: Colour,
     /// Drawn in the upper half of the row.
     pub upper: Vec<(f64, f64, f64)>,

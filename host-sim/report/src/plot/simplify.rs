@@ -1,7 +1,7 @@
-//! Fewer points for the same line: what a straight line tells as well is left out.
+//! Fewer points for the same line: points that a straight line replaces are dropped.
 
-/// The points of a line that are needed to stay within `tolerance` of all of them, by Ramer,
-/// Douglas and Peucker; distances along y, which keeps peaks as high as they are.
+/// The points of a line that keep it within `tolerance` of all of them, by Ramer, Douglas and Peucker;
+/// distances are along y, which keeps the height of peaks.
 pub(super) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     let Some(last) = points.len().checked_sub(1) else {
         return Vec::new();

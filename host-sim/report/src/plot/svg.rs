@@ -1,11 +1,11 @@
-//! The few elements of SVG that a figure is made of. Positions are in pixels from the
-//! upper left corner; `sans-serif` is a font of the reader's machine.
+//! The few SVG elements of a figure. Positions are in pixels from the upper left corner; `sans-serif` is a
+//! font of the reader's machine.
 
 use std::fmt::{self, Display, Write as _};
 
 use super::colour::{self, Colour};
 
-/// A picture as it grows.
+/// A picture under construction.
 pub(super) struct Svg {
     text: String,
 }
@@ -29,7 +29,7 @@ impl Stroke {
     }
 }
 
-/// The end of a text that stands at its position.
+/// The end of a text that is at its position.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -100,14 +100,14 @@ impl Svg {
         ));
     }
 
-    /// A text, its middle at the height `y`.
+    /// A text with its middle at the height `y`.
     pub(super) fn text(&mut self, (x, y): (f64, f64), size: f64, anchor: Anchor, text: &str) {
         self.open_text((x, y), size, anchor);
         self.put(format_args!("{}</text>\n", Escaped(text)));
     }
 
-    /// A title, and after it what each line means. Each part stands where the one
-    /// before it ends, so that nobody needs to know how wide the reader's letters are.
+    /// A title, followed by the meaning of each line. Each part begins where the one before it ends, so that
+    /// the width of the reader's letters need not be known.
     pub(super) fn legend<'a>(
         &mut self,
         at: (f64, f64),
@@ -135,7 +135,7 @@ impl Svg {
             Anchor::Middle => " text-anchor=\"middle\"",
             Anchor::End => " text-anchor=\"end\"",
         };
-        // Digits and small letters reach about 0.7 of the size above the line that they stand on.
+        // Digits and small letters reach about 0.7 of the size above their base line.
         let foot = y + 0.35 * size;
         self.put(format_args!(
             "<text x=\"{}\" y=\"{}\" font-size=\"{size}\" fill=\"{}\"{anchor}>",
@@ -157,7 +157,7 @@ impl Display for Tenths {
     }
 }
 
-/// An attribute, left out where nothing shines through.
+/// An attribute, left out if fully opaque.
 struct Opacity(&'static str, f64);
 
 impl Display for Opacity {
@@ -170,7 +170,7 @@ impl Display for Opacity {
     }
 }
 
-/// A text in which nothing is a mark of SVG.
+/// A text with the special characters of SVG escaped.
 struct Escaped<'a>(&'a str);
 
 impl Display for Escaped<'_> {

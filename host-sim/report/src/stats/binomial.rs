@@ -1,6 +1,6 @@
-//! The binomial distribution, and what it says of a share that was counted.
+//! The binomial distribution, and confidence bounds of a counted share.
 
-/// Error probability: of both sides of an interval together, of the one side of a bound.
+/// Error probability: of both sides of an interval together, or of the one side of a bound.
 pub const ALPHA: f64 = 0.05;
 /// Standard normal quantile at 1 − α/2.
 const Z: f64 = 1.959_963_984_540_054;
@@ -44,8 +44,8 @@ fn tail(k: u64, n: u64, p: f64) -> f64 {
     sum.min(1.0)
 }
 
-/// Interval of a share after `k` of `n`, 95 % two-sided, exact (Clopper and Pearson 1934): it
-/// holds the true one in at least 95 of 100 experiments. From 0 to 1 of no trials.
+/// Interval of a share after `k` of `n`, 95 % two-sided, exact (Clopper and Pearson 1934): it holds the true
+/// one in at least 95 of 100 experiments. From 0 to 1 without trials.
 ///
 /// # Panics
 /// If there are more successes than trials.
@@ -64,7 +64,7 @@ pub fn clopper_pearson(k: u64, n: u64) -> [f64; 2] {
     [low, high]
 }
 
-/// Root in 0 … 1 of a function that falls, to the last bit or so.
+/// Root in 0 … 1 of a falling function, to the last bit or so.
 pub(super) fn falling(f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..100 {
@@ -78,8 +78,8 @@ pub(super) fn falling(f: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Interval of a share after `k` of `n`, 95 % two-sided, by the score test (Wilson 1927): shorter
-/// than the exact one, and right on average. From 0 to 1 of no trials.
+/// Interval of a share after `k` of `n`, 95 % two-sided, by the score test (Wilson 1927): shorter than the
+/// exact one, and right on average. From 0 to 1 without trials.
 ///
 /// # Panics
 /// If there are more successes than trials.
@@ -96,27 +96,27 @@ pub fn wilson(k: u64, n: u64) -> [f64; 2] {
     [(centre - half).max(0.0), (centre + half).min(1.0)]
 }
 
-/// Ranks, from 1, between which a quantile lies with 95 %, of `n` sorted values; `None` where so
-/// few values do not bound it on that side. Whatever the distribution is.
+/// Ranks, from 1, between which a quantile of `n` sorted values lies with 95 %; `None` if there are too few
+/// values to bound it on that side. For any distribution.
 #[must_use]
 pub fn quantile_ranks(n: u64, share: f64) -> [Option<u64>; 2] {
     let half = 0.5 * ALPHA;
-    // The largest rank that so many values reach with a probability of α/2 at most.
+    // The largest rank that this many values reach with a probability of α/2 at most.
     let low = largest(n, |rank| at_most(rank - 1, n, share) <= half);
-    // The mirror image: the same of the largest values.
+    // The mirror image: the same for the largest values.
     let high = largest(n, |rank| at_most(rank - 1, n, 1.0 - share) <= half);
     [low, high.map(|rank| n + 1 - rank)]
 }
 
-/// Rank, from 1, of the value that is an upper bound of a quantile of `n` sorted values: one-sided 95 %; `None` where so
-/// few values do not bound it. Whatever the distribution is.
+/// Rank, from 1, of the value that is an upper bound of a quantile of `n` sorted values: one-sided 95 %;
+/// `None` if there are too few values to bound it. For any distribution.
 #[must_use]
 pub fn quantile_bound_rank(n: u64, share: f64) -> Option<u64> {
     let rank = largest(n, |rank| at_most(rank - 1, n, 1.0 - share) <= ALPHA)?;
     Some(n + 1 - rank)
 }
 
-/// Largest rank from 1 to `n` for which a condition holds that holds below it, too.
+/// Largest rank from 1 to `n` that satisfies a condition that also holds for all lower ranks.
 fn largest(n: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
     let (mut low, mut high) = (0, n);
     while low < high {
@@ -130,8 +130,8 @@ fn largest(n: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
     (low > 0).then_some(low)
 }
 
-/// Two-sided exact test of McNemar: probability of as unequal a split of the cases in which two
-/// programs differ, `b` one way and `c` the other, if both ways are as likely.
+/// Two-sided exact test of McNemar: probability of such an unequal split of the cases in which two programs
+/// differ, `b` one way and `c` the other, if both ways are equally likely.
 #[must_use]
 pub fn mcnemar(b: u64, c: u64) -> f64 {
     let few = b.min(c);

@@ -1,8 +1,7 @@
 //! Statistics of ranks.
 
-/// Rank correlation of Spearman: Pearson's of the ranks, equal values having the mean of theirs.
-/// Pairs in which one is no number are left out. `None` of fewer than three, or of values that
-/// are all equal.
+/// Spearman's rank correlation: Pearson's of the ranks, where equal values share their mean rank. Pairs with
+/// a value that is not a number are left out. `None` for fewer than three pairs, or if all values are equal.
 ///
 /// # Panics
 /// If the lists differ in length.
@@ -30,7 +29,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut ranks = vec![0.0; values.len()];
     for equal in order.chunk_by(|a, b| values[*a] == values[*b]) {
-        // Ranks are handed out in order, so the first of the group is known by its neighbours.
+        // Ranks follow the sorted order, so the neighbours give the first of the group.
         let below = order.partition_point(|i| values[*i] < values[equal[0]]);
         let rank = below as f64 + 0.5 * (equal.len() as f64 + 1.0);
         equal.iter().for_each(|i| ranks[*i] = rank);

@@ -1,15 +1,15 @@
-//! Intervals by drawing from the values themselves (Efron 1979), the same for the same seed.
+//! Intervals by resampling the values themselves (Efron 1979), the same for the same seed.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 
 use super::quantile;
 
-/// Times that a sample is drawn.
+/// Number of samples drawn.
 const TIMES: usize = 1000;
 
-/// Interval of a statistic, 95 % two-sided, percentiles of its values on samples drawn with
-/// replacement; `None` of fewer than two values.
+/// Interval of a statistic, 95 % two-sided, percentiles of its values on samples drawn with replacement;
+/// `None` for fewer than two values.
 #[must_use]
 pub fn bootstrap(values: &[f64], seed: u64, statistic: impl Fn(&[f64]) -> f64) -> Option<[f64; 2]> {
     if values.len() < 2 {
@@ -33,7 +33,7 @@ mod tests {
     use super::bootstrap;
     use crate::stats::mean;
 
-    /// Of a uniform sample the mean has a standard error of span / √(12 n).
+    /// The mean of a uniform sample has a standard error of span / √(12 n).
     #[test]
     fn an_interval_of_a_mean_is_as_wide_as_its_standard_error_says() {
         let values: Vec<f64> = (0..400).map(|i| (f64::from(i) + 0.5) / 400.0).collect();

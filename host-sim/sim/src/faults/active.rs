@@ -7,7 +7,7 @@ use wheeleg_remote_host::Nodes;
 use super::admission;
 use crate::SimError;
 
-/// Faults under way, each with the time since power-up at which it is over, ns.
+/// Faults under way, each with its end as time since power-up, ns.
 #[derive(Debug, Default)]
 pub(crate) struct ActiveFaults(Vec<(FaultSpec, u64)>);
 
@@ -26,7 +26,7 @@ impl ActiveFaults {
         self.0.retain(|(_, over_ns)| *over_ns > now_ns);
         let active: Vec<FaultSpec> = self.0.iter().map(|(fault, _)| *fault).collect();
         admission::check_now(fault, &active, robot, nodes)?;
-        // Infinity saturates: such a fault lasts until somebody ends it.
+        // Infinity saturates: such a fault lasts until it is ended.
         let lasts_ns = (fault.kind.lasts_s(fault.value) * 1e9).round() as u64;
         self.0.push((*fault, now_ns.saturating_add(lasts_ns)));
         Ok(())

@@ -1,5 +1,4 @@
-//! Which faults a run can have: what makes no sense is refused, never left out
-//! in silence.
+//! Which faults a run can have: one that makes no sense is refused, never silently left out.
 
 use crate::SimError;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
@@ -12,8 +11,8 @@ use wheeleg_remote_host::{NodeKind, Nodes};
 /// where the nodes run.
 ///
 /// # Errors
-/// [`SimError::Config`] or, of a fault that is not in the scenario's file, [`SimError::Simulation`] with the
-/// first fault that cannot be, and why.
+/// [`SimError::Config`] with the first impossible fault, and why; [`SimError::Simulation`] if that fault is
+/// not in the scenario's file.
 pub fn check(scenario: &Scenario, robot: &RobotConfig, nodes: &Nodes) -> Result<(), SimError> {
     let mut alone = scenario.faults.iter().enumerate();
     alone
@@ -50,7 +49,7 @@ fn check_alone(
     Ok(())
 }
 
-/// The error of a fault, with its place if it stands in the scenario's file: others come from elsewhere.
+/// The error of a fault, with its place if it comes from the scenario's file.
 fn in_file(scenario: &Scenario, number: usize, error: SimError) -> SimError {
     let SimError::Simulation { what, help } = &error else {
         return error;
@@ -115,9 +114,9 @@ fn cannot_begin(fault: &FaultSpec) -> SimError {
     )
 }
 
-/// What affects a board itself must be possible where that board runs: an image has a
-/// clock, a transmitter and an interface of its own; a board on QEMU has no watchdog that
-/// would end a stopped program, and a bench board a supply that nobody here can cut.
+/// A fault of a board itself must be possible where that board runs: an image has a clock, a transmitter and
+/// an interface of its own; a board on QEMU has no watchdog that would end a stopped program, and a bench
+/// board has a supply that nobody here can cut.
 fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
     let FaultTarget::Board(node) = fault.target else {
         return Ok(());
@@ -154,11 +153,11 @@ fn can_be_there(fault: &FaultSpec, nodes: &Nodes) -> Result<(), SimError> {
     ))
 }
 
-/// Whether a run with boards outside can be asked to equal one with all boards in this
-/// program: not on a disturbed line.
+/// Checks that a run with boards outside can be compared with one with all boards in this program: not on a
+/// disturbed line.
 ///
 /// # Errors
-/// [`SimError::Simulation`] with the fault that stands against it.
+/// [`SimError::Simulation`] with the fault that prevents it.
 pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimError> {
     use FaultKind as F;
     let on_line = |fault: &&FaultSpec| {
@@ -184,7 +183,7 @@ pub fn ensure_comparable(scenario: &Scenario, nodes: &Nodes) -> Result<(), SimEr
     }
 }
 
-/// What would leave this robot as it is, is no fault.
+/// Refuses a fault that would not change this robot.
 fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError> {
     let plant = &robot.plant;
     let (what, unit, sound) = match fault.kind {
@@ -212,9 +211,9 @@ fn does_something(fault: &FaultSpec, robot: &RobotConfig) -> Result<(), SimError
     ))
 }
 
-/// Parts of the robot, each with where it is, that a fault takes for itself as long as it
-/// lasts: the simulation keeps one fault of such a part, and its end restores the sound part;
-/// or the two exclude each other, as a wiper that is open and one that jumps.
+/// Parts of the robot, each with its place, that a fault takes for itself as long as it lasts: either the
+/// simulation keeps one fault of such a part, and its end restores the sound part; or two faults exclude each
+/// other, as an open wiper and one that jumps.
 fn parts(fault: &FaultSpec) -> Vec<(&'static str, FaultTarget)> {
     use FaultKind as F;
     let part = match fault.kind {
@@ -239,7 +238,7 @@ fn parts(fault: &FaultSpec) -> Vec<(&'static str, FaultTarget)> {
     parts
 }
 
-/// What two faults at a time cannot both act on, in words.
+/// The part that two faults cannot both act on at a time, in words.
 fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
     let others = parts(b);
     let of = |place: FaultTarget| place.to_string().trim_start_matches(':').to_owned();
@@ -249,14 +248,14 @@ fn contested(a: &FaultSpec, b: &FaultSpec) -> Option<String> {
             _ => format!("the {part} of {}", of(place)),
         });
     }
-    // Of those that combine with every other kind, one of a kind at a time.
+    // Faults that combine with every other kind: one of a kind at a time.
     (a.kind == b.kind && a.target == b.target).then(|| match a.target {
         FaultTarget::Robot => whole(a.kind).to_owned(),
         place => of(place),
     })
 }
 
-/// What a fault affects of which there is only one.
+/// The part that a fault affects and that exists only once.
 fn whole(kind: FaultKind) -> &'static str {
     use FaultKind as F;
     match kind {
@@ -277,7 +276,7 @@ fn whole(kind: FaultKind) -> &'static str {
 fn no_rivals(faults: &[FaultSpec]) -> Result<(), (usize, SimError)> {
     let mut by_begin: Vec<usize> = (0..faults.len()).collect();
     by_begin.sort_by(|a, b| faults[*a].from_s.total_cmp(&faults[*b].from_s));
-    // Those under way are at different parts, of which a robot has few.
+    // Faults under way are at different parts, of which a robot has few.
     let mut under_way: Vec<usize> = Vec::new();
     for new in by_begin {
         let begins = &faults[new];
@@ -320,7 +319,7 @@ mod tests {
         check(&scenario, &robot, nodes)
     }
 
-    /// Faults that follow each other are compared with those that are under way alone.
+    /// Faults that follow each other are compared only with those under way.
     #[test]
     fn a_hundred_thousand_faults_are_admitted_in_a_moment() {
         let mut scenario = builtin::scenario("stand").expect("built in");
@@ -446,7 +445,7 @@ mod tests {
         }
     }
 
-    /// A fault of the file is named with its line, one that was added by itself.
+    /// A fault of the file is named with its line, an added one by itself.
     #[test]
     fn a_fault_of_the_file_is_refused_at_its_place() {
         const TEXT: &str = "name = \"x\"\ndescription = \"\"\nrobot = \"wheeleg\"\nduration = \"2 s\"\n\

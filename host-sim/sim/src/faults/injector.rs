@@ -1,10 +1,9 @@
-//! The faults under way: what they do to the plant, to signals and to the line.
+//! The faults under way: their effect on the plant, on signals and on the line.
 //!
-//! A fault acts at one of three places. On the plant it is done once, when it
-//! begins, and undone when it ends ([`Injector::inject`]). On a signal between
-//! plant and board, or on the line, it stands in the way as long as it lasts;
-//! the simulation asks at every passage. All chance comes from one random
-//! stream of the run's seed, which runs without faults never draw from.
+//! A fault acts at one of three places. On the plant it is set once, when it begins, and undone when it ends
+//! ([`Injector::inject`]). A fault on a signal between plant and board, or on the line, acts on every passage
+//! as long as it lasts. All randomness comes from one random stream of the run's seed, which runs without
+//! faults never draw from.
 
 use rand_pcg::Pcg64Mcg;
 use wheeleg_plant::cylinder::{CylinderModel, CylinderParams};
@@ -52,7 +51,7 @@ impl Injector {
         }
     }
 
-    /// A fault begins, or ends if `begin` is false. Plant faults are done here.
+    /// Begins a fault, or ends it if `begin` is false. Plant faults take effect here.
     pub(crate) fn inject(
         &mut self,
         fault: &FaultSpec,
@@ -102,13 +101,13 @@ impl Injector {
         self.of(kind).any(|f| f.target == FaultTarget::Board(node))
     }
 
-    /// The value of a fault of which there is one at a time (`admission`); 0 without it.
+    /// The value of a fault of which only one is active at a time (`admission`); 0 without it.
     fn value(&self, kind: FaultKind) -> f64 {
         self.of(kind).next().map_or(0.0, |f| f.value)
     }
 
-    /// Lets the ground under the feet be as low as it is now; to be called in every joint tick. The wheels'
-    /// stays.
+    /// Lowers the ground under the feet to its height at this time; to be called in every joint tick. The
+    /// ground under the wheels stays.
     pub(crate) fn sink(&self, now_ns: u64, plant: &mut Plant) {
         let since_s = now_ns.saturating_sub(self.sinks_from_ns) as f64 * 1e-9;
         let gives_way_m = self.value(FaultKind::FootSinks).min(SINKS_M_S * since_s);
@@ -116,7 +115,7 @@ impl Injector {
         plant.assembly.mechanics.touching.sink_under_feet(depth_m);
     }
 
-    /// What the master puts on the line in place of `sync`; `None`: nothing.
+    /// The bytes that the master puts on the line in place of `sync`; `None`: nothing.
     pub(crate) fn master_sends(&mut self, sync: &[u8]) -> Option<Vec<u8>> {
         if self.is(FaultKind::MasterSilent) {
             return None;
@@ -154,7 +153,7 @@ impl Injector {
         }
     }
 
-    /// What the board's driver puts on the line of a frame; `None`: nothing.
+    /// The bytes that the board's driver puts on the line for a frame; `None`: nothing.
     pub(crate) fn board_sends(&mut self, node: Node, bytes: Vec<u8>) -> Option<Vec<u8>> {
         if self.affects(FaultKind::NodeSilent, node)
             || self.affects(FaultKind::BabbleUnguarded, node)
@@ -162,7 +161,7 @@ impl Injector {
             return None;
         }
         if self.affects(FaultKind::Babble, node) {
-            // A byte more would end behind the limit.
+            // A byte more would end beyond the limit.
             let limit = SlotTiming::DEFAULT.driver_limit_us() / SlotTiming::DEFAULT.bytes_us(1);
             return Some(rubbish(limit as usize, &mut self.rng));
         }
@@ -177,7 +176,7 @@ impl Injector {
         self.affects(FaultKind::Babble, node)
     }
 
-    /// What a driver that is stuck on sends in the time of so many bytes.
+    /// Bytes that a driver that is stuck on sends in the time of `bytes` bytes.
     pub(crate) fn babble(&mut self, node: Node, bytes: usize) -> Option<Vec<u8>> {
         let stuck = self.affects(FaultKind::BabbleUnguarded, node);
         stuck.then(|| rubbish(bytes, &mut self.rng))
@@ -192,8 +191,7 @@ impl Injector {
         }
     }
 
-    /// What a sound line makes of a transmission, and how late it is, ns; as
-    /// it is on a line without faults.
+    /// A transmission after the errors of the line, and its delay, ns; unchanged on a line without faults.
     pub(crate) fn transmit(&mut self, bytes: Vec<u8>) -> (Vec<u8>, u64) {
         if self.line.is_none() {
             return (bytes, 0);

@@ -4,7 +4,7 @@ use wheeleg_protocol::{Decoder, Envelope, MAX_ENCODED, Message, SCHEMA_HASH};
 
 use wheeleg_interface::archive;
 
-/// The interface that such a board was built from: the newest that is not this program's.
+/// The interface definition of such a board: the newest that is not this program's.
 fn other() -> u64 {
     archive::newest_earlier().unwrap_or(!SCHEMA_HASH)
 }

@@ -26,7 +26,7 @@ impl LineErrors {
         *self == Self::default()
     }
 
-    /// What reaches the receivers of `bytes`.
+    /// The bytes that reach the receivers of `bytes`.
     pub(crate) fn corrupt(&self, bytes: &[u8], rng: &mut impl Rng) -> Vec<u8> {
         let mut out = Vec::with_capacity(bytes.len());
         for &byte in bytes {
@@ -61,8 +61,8 @@ pub(super) fn rubbish(bytes: usize, rng: &mut impl Rng) -> Vec<u8> {
     (0..bytes).map(|_| rng.random()).collect()
 }
 
-/// A sound frame of a type that nobody knows, from the last board to the master, as
-/// long as fits into `room` bytes; `None` if none does.
+/// A sound frame of an unknown type, from the last board to the master, as long as fits into `room` bytes;
+/// `None` if none does.
 pub(super) fn record(room: usize) -> Option<Vec<u8>> {
     let payload = room.checked_sub(encoded_len(0))?.min(MAX_PAYLOAD);
     let header = Header {

@@ -1,11 +1,11 @@
-//! Faults as they are done to the simulated robot.
+//! Faults that are injected into the simulated robot.
 //!
 //! * [`line`]: errors of the bus line, and rubbish on it;
 //! * [`interface`]: boards of another interface version;
-//! * [`active`]: the faults under way, and when those that end by themselves are over;
+//! * [`active`]: the faults under way, and the end of those that end by themselves;
 //! * [`admission`]: which faults a run can have;
 //! * [`schedule`]: begins and ends in order;
-//! * [`injector`]: what the faults under way do to plant, signals and line.
+//! * [`injector`]: the effect of the faults under way on plant, signals and line.
 
 mod active;
 mod admission;

@@ -18,7 +18,7 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// The schedule of `faults`, without those that are there from power-up on.
+    /// The schedule of `faults`, without those that are present from power-up on.
     pub(crate) fn new(faults: &[FaultSpec]) -> Self {
         let ns = |s: f64| (s * 1e9).round() as u64;
         let mut changes: Vec<Change> = Vec::new();

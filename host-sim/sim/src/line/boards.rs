@@ -9,7 +9,7 @@ use crate::{Boards, Session, SimError};
 ///
 /// The same bytes at the same times give the same bytes, however the time is cut into calls.
 pub struct LineBoards {
-    /// Large, and not moved about.
+    /// Boxed: it is large, and should not be moved about.
     session: Box<Session>,
     now_ns: u64,
 }
@@ -32,7 +32,7 @@ impl LineBoards {
         self.now_ns
     }
 
-    /// Bytes come in. On the line they take the time of their bits.
+    /// Takes incoming bytes. On the line they take the time of their bits.
     pub fn hear(&mut self, bytes: &[u8]) {
         let now_ns = self.now_ns;
         if !bytes.is_empty() {
@@ -40,7 +40,7 @@ impl LineBoards {
         }
     }
 
-    /// Simulates up to `t_ns`, and gives the bytes that came from the boards until then.
+    /// Simulates up to `t_ns`, and gives the bytes that the boards sent until then.
     ///
     /// # Errors
     /// [`SimError`] when the plant leaves the range of its model.

@@ -21,14 +21,14 @@ use crate::{SimError, setup};
 /// Time between two looks at the line, ns.
 const TICK_NS: u64 = 1_000_000;
 
-/// Fields of telemetry that no board tells, by the schema of their channel.
+/// Fields of telemetry that no board reports, by the schema of their channel.
 #[must_use]
 pub fn unmeasured() -> &'static [(&'static str, &'static [&'static str])] {
     &UNMEASURED
 }
 
-/// The same master as in a [`Session`](crate::Session), with boards that it knows by their replies
-/// alone: no plant, no injection of faults.
+/// The same master as in a [`Session`](crate::Session), with boards that it knows only by their replies: no
+/// plant, no injection of faults.
 pub struct LineMaster<L> {
     master: Master,
     line: L,
@@ -83,13 +83,13 @@ impl<L: Line> LineMaster<L> {
         })
     }
 
-    /// What the clock of the line showed last, ns.
+    /// Newest time of the line's clock, ns.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
-    /// The master, to look at.
+    /// The master, read only.
     #[must_use]
     pub fn master(&self) -> &Master {
         &self.master
@@ -106,8 +106,7 @@ impl<L: Line> LineMaster<L> {
         &mut self.line
     }
 
-    /// A request of a client of the master, now. How it ends comes from
-    /// [`take_outcome`](Self::take_outcome).
+    /// Takes a request of a client of the master, now. [`take_outcome`](Self::take_outcome) gives its end.
     ///
     /// # Errors
     /// [`Reject`]: refused at the door.
@@ -135,7 +134,7 @@ impl<L: Line> LineMaster<L> {
             self.watch_line(recorder);
             if self.now_ns >= self.next_cycle_ns {
                 self.cycle(recorder);
-                // A cycle that was missed is not made up for.
+                // A missed cycle is not made up for.
                 let missed = (self.now_ns - self.next_cycle_ns) / self.cycle_ns;
                 self.next_cycle_ns += (missed + 1) * self.cycle_ns;
             }
@@ -153,7 +152,7 @@ impl<L: Line> LineMaster<L> {
         self.now_ns = self.line.wait(t_ns, &mut heard);
     }
 
-    /// A line that breaks is told, and leaves the axes disarmed when it is there again.
+    /// Reports a broken line, which leaves the axes disarmed when it is back.
     fn watch_line(&mut self, recorder: &mut Recorder) {
         let broken = self.line.broken();
         if broken.is_some() == self.was_broken {
@@ -166,7 +165,7 @@ impl<L: Line> LineMaster<L> {
         };
         recorder.event(self.now_ns, cause);
         if !self.was_broken {
-            // Only a full queue refuses it, of a master that is busy with a stop already.
+            // Only the full queue of a master that is already busy with a stop refuses it.
             let _ = self.master.submit(Command::Disarm, self.now_ns / NS_PER_US);
         }
     }

@@ -1,5 +1,4 @@
-//! Lines on the clock of the wall: the master's serial port, and the boards behind a
-//! pseudo-terminal.
+//! Lines in wall-clock time: the master's serial port, and the boards behind a pseudo-terminal.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -18,12 +17,12 @@ use crate::SimError;
 
 /// Time between two looks at a port: less than the turnaround of the bus takes.
 const LOOK: Duration = Duration::from_micros(200);
-/// Who comes later than this has been held up; the clock then leaves that time out.
+/// A wait longer than this means that the program was held up; the clock leaves that time out.
 const LATE: Duration = Duration::from_millis(100);
-/// Largest piece that is read at once: what a bus cycle carries.
+/// Largest piece that is read at once: the bytes of a bus cycle.
 const PIECE: usize = 1_024;
 
-/// A clock that goes with the wall's, but leaves out times in which its program was held up.
+/// A wall clock that leaves out times in which its program was held up.
 #[derive(Debug)]
 struct WallClock {
     base: Instant,
@@ -49,7 +48,7 @@ impl WallClock {
     }
 }
 
-/// A serial port as a line, on the wall's clock.
+/// A serial port as a line, in wall-clock time.
 #[derive(Debug)]
 pub struct PortLine {
     port: BusPort,
@@ -95,7 +94,7 @@ impl Line for PortLine {
 
 #[cfg(unix)]
 impl LineBoards {
-    /// Lets the boards live behind a pseudo-terminal, in the time of the wall, until `ended`.
+    /// Runs the boards behind a pseudo-terminal, in wall-clock time, until `ended`.
     ///
     /// # Errors
     /// [`SimError`] when the plant leaves the range of its model, or the terminal fails.

@@ -1,5 +1,5 @@
-//! What a master knows of boards that are not in this program: what it sent, and their replies.
-//! What no board tells stays without a value.
+//! What a master knows of boards outside this program: its own commands, and their replies. Fields that no
+//! board reports stay without a value.
 
 use wheeleg_master::telemetry::Record;
 use wheeleg_protocol::{Address, Node, SlotReply};
@@ -7,8 +7,8 @@ use wheeleg_telemetry::{BusSample, FootSample, JointSample, Recorder, WheelSampl
 
 use super::{Observer, behaviours, switch_bits};
 
-/// Fields that no board tells, by the schema of their channel. Numbers among them are recorded as
-/// not a number, integers as 0.
+/// Fields that no board reports, by the schema of their channel. Numbers among them are recorded as not a
+/// number, integers as 0.
 pub(crate) const UNMEASURED: [(&str, &[&str]); 3] = [
     (
         "wheeleg.Joint",
@@ -49,8 +49,8 @@ pub(crate) const UNMEASURED: [(&str, &[&str]); 3] = [
 ];
 
 impl Observer {
-    /// Samples a bus cycle from the master's own record of it. `counts_to_mm` is the way of a
-    /// wheel's rim for one count of its encoder.
+    /// Samples a bus cycle from the master's own record of it. `counts_to_mm` is the travel of a wheel's rim
+    /// for one count of its encoder.
     pub(crate) fn heard(&mut self, record: &Record, counts_to_mm: f64, recorder: &mut Recorder) {
         let t_ns = record.time_us * 1_000;
         self.last = Some(*record);

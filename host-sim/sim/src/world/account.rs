@@ -1,4 +1,4 @@
-//! The account of the energy, where one is kept.
+//! The account of the energy, if one is kept.
 
 use super::World;
 use crate::energy::{EnergyBalance, EnergyMeter};

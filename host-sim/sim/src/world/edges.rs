@@ -10,8 +10,7 @@ use crate::board::BoardInputs;
 use wheeleg_remote_host::RemoteBoards;
 
 impl World {
-    /// The edge of all joint boards outside, and the comparison of the outputs
-    /// that act from it on.
+    /// Runs the edge of all joint boards outside, and compares the outputs that act from it on.
     pub(super) fn joint_edge_remote(&mut self, sensed: &[BoardInputs; 6]) -> Result<(), SimError> {
         // The dump valve acts at once: its board is brought to this instant.
         let mut edges: Vec<(Node, Option<link::Inputs>)> = vec![(LEFT_WHEEL, None)];
@@ -41,8 +40,8 @@ impl World {
         }
     }
 
-    /// The edge of a wheel board outside, and the comparison of its outputs. Boards
-    /// whose edges fall on one instant work at the same time.
+    /// Runs the edge of a wheel board outside, and compares its outputs. Boards whose edges fall on one
+    /// instant work at the same time.
     pub(super) fn wheel_edge_remote(&mut self, wheel: usize) -> Result<(), SimError> {
         let now_ns = self.now_ns;
         let mut edges = Vec::new();
@@ -67,13 +66,12 @@ impl World {
         Ok(())
     }
 
-    /// Brings all boards outside to this instant, so that they answer what was
-    /// delivered just now.
+    /// Brings all boards outside to this instant, so that they can answer the bytes delivered just now.
     pub(super) fn deliver_remote(&mut self) -> Result<(), SimError> {
         self.run_remote(&Node::ALL.map(|node| (node, None)))
     }
 
-    /// Runs boards outside to this instant, with an edge those that have inputs.
+    /// Runs boards outside to this instant; those with inputs run an edge.
     pub(super) fn run_remote(
         &mut self,
         edges: &[(Node, Option<link::Inputs>)],
@@ -89,7 +87,7 @@ impl World {
         self.restart_tripped()
     }
 
-    /// A board outside that was reset: the application beside it restarts.
+    /// Restarts the application beside a board outside that was reset.
     fn restart_tripped(&mut self) -> Result<(), SimError> {
         for node in Node::ALL {
             let Some(trip) = self.remote.as_mut().and_then(|o| o.take_trip(node)) else {

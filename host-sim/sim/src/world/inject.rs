@@ -1,4 +1,4 @@
-//! Faults that stop boards or programs: what they do at the instant at which they begin.
+//! Faults that stop boards or programs: their effect at the instant at which they begin.
 
 use wheeleg_protocol::{Node, ResetCause};
 use wheeleg_remote_link as link;
@@ -11,7 +11,7 @@ use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
 use wheeleg_config::timing::{JOINT_TICK_NS, WATCHDOG_NS};
 
 impl World {
-    /// What a fault does to the power of a board or to a program.
+    /// Applies a fault to the power of a board or to a program.
     ///
     /// # Errors
     /// [`SimError`] if a board outside refuses it.
@@ -55,7 +55,7 @@ impl World {
             Down::Hung { .. } => Ok(remote.hook(node, link::Hook::StopProcessor)?),
             _ => {
                 remote.set_power(node, link::Power::BrownOut);
-                // At once: it may be back before the board is run otherwise.
+                // At once: it may be back before the board next runs.
                 self.run_remote(&[(node, None)])
             }
         }
@@ -74,7 +74,7 @@ impl World {
                 };
                 self.run_remote(&[(node, None)])
             }
-            // How long its start takes is known from the run that this one repeats.
+            // The run that this one repeats says how long its start takes.
             _ if self.replayed.is_replayed(node) => {
                 self.board_mut(node).down = Down::Off { until_ns: u64::MAX };
                 Ok(())

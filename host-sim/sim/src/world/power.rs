@@ -18,8 +18,8 @@ use wheeleg_config::timing::JOINT_TICK_NS;
 /// Memory, clock, converter and parameters as the shipped images set them up, measured on
 /// emulated boards (tests/system/pil.rs). A crystal that is slow to swing makes it longer.
 pub const BOARD_START_UP_NS: [u64; 2] = [3_189_250, 2_248_000];
-/// What a master adds to the first number of its requests at every start, so that
-/// no board takes them for repetitions; any odd number would do.
+/// Step of the master's first request number from start to start, so that no board takes its requests for
+/// repetitions; any odd number would do.
 const SEQUENCE_STEP: u16 = 0x2F35;
 
 impl World {
@@ -30,8 +30,8 @@ impl World {
             .is_some_and(|edge_ns| edge_ns <= self.now_ns)
     }
 
-    /// Whether a board drives its bridge: from its first tick edge on, and
-    /// on with what it was told last when its program has stopped.
+    /// Whether a board drives its bridge: from its first tick edge on; with its last outputs if its program
+    /// has stopped.
     pub(super) fn drives(&self, node: Node) -> bool {
         let started = self.started_ns(node);
         !self.board(node).down.is_off() && started.is_some_and(|ns| ns <= self.now_ns)
@@ -81,8 +81,7 @@ impl World {
         Micros(now.get().wrapping_sub(zero.get()))
     }
 
-    /// Does to boards here what had become of them outside, in the run that this one
-    /// repeats.
+    /// Gives boards here the resets that they had outside, in the run that this one repeats.
     ///
     /// # Errors
     /// [`SimError`] if the application refuses its parameters.
@@ -121,13 +120,13 @@ impl World {
         std::mem::take(&mut self.down_times)
     }
 
-    /// The application of a board from its reset by `cause` on.
+    /// Restarts the application of a board from its reset by `cause`.
     pub(super) fn start_anew(&mut self, node: Node, cause: ResetCause) -> Result<(), SimError> {
         let remote = self.remote.as_ref();
         let remote = remote.is_some_and(|o| o.has(node));
         let now_ns = self.now_ns;
         let board = self.board_mut(node);
-        // A board outside that has lost its power stays without until it is given back.
+        // A board outside that has lost its power stays without until power is given back.
         if !(remote && matches!(board.down, Down::Off { .. })) {
             board.down = Down::No;
         }
@@ -136,8 +135,8 @@ impl World {
         Ok(())
     }
 
-    /// A board that wants to stores its parameters, once it has nothing to send, and
-    /// stands still meanwhile.
+    /// Lets a board store its parameters if it wants to, once it has nothing to send; it stands still
+    /// meanwhile.
     pub(super) fn store(&mut self, node: Node) {
         if self.bus.is_driven_by(node.number()) {
             return;
@@ -150,8 +149,8 @@ impl World {
         }
     }
 
-    /// Boards whose time without power, or in a stopped program, is over; a
-    /// master that has been reset.
+    /// Restarts boards whose time without power, or in a stopped program, is over, and a master that has been
+    /// reset.
     pub(super) fn bring_up(&mut self) -> Result<(), SimError> {
         for node in Node::ALL {
             let down = self.board(node).down;
@@ -160,10 +159,10 @@ impl World {
                 // It begins with an edge of its own.
                 Down::Starting { .. } if !node.is_joint() => continue,
                 Down::Starting { until_ns, .. } => until_ns.saturating_sub(JOINT_TICK_NS),
-                // How long that takes is known from the run that this one repeats.
+                // The run that this one repeats says how long that takes.
                 Down::Off { .. } | Down::Hung { .. } if self.replayed.is_replayed(node) => continue,
                 Down::Off { until_ns } | Down::Hung { until_ns } => until_ns,
-                // The tick of the last edge before the end is worked off then.
+                // Then the tick of the last edge before the end runs.
                 Down::Storing { until_ns } => {
                     if until_ns < self.now_ns.saturating_add(JOINT_TICK_NS) {
                         self.board_mut(node).memory.end();
@@ -208,7 +207,7 @@ impl World {
         };
     }
 
-    /// A wheel board begins with the next sample, if it has started by then.
+    /// Starts a wheel board with the next sample, if its processor has started by then.
     pub(super) fn start_wheel(&mut self, wheel: usize) -> Result<(), SimError> {
         let node = Node::WHEELS[wheel];
         match self.board(node).down {
@@ -219,8 +218,8 @@ impl World {
         }
     }
 
-    /// Wheel boards whose first sample is the one that now comes: their counters have
-    /// counted since their start-up, between the two samples before this one.
+    /// Starts the counters of wheel boards whose first sample is the next one: they have counted since their
+    /// start-up, between the two samples before this one.
     pub(super) fn start_counters(&mut self) {
         for wheel in 0..2 {
             let node = Node::WHEELS[wheel];
@@ -237,7 +236,7 @@ impl World {
         }
     }
 
-    /// A master that remembers nothing. Whoever was connected to it reconnects.
+    /// A master that remembers nothing. Its clients reconnect.
     fn restart_master(&mut self) -> Result<(), SimError> {
         let first_sequence = self.config.first_sequence.wrapping_add(SEQUENCE_STEP);
         self.config = MasterConfig {

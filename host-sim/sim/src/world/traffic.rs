@@ -1,4 +1,4 @@
-//! What goes on the line and who hears it.
+//! Traffic on the line, and who hears it.
 
 use wheeleg_protocol::{Address, Node};
 use wheeleg_units::Micros;
@@ -11,14 +11,14 @@ use crate::clock::{NS_PER_US, micros};
 use crate::faults::Injector;
 use crate::rogue_nodes;
 
-/// How far a start lies ahead on the board's own clock, µs, when that shows `now`.
+/// Time to a start on the board's own clock, µs, when that shows `now`.
 fn ahead_us(now: Micros, start_at: Micros) -> u32 {
     let ahead = start_at.get().wrapping_sub(now.get());
-    // More than half the counter's range ahead means: already past.
+    // More than half the counter's range means: already past.
     if ahead < 1 << 31 { ahead } else { 0 }
 }
 
-/// Puts bytes on the line as the line lets them through.
+/// Puts bytes on the line, with the line's errors and delay.
 fn transmit(
     bus: &mut Bus,
     audit: &mut Audit,
@@ -44,7 +44,7 @@ impl World {
         self.elsewhere = Some(Elsewhere::default());
     }
 
-    /// Bytes of a master elsewhere are on the line from `t_ns` on, behind those before them.
+    /// Puts bytes of a master elsewhere on the line from `t_ns` on, behind those before them.
     pub(crate) fn heard_from_elsewhere(&mut self, t_ns: u64, bytes: &[u8]) {
         let Some(elsewhere) = &mut self.elsewhere else {
             return;
@@ -54,7 +54,7 @@ impl World {
         self.transmit(Address::MASTER.raw(), start_ns, bytes.to_vec());
     }
 
-    /// Takes what a master elsewhere hears.
+    /// Takes the bytes that a master elsewhere hears.
     pub(crate) fn take_said(&mut self) -> Vec<u8> {
         let elsewhere = self.elsewhere.as_mut();
         elsewhere.map_or_else(Vec::new, |e| std::mem::take(&mut e.said))
@@ -75,10 +75,10 @@ impl World {
         self.next_cycle_ns = due_ns.saturating_add_signed(self.faults.cycle_jitter_ns());
     }
 
-    /// Hands over what has reached its end on the line.
+    /// Delivers transmissions that have reached their end on the line.
     pub(super) fn deliver(&mut self) -> Result<(), SimError> {
-        // A node's frame is answered by no node: boards outside hear it in their
-        // next run, which saves most of the ways to them and back.
+        // No node answers a node's frame: boards outside hear it in their next run, which saves most of the
+        // round trips to them.
         let mut answerable = false;
         while let Some(delivery) = self.bus.take_due(self.now_ns) {
             answerable |= Node::new(delivery.from).is_none();
@@ -89,7 +89,7 @@ impl World {
                 let Some((bytes, end_ns)) = self.bus.heard_by(node.number(), &delivery) else {
                     continue;
                 };
-                // A board that starts hears the end of a frame.
+                // A board that starts up hears the end of a frame.
                 let heard = end_ns.saturating_sub(from_ns).div_ceil(self.bus.byte_ns());
                 let missed = bytes.len().saturating_sub(heard as usize);
                 let bytes = &bytes[missed..];
@@ -124,7 +124,7 @@ impl World {
         Ok(())
     }
 
-    /// Puts on the line what the boards want to send, at the times they chose.
+    /// Puts the boards' transmissions on the line, at the times they chose.
     pub(super) fn collect_transmissions(&mut self) {
         let now_ns = self.now_ns;
         let clocks: [Micros; 8] = Node::ALL.map(|node| self.clock(node, now_ns));
@@ -137,8 +137,8 @@ impl World {
             let ahead_us = ahead_us(clock(from), t.start_at);
             let start_ns = now_ns + faults.duration_ns(from, ahead_us);
             match remote {
-                // What goes on the line is what the board outside sends; what faults make
-                // of it on the way is none of the comparison's business.
+                // The frame of the board outside goes on the line; the comparison is of the frame before any
+                // fault acts on it.
                 Some(remote) if remote.has(from) => {
                     remote.expect_frame(from, start_ns, t.bytes.to_vec());
                     false
@@ -175,8 +175,8 @@ impl World {
         }
     }
 
-    /// Lets the master use the line for a request while nothing is on it or
-    /// scheduled, then a service tool, then whoever has a stream to send.
+    /// While nothing is on the line or scheduled, lets the master use it for a request, then a service tool,
+    /// then any node that has a stream to send.
     pub(super) fn offer_line(&mut self) {
         if self.bus.next_delivery_ns().is_some() {
             return;
@@ -200,7 +200,7 @@ impl World {
         }
     }
 
-    /// What boards whose driver is stuck on send in the tick that begins now.
+    /// Sends the bytes of boards whose driver is stuck on, in the tick that begins now.
     pub(super) fn babble(&mut self, tick_ns: u64) {
         let bytes = (tick_ns / self.bus.byte_ns()) as usize;
         for node in Node::ALL {

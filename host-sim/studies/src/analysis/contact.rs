@@ -1,4 +1,4 @@
-//! Lifts and touchdowns, from the foot switches as the node sees them.
+//! Lifts and touchdowns, from the foot switches as the node reads them.
 
 use super::Target;
 use wheeleg_telemetry::FootSample;
@@ -21,7 +21,7 @@ const SETTLED_NS: u64 = 50_000_000;
 #[derive(Debug, Default)]
 pub(super) struct ContactMeter {
     grounded: Option<bool>,
-    /// Since when, and with which switches, the foot is otherwise.
+    /// When the foot last changed, and with which switches.
     changed: Option<(u64, u8)>,
     found: Vec<Contact>,
 }
@@ -53,7 +53,7 @@ impl ContactMeter {
     }
 }
 
-/// The switch that closes first must be the one of the side that touches.
+/// The switch that closes first must be that of the touching side.
 pub(super) fn side_targets(contacts: &[Contact], bit: u8) -> Vec<Target> {
     let side = ["front", "back", "left", "right"][usize::from(bit.min(3))];
     let first = contacts.iter().find(|c| c.touchdown);

@@ -15,15 +15,14 @@ pub struct StartDelay {
     pub move_name: &'static str,
     /// Time at which the node latched the step of the command, s on the recording's clock.
     pub at_s: f64,
-    /// From the step of the command at the node to the first millimetre in the
-    /// new direction, s; `None` if it never moved.
+    /// From the step of the command at the node to the first millimetre in the new direction, s; `None` if it
+    /// never moved.
     pub delay_s: Option<f64>,
 }
 
-/// A move has started once the piston is this far from where it turned, mm.
+/// A move has started once the piston is this far from its turning point, mm.
 const STARTED_MM: f64 = 1.0;
-/// How long before its time in the gait a step of the command is looked for, s:
-/// two bus cycles.
+/// How long before its time in the gait the search for a step of the command begins, s: two bus cycles.
 const BEFORE_S: f64 = 0.02;
 /// A step of the command is a jump of more than this, mm.
 const STEP_MM: f64 = 5.0;
@@ -33,21 +32,21 @@ const STEP_MM: f64 = 5.0;
 struct Move {
     /// Place in the list of delays.
     place: usize,
-    /// Whether it is b5 that moves.
+    /// Whether it is a move of b5.
     is_b5: bool,
-    /// In which the command steps and the piston starts, s.
+    /// Window in which the command steps and the piston starts, s.
     window_s: (f64, f64),
     /// Direction, +1 extends.
     sign: f64,
     /// Command at the begin of the window, mm.
     before_mm: Option<f64>,
-    /// Smallest way in the direction since the step, mm: the move before may still be ending.
+    /// Smallest stroke in the direction since the step, mm: the move before may still be ending.
     turned_mm: f64,
 }
 
-/// Measures the delays of all square-wave moves while the samples come in. The clock starts
-/// when the node latches the commanded step, so bus and gait latency are not in it, and what
-/// the board's slew limit and controller make of the step is.
+/// Measures the delays of all square-wave moves while the samples come in. The clock starts when the node
+/// latches the commanded step: the delay excludes bus and gait latency, and includes the effect of the
+/// board's slew limit and controller.
 #[derive(Debug)]
 pub(super) struct DelayMeter {
     gait: GaitParams,
@@ -55,7 +54,7 @@ pub(super) struct DelayMeter {
     /// Steps whose moves have been set up.
     steps: u16,
     moves: Vec<Move>,
-    /// Three per step; `None` where the command does not jump.
+    /// Three per step; `None` if the command does not jump.
     delays: Vec<Option<StartDelay>>,
 }
 
@@ -141,9 +140,9 @@ impl Move {
 
 /// Samples per bin of the correlation; one bin is 4 ms.
 const BIN: usize = 4;
-/// Largest shift looked at, s.
+/// Largest shift tried, s.
 const MAX_SHIFT_S: f64 = 1.0;
-/// Most bins of a joint: ten minutes, which is as much as the shift is looked for in.
+/// Most bins of a joint: ten minutes, the part of the record that the shift is fitted to.
 const MAX_BINS: usize = 150_000;
 
 /// Means over a bin.
@@ -185,13 +184,13 @@ impl Bins {
     }
 }
 
-/// How the strokes of b5 and b6 lie beside those of the reference model.
+/// Strokes of b5 and b6 compared with those of the reference model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Shift of the velocities of b5 and b6 (together) at the maximum of the normalised
     /// cross-correlation, s; positive when the robot is late.
     pub shift_s: f64,
-    /// What is left of the strokes of b5 and b6 beside the model shifted by that, RMS, mm.
+    /// Residual of the strokes of b5 and b6 against the model shifted by that, RMS, mm.
     pub residual_mm: [f64; 2],
 }
 
@@ -299,7 +298,7 @@ mod tests {
         let model = ReferenceModel::new(robot.reference, robot.gait);
         for delay_s in [0.0, 0.0637, 0.25] {
             let mut recording = testing::from_reference(&robot, delay_s, 0.0);
-            // b6 stands 3 mm beside the model, which no shift takes away.
+            // b6 is 3 mm off the model, which no shift removes.
             for row in &mut recording.joints[2] {
                 row.v.position_mm += 3.0;
             }
@@ -362,8 +361,8 @@ mod tests {
         let delays = meter.into_delays();
         assert_eq!(delays.len(), 9);
         for d in &delays {
-            // 1 mm from rest at S/tau^2 (4.5 to 5.9 m/s2) takes 19 to 22 ms; b6
-            // first ends its way up when it turns to come down.
+            // 1 mm from rest at S/tau^2 (4.5 to 5.9 m/s2) takes 19 to 22 ms; b6 first ends its way up before
+            // it turns to come down.
             let unloading = match d.move_name {
                 "b6 retracts" => robot.reference.unload_s,
                 _ => 0.0,

@@ -1,4 +1,4 @@
-//! Indices of a leg's design: text-book figures of its geometry, its bores and its supply alone.
+//! Indices of a leg's design: text-book figures of only its geometry, its bores and its supply.
 //!
 //! | index | unit | source |
 //! |---|---|---|
@@ -8,8 +8,8 @@
 //! | workspace: volume that the foot reaches within the strokes | m³ | ∫ \|det J\| dq |
 //! | foot force: smallest half-axis of the force ellipsoid | N | Yoshikawa 1985; Chiacchio et al. 1997, forces scaled by what each cylinder can |
 //!
-//! J takes the speeds of the three cylinders to that of the foot. All are m/s, so its singular
-//! values σ are pure numbers, and no unit weighs one direction against another.
+//! J maps the speeds of the three cylinders to that of the foot. All are m/s, so its singular values σ are
+//! pure numbers, and no unit weights one direction against another.
 
 use nalgebra::{Matrix3, Vector3};
 use wheeleg_kinematics::LegGeometry;
@@ -33,7 +33,7 @@ pub struct LegIndices {
 }
 
 impl LegIndices {
-    /// Those of the left leg of a robot; `None` if it closes nowhere or has no workspace.
+    /// The indices of the left leg of a robot; `None` if it closes nowhere or has no workspace.
     #[must_use]
     pub fn of(robot: &PlantParams) -> Option<Self> {
         let geometry = LegGeometry::new(robot.leg_parameters(0)).ok()?;
@@ -67,8 +67,8 @@ impl LegIndices {
     }
 }
 
-/// What each cylinder of the left leg can both push and pull with at the pressure of the supply
-/// \[N\]: that on the side of its rod. Friction is left out.
+/// Force that each cylinder of the left leg can both push and pull with at supply pressure \[N\]: that on its
+/// rod side. Friction is left out.
 fn cylinder_forces_n(robot: &PlantParams) -> [f64; 3] {
     let gauge_pa = robot.supply.set_pressure_pa - robot.gas.ambient_pressure_pa;
     [0, 1, 2].map(|k| {
@@ -95,8 +95,8 @@ fn manipulability(jacobian: &Matrix3<f64>) -> f64 {
     jacobian.determinant().abs()
 }
 
-/// Smallest half-axis of the ellipsoid of foot forces \[N\] that cylinders hold whose forces, each
-/// over what it can, have a norm of 1 at most.
+/// Smallest half-axis of the ellipsoid of foot forces \[N\] that the cylinders can hold: their forces, each
+/// divided by its largest one, have a norm of 1 at most.
 ///
 /// With J = U Σ Vᵀ and equal forces F the half-axes are F/σ: f = J⁻ᵀ diag(F) u, so they are the
 /// inverse singular values of J diag(1/F).
@@ -128,9 +128,8 @@ mod tests {
         geometry.posture(&lengths).expect("closes").foot_jacobian()
     }
 
-    /// At home the crank stands at a right angle on its cylinder, so the foot goes sideways
-    /// b5/0.29 as fast as the yaw cylinder, and as fast as the other two. By hand, b5 = 0.145 m:
-    /// σ = 1, 1, 0.5.
+    /// At home the crank is at a right angle to its cylinder, so the foot moves sideways b5/0.29 as fast as
+    /// the yaw cylinder, and otherwise as fast as the other two. By hand, b5 = 0.145 m: σ = 1, 1, 0.5.
     #[test]
     fn the_home_pose_is_as_worked_out_by_hand() {
         let home = jacobian(0.40, 0.145);
@@ -155,7 +154,7 @@ mod tests {
         near(manipulability(&isotropic), 1.0, 1e-12);
         let singular = jacobian(0.40, 1e-4);
         near(condition_number(&singular), 2900.0, 1e-6);
-        // Farther out than the crank is long the weakest direction is sideways.
+        // If the foot is farther out than the crank is long, the weakest direction is sideways.
         near(least_force_n(&jacobian(0.40, 0.58), [100.0; 3]), 50.0, 1e-9);
     }
 

@@ -38,7 +38,7 @@ use wheeleg_telemetry::{
     SupplySample, Taken, WheelSample,
 };
 
-/// What the analysis found.
+/// Results of the analysis.
 #[derive(Debug, Clone)]
 pub struct Analysis {
     /// Targets with values and verdicts.
@@ -51,8 +51,7 @@ pub struct Analysis {
     pub leg: Option<LegChoice>,
     /// Delay from commanded step to motion, per move.
     pub start_delays: Vec<StartDelay>,
-    /// Strokes beside those of the reference model; only where no event of the scenario disturbs
-    /// the motion.
+    /// Strokes against those of the reference model; only if no event of the scenario disturbs the motion.
     pub fit: Option<Fit>,
     /// Lifts and touchdowns of the stepping foot.
     pub contacts: Vec<Contact>,
@@ -103,10 +102,10 @@ pub struct Analyser<'a> {
     robot: &'a RobotConfig,
     /// The moving leg.
     moving: Option<LegChoice>,
-    /// When the motion began, s; the start of the record as long as it has not.
+    /// Start of the motion, s; the start of the record until it has begun.
     start_s: Option<f64>,
-    /// Last samples of the joints, for what counts from the start of the motion: the master
-    /// tells of it after it was.
+    /// Last samples of the joints, for values that count from the start of the motion: the master reports it
+    /// afterwards.
     recent: VecDeque<(usize, Row<JointSample>)>,
     meter: Meter,
     travel: Option<TravelMeter>,
@@ -115,7 +114,7 @@ pub struct Analyser<'a> {
     contacts: Option<ContactMeter>,
 }
 
-/// How far the samples reach back that the analyser keeps, s, beside three bus cycles.
+/// How far back the analyser keeps samples, s, in addition to three bus cycles.
 const RECENT_S: f64 = 0.05;
 
 impl<'a> Analyser<'a> {
@@ -144,20 +143,20 @@ impl<'a> Analyser<'a> {
         analyser
     }
 
-    /// Begins anew what counts from the start of the motion.
+    /// Resets all counts that start with the motion.
     fn count_from(&mut self, start_s: f64) {
         if let Meter::ThreeStep(_) = self.meter {
             self.meter = Meter::new(self.scenario, self.robot, start_s);
         }
         if self.contacts.is_some() {
             self.delays = Some(DelayMeter::new(self.robot.gait, start_s));
-            // The model knows nothing of what a scenario does to the robot.
+            // The model does not know the scenario's events.
             let undisturbed = self.scenario.events.is_empty();
             self.shift = undisturbed.then(|| ShiftMeter::new(start_s));
         }
     }
 
-    /// The motion began when the master was in a step for the first time.
+    /// The motion began when the master first was in a step.
     fn master(&mut self, t_s: f64, master: &MasterSample) {
         if let Some(travel) = &mut self.travel {
             travel.master(t_s, master);
@@ -202,7 +201,7 @@ impl<'a> Analyser<'a> {
         self.recent.push_back((joint, row));
     }
 
-    /// What counts from the start of the motion.
+    /// Counts a sample that belongs to the motion.
     fn count_joint(&mut self, joint: usize, row: &Row<JointSample>) {
         let first = first_joint(self.moving);
         let (is_b5, is_b6) = (joint == first + 1, joint == first + 2);
@@ -264,7 +263,7 @@ impl<'a> Analyser<'a> {
         }
     }
 
-    /// What was found.
+    /// The results.
     #[must_use]
     pub fn finish(self) -> Analysis {
         let reference = self
@@ -355,7 +354,7 @@ pub fn analyse(scenario: &Scenario, robot: &RobotConfig, recording: &Recording) 
     for r in &recording.events {
         analyser.event(r.t_s(), &r.v);
     }
-    // The way of the robot sees its feet as they are at the time.
+    // The robot's travel uses the feet's values of the same time.
     let mut feet = recording.feet.each_ref().map(|rows| rows.iter().peekable());
     for body in &recording.body {
         for (foot, rows) in feet.iter_mut().enumerate() {

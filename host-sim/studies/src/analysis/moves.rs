@@ -3,13 +3,13 @@
 use super::{Extremes, Target};
 use wheeleg_telemetry::{JointSample, Row};
 
-/// As near to its command as this a joint has arrived, mm (PAPER §8.2: some millimetres are enough).
+/// A joint has arrived this near to its command, mm (PAPER §8.2: some millimetres are enough).
 const ARRIVED_MM: f64 = 5.0;
 /// A command that jumps by more than this is a move, mm.
 const MOVE_MM: f64 = 10.0;
-/// The last of the way to where a foot stands, mm, …
+/// In the last part of the way to a foot's standing stroke, mm, …
 const LOWERING_MM: usize = 10;
-/// … in which a foot that meets the ground is to be no faster than this, mm/s.
+/// … a foot that meets the ground should be no faster than this, mm/s.
 const LOWERING_MM_S: f64 = 100.0;
 
 /// One joint, while its samples come in.
@@ -26,7 +26,7 @@ struct JointMoves {
     squares_mm2: f64,
     worst_mm: f64,
     samples: u32,
-    /// Largest speed outward in each millimetre of the stroke that was reached, mm/s.
+    /// Largest outward speed in each millimetre of the stroke reached so far, mm/s.
     outward_mm_s: Vec<f64>,
     edges: Extremes,
     position_mm: Extremes,
@@ -69,7 +69,7 @@ impl JointMoves {
 }
 
 impl JointMoves {
-    /// Largest speed in the last of the way out, mm/s.
+    /// Largest speed in the last part of the way out, mm/s.
     fn lowering_mm_s(&self) -> f64 {
         let last = self.outward_mm_s.iter().rev().take(LOWERING_MM);
         last.copied().fold(0.0, f64::max)
@@ -85,10 +85,10 @@ impl MoveMeter {
         self.0[joint].add(row);
     }
 
-    /// Targets for information: no law was asked for them yet.
+    /// Targets for information: no law has had to meet them yet.
     pub(super) fn targets(&self, steps: u16) -> Vec<Target> {
         let mut targets = Vec::new();
-        // Of the stepping leg: b5 and b6 are the joints that are sent far.
+        // In the stepping leg, b5 and b6 are the joints with long moves.
         for (name, offset) in [("b5", 1), ("b6", 2)] {
             let legs = [&self.0[offset], &self.0[offset + 3]];
             let Some(joint) = legs.into_iter().find(|joint| joint.moves > 0) else {

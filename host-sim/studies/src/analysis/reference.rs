@@ -1,5 +1,5 @@
-//! The reference model of the paper's figures: square-wave references answered
-//! by critically damped cylinders (MODEL.md §6.2).
+//! The reference model of the paper's figures: the responses of critically damped cylinders to square-wave
+//! references (MODEL.md §6.2).
 
 use wheeleg_config::{GaitParams, ReferenceParams};
 
@@ -11,7 +11,7 @@ struct Motion {
     a: f64,
 }
 
-/// Critically damped answer of `from` to the target `xt`, `t` s after the switch.
+/// Critically damped response from `from` to the target `xt`, `t` s after the switch.
 fn critically_damped(from: Motion, xt: f64, tau: f64, t: f64) -> Motion {
     let a0 = from.x - xt;
     let b = from.v + a0 / tau;
@@ -184,7 +184,7 @@ impl ReferenceModel {
         if u < g.push_s {
             return (reach(u), b6, start.travel_m);
         }
-        // The chassis covers the stroke that was reached; b5 gives way.
+        // The chassis travels the stroke that b5 has reached; b5 gives way.
         let reached = reach(g.push_s).x;
         let push = trapezoid(
             reached,
@@ -293,7 +293,7 @@ mod tests {
         let a = model.at(2.1);
         let b = model.at(3.2);
         assert!(((a.s5_m + a.travel_m) - (b.s5_m + b.travel_m)).abs() < 1e-12);
-        // Three strokes of travel, less the little that a step does not reach.
+        // Three strokes of travel, less the little that is missing in each step.
         let travel = model.at(10.0).travel_m;
         assert!((0.535..0.54).contains(&travel), "{travel}");
     }

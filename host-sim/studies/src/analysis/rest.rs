@@ -3,7 +3,7 @@
 use super::{Extremes, Target, within};
 use wheeleg_telemetry::{JointSample, Row};
 
-/// What the joints did while their references stood still.
+/// The joints while their references stand still.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct RestResult {
     /// Commanded valve edges at rest, all joints.
@@ -22,8 +22,8 @@ const STILL_MM: f64 = 0.01;
 /// One joint, while its samples come in.
 #[derive(Debug, Clone, Default)]
 struct JointRest {
-    /// Reference and command that were last taken for new ones, mm, and when that was, s. A
-    /// reference generator begins a move by less than stands still; the command tells of it.
+    /// Reference and command last taken as new, mm, and their time, s. A reference generator begins a move
+    /// with increments that count as still; the command reveals it.
     target: Option<([f64; 2], f64)>,
     /// Time, s, valve edges and distance from the reference, mm, of the last sample.
     last: Option<(f64, u32, f64)>,
@@ -92,7 +92,7 @@ impl RestResult {
 #[derive(Debug, Default)]
 pub(super) struct StandMeter {
     rest: RestMeter,
-    /// Per joint: when it has settled, s, and where it was since.
+    /// For each joint, the time when it settled, s, and its range since then.
     settled: [Option<(f64, Extremes)>; 6],
 }
 

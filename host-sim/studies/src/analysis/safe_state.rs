@@ -19,7 +19,7 @@ const SAFE_MODES: [u8; 3] = [4, 5, 6];
 struct Reaction {
     /// Time of the last sample in the window, s.
     end_s: Option<f64>,
-    /// Time of the last one in which it had not come yet, s.
+    /// Time of the last sample before it came, s.
     last_s: Option<f64>,
 }
 
@@ -31,8 +31,8 @@ impl Reaction {
         }
     }
 
-    /// Time from the event to the last pending sample, with what the sample itself lasts;
-    /// `None` without samples.
+    /// Time from the event to the last pending sample, including that sample's own length; `None` without
+    /// samples.
     fn after(&self, at_s: f64, sample_s: f64) -> Option<f64> {
         self.end_s?;
         Some(self.last_s.map_or(0.0, |t_s| t_s + sample_s - at_s))

@@ -4,7 +4,7 @@ use super::{Extremes, Target};
 use wheeleg_config::RobotConfig;
 use wheeleg_telemetry::JointSample;
 
-/// What a joint did.
+/// Motion of a joint.
 #[derive(Debug, Default)]
 struct Track {
     stroke_mm: Extremes,
@@ -85,7 +85,7 @@ fn targets(robot: &RobotConfig, b5_track: &Track, b6_track: &Track) -> Vec<Targe
             Some(200.0),
         ),
     ];
-    // With the axis of the paper's plot of the speed, mm/s.
+    // With the speed axis of the paper's plot, mm/s.
     for (name, track, axis) in [("b5", b5_track, 10.0), ("b6", b6_track, 40.0)] {
         let rms = (track.squares / track.samples.max(1) as f64).sqrt();
         let peak = track.peak_mm;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use wheeleg_telemetry::messages::within;
 
-/// What is to be said of a target.
+/// Judgement of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judgement {
@@ -22,7 +22,7 @@ pub enum Judgement {
 }
 
 impl Judgement {
-    /// As the terminal shows it.
+    /// As shown in the terminal.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -56,7 +56,7 @@ pub struct Target {
     pub required: bool,
 }
 
-/// A band as every page and the terminal show it.
+/// A band as shown on every page and in the terminal.
 pub(crate) fn band_text(min: Option<f64>, max: Option<f64>) -> String {
     match (min, max) {
         (Some(a), Some(b)) if a == b => format!("= {a}"),
@@ -100,7 +100,7 @@ impl Target {
         }
     }
 
-    /// The unit as it stands behind a value: none behind a count or a share.
+    /// The unit for use after a value: empty for a count or a share.
     #[must_use]
     pub fn unit_text(&self) -> &'static str {
         if self.unit == "1" { "" } else { self.unit }
@@ -115,7 +115,7 @@ impl Target {
             .to_owned()
     }
 
-    /// What was asked, with the unit.
+    /// The requirement, with the unit.
     #[must_use]
     pub fn asked_text(&self) -> String {
         let band = self.band_text();
@@ -123,7 +123,7 @@ impl Target {
         format!("{band} {}", self.unit_text()).trim_end().to_owned()
     }
 
-    /// What is measured, as it stands in a sentence: without what its brackets explain.
+    /// The measured quantity, as used in a sentence: without the explanation in brackets.
     #[must_use]
     pub fn name_text(&self) -> String {
         let name = self.description.split(" (").next().unwrap_or_default();
@@ -149,7 +149,7 @@ impl Target {
         format!("{v:.decimals$}")
     }
 
-    /// What is to be said of it.
+    /// Its judgement.
     #[must_use]
     pub fn judgement(&self) -> Judgement {
         match (self.pass, self.required) {

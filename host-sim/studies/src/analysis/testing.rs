@@ -5,8 +5,8 @@ use super::ReferenceModel;
 use wheeleg_config::RobotConfig;
 use wheeleg_telemetry::{FootSample, JointSample, MasterSample, Recorder, Recording, WheelSample};
 
-/// Ten seconds of gait, as a left leg that follows the reference model exactly
-/// but `delay_s` late, starting at `start_s`.
+/// Ten seconds of gait of a left leg that follows the reference model exactly, but `delay_s` late, starting
+/// at `start_s`.
 pub(crate) fn from_reference(robot: &RobotConfig, delay_s: f64, start_s: f64) -> Recording {
     let model = ReferenceModel::new(robot.reference, robot.gait);
     let mut recorder = Recorder::in_memory();

@@ -11,8 +11,8 @@ use wheeleg_telemetry::{JointSample, Row};
 
 /// The end stops are elastic: a stroke may pass the axis limit by this, mm.
 const STOP_MM: f64 = 0.5;
-/// What counts as the full stroke of 180 mm. The reference model itself covers
-/// 173.5 mm of b6, for want of time.
+/// Travel that counts as the full stroke of 180 mm. The reference model itself covers 173.5 mm of b6, for
+/// lack of time.
 const FULL_STROKE_MM: f64 = 170.0;
 
 /// One joint of the stepping leg, from the start of the motion on.
@@ -55,8 +55,8 @@ impl Track {
     }
 }
 
-/// Smallest and largest acceleration that second differences of the sensed position find when
-/// it is sampled every so often, whatever the instant of the first sample.
+/// Smallest and largest acceleration from second differences of the sensed position, sampled with a fixed
+/// period, for any instant of the first sample.
 ///
 /// Figs. 14 and 15 were not measured: the paper's "input data from the source file of the joint
 /// positions were used to determine the velocities and accelerations" (section 9).
@@ -97,14 +97,14 @@ impl SampledAcceleration {
     }
 }
 
-/// The stroke that is covered in each step.
+/// The stroke covered in each step.
 #[derive(Debug, Default)]
 struct StepStrokes {
     /// Steps that are over.
     over: u16,
-    /// In the step of now.
+    /// Range in the current step.
     now: Extremes,
-    /// Smallest of those that are over, mm; `None` if one of them has no sample.
+    /// Smallest of the finished steps, mm; `None` if one of them has no sample.
     smallest: Option<f64>,
 }
 
@@ -290,8 +290,8 @@ impl ThreeStepMeter {
         }
     }
 
-    /// The axes of the paper's figures are held against accelerations from sampled positions.
-    /// What moves faster than the samples stands beside them for information.
+    /// The axes of the paper's figures are compared with accelerations from sampled positions. Motions faster
+    /// than the samples are given in addition, for information.
     fn accelerations(&self, targets: &mut Vec<Target>) {
         for (id, name, track, min, max) in [
             ("A22", "a5", &self.b5, -5.0, 10.0),
@@ -446,8 +446,7 @@ mod tests {
     use crate::analysis::{analyse, testing};
     use wheeleg_config::builtin;
 
-    /// The reference model itself meets the paper's axes; so the analysis,
-    /// fed with it, must say so, with the known values.
+    /// The reference model itself meets the paper's axes; so must the analysis of it, with the known values.
     #[test]
     fn reference_model_passes_its_own_targets_with_known_values() {
         let robot = builtin::robot("wheeleg-2003").expect("built in");
@@ -467,7 +466,7 @@ mod tests {
         assert!((value("A27-raw") - 25.78).abs() < 0.01);
         assert!((value("A25") - 3.0).abs() < 1e-12);
         assert!((value("A22-max-raw") - 5.88).abs() < 0.1);
-        // The low-pass takes the corner off a step of acceleration, samples take more.
+        // The low-pass rounds the corner of a step of acceleration; sampling rounds it more.
         assert!(value("A22-max-20hz") < value("A22-max-raw"));
         assert!(value("A22-max-20hz") > 4.0);
         assert!(value("A22-max") < value("A22-max-20hz"));

@@ -1,4 +1,4 @@
-//! The whole robot's way over the ground, against the bars of the scenario.
+//! The whole robot's travel over the ground, against the bars of the scenario.
 
 use wheeleg_config::{Bar, Measure, RobotConfig};
 use wheeleg_master::behaviour::Act;
@@ -32,7 +32,7 @@ impl Ends {
     }
 }
 
-/// Angles that go on beyond half a turn.
+/// Angles unwrapped beyond half a turn.
 #[derive(Debug, Clone, Copy, Default)]
 struct Unwrapped {
     last_deg: Option<f64>,
@@ -48,7 +48,7 @@ impl Unwrapped {
     }
 }
 
-/// Everything that a bar can be about, while samples come in.
+/// Every measure for a bar, while samples come in.
 #[derive(Debug, Default)]
 pub(super) struct TravelMeter {
     last_s: Option<f64>,
@@ -133,7 +133,7 @@ impl TravelMeter {
         }
     }
 
-    /// A measure, SI; `None` where the run was too short or the measure has no meaning.
+    /// A measure, SI; `None` if the run was too short or the measure has no meaning.
     fn value(&self, measure: Measure, robot: &RobotConfig) -> Option<f64> {
         let steps = || self.later_steps.change().filter(|steps| *steps > 0.0);
         let leg = || LegIndices::of(&robot.plant);
@@ -182,7 +182,7 @@ impl TravelMeter {
     pub(super) fn targets(&self, robot: &RobotConfig, bars: &[Bar]) -> Vec<Target> {
         let target = |bar: &Bar| {
             let (measure, scale) = (bar.measure, bar.measure.per_si());
-            // Bands are written in other units than SI: their ends back, without its rounding.
+            // Bands are written in other units than SI: convert their ends back, without rounding errors.
             let shown = |si: f64| (si * scale * 1e9).round() / 1e9;
             let target = Target::new(
                 measure.name(),
@@ -303,7 +303,7 @@ mod tests {
         };
         let robot = robot();
         assert!(!meter.targets(&robot, &[bar])[0].pass);
-        // Not before 5 s is what it does.
+        // "Not before 5 s" is met.
         let later = Bar {
             min: Some(5.0),
             max: None,
@@ -339,7 +339,7 @@ mod tests {
         let target = &meter.targets(&robot(), &[bar])[0];
         assert_eq!((target.min, target.max), (Some(114.0), Some(126.0)));
         assert!(!target.pass && target.required);
-        // No turn: no radius, and what cannot be measured is not met.
+        // No turn: no radius, and a measure without a value is not met.
         let radius = Bar {
             measure: Measure::Radius,
             ..bar

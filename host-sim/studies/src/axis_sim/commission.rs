@@ -1,8 +1,7 @@
-//! From a design to the parameters of a joint board.
+//! Converts a design to the parameters of a joint board.
 //!
-//! The board's parameter table is the only way gains get into a board, so it is
-//! the only way they get onto the bench of the comparison, and into the file
-//! that `wheeleg tune` writes.
+//! Gains get into a board only through its parameter table, so this is also how they get onto the bench of
+//! the comparison, and into the file that `wheeleg tune` writes.
 
 use wheeleg_control::joint::{Correction, Law};
 use wheeleg_protocol::param::{Format, JointParam, ParamInfo};
@@ -11,8 +10,8 @@ use wheeleg_units::PositionMm;
 use super::error::AxisSimError;
 use super::firmware::Design;
 
-/// Every parameter that a design sets, raw, in ascending order of number. What
-/// the axis says nothing about (watchdog, staged exhaust) keeps its default.
+/// Every parameter that a design sets, raw, in ascending order of number. Parameters that do not depend on
+/// the axis (watchdog, staged exhaust) keep their default.
 ///
 /// # Errors
 /// [`AxisSimError::Parameter`] names a value outside the board's table.
@@ -43,7 +42,7 @@ pub fn value(row: &ParamInfo, raw: i32) -> f64 {
     f64::from(raw) / f64::from(row.format.fraction_bits()).exp2()
 }
 
-/// A value of the control crate, whose formats are those of the table.
+/// A value of the control crate, which uses the table's formats.
 fn raw(design: &Design, parameter: JointParam) -> Option<i32> {
     use JointParam as P;
     let (g, a, s) = (&design.gains, &design.gains.axis, &design.sensor);
@@ -124,7 +123,7 @@ pub fn toml_lines(list: &[(JointParam, i32)], source: &str) -> String {
         let row = parameter.info();
         let number = match row.format {
             Format::Integer | Format::Flag => raw.to_string(),
-            // Enough digits to come back as the same raw number.
+            // Enough digits to give the same raw number back.
             _ => {
                 let digits = (f64::from(row.format.fraction_bits()) * 0.302).ceil() as usize + 1;
                 let text = format!("{:.digits$}", value(row, *raw));

@@ -1,23 +1,20 @@
-//! Finding the valves' opening delay at start-up, with the potentiometer alone.
+//! Finds the valves' opening delay at start-up, using only the potentiometer.
 //!
-//! A pulse shorter than t_on lets nothing through, however often it is sent; one
-//! that is longer lets through t_off's worth at least, and a few of those move
-//! the piston. So pulses of growing length are sent to one fill valve until
-//! the piston moves: first in coarse steps, which brings the chamber to the edge of
-//! slipping, then in fine ones from a little below. The pulse that moves it then
-//! exceeds t_on by a step or two. If neither chamber moves the piston, there is
-//! no result.
+//! A pulse shorter than t_on lets nothing through, however often it is sent; a longer one lets at least
+//! t_off's worth through, and a few of those move the piston. So pulses of growing length are sent to one
+//! fill valve until the piston moves: first in coarse steps, which brings the chamber to the edge of
+//! slipping, then in fine ones from a little below. The pulse that moves it then exceeds t_on by a step or
+//! two. If neither chamber moves the piston, there is no result.
 //!
-//! Motion counts that follows a pulse at once and in its direction: under a load
-//! that has moved the piston until a shut chamber carries it, leakage lets it creep on
-//! by itself. Where that brings it to its end stop, the side is given up, its chamber
-//! vented, and the search begins anew from the other one.
+//! Motion counts only if it follows a pulse at once and in its direction: under a load that has moved the
+//! piston until a shut chamber carries it, leakage lets it creep on by itself. If that brings it to its end
+//! stop, the side is given up, its chamber vented, and the search starts again from the other one.
 //!
-//! A chamber that is full to begin with gives way to no pulse. A search without a result is repeated once, from a
-//! known state: each side then begins with both chambers open to the atmosphere for two seconds.
+//! If a chamber is full at the start, no pulse moves the piston. A search without a result is repeated once,
+//! from a known state: each side then begins with both chambers open to the atmosphere for two seconds.
 //!
-//! t_off does not show this way. Both delays of a valve come from one coil and
-//! one spring: it is taken to differ from its data sheet by the same factor.
+//! This does not show t_off. Both delays of a valve come from one coil and one spring: t_off is assumed to
+//! differ from its data sheet by the same factor.
 
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_units::{Micros, PositionMm};
@@ -27,26 +24,25 @@ const PERIOD: u16 = 30;
 /// Standing still before pulses begin, ticks: a loaded, vented piston first runs
 /// to its end stop.
 const PAUSE: u16 = 200;
-/// For so long both chambers are open to the atmosphere before a side of the second search, ticks (2 s).
+/// Time for which both chambers are vented before a side of the second search, ticks (2 s).
 const EMPTIES: u16 = 2000;
 /// Coarse and fine steps, µs.
 const COARSE: u16 = 200;
 const FINE: u16 = 50;
 /// Fine steps begin this far below the coarse result, µs.
 const BACK: u16 = 3000;
-/// Longest pulse, µs: slower valves than 20 ms are not for this use.
+/// Longest pulse, µs: valves slower than 20 ms are not for this use.
 const LONGEST: u16 = 20_000;
-/// A side that takes pulses so much longer than the last one that moved it, µs, has
-/// come to its end stop.
+/// A side that takes pulses longer by this than the last one that moved it, µs, has come to its end stop.
 const BEYOND: u16 = 1000;
 /// Shortest pulse, µs.
 const SHORTEST: u16 = 200;
 /// Motion that counts, raw mm (0.2 mm: four steps of a 12-bit converter).
 const MOVED: i32 = 13_107;
-/// Fine results that are taken; the smallest counts.
+/// Number of fine results; the smallest counts.
 const ROUNDS: u8 = 3;
 
-/// Where the search stands.
+/// State of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Phase {
     Pause,
@@ -65,7 +61,7 @@ pub struct DelayProbe {
     pulse: u16,
     /// Pulse at which this side is given up.
     longest: u16,
-    /// Ticks for which both chambers still are to be open to the atmosphere; `None` in the first search.
+    /// Remaining ticks with both chambers open to the atmosphere; `None` in the first search.
     empties: Option<u16>,
     /// Ticks since the pulse began, or of the pause.
     at: u16,
@@ -84,7 +80,7 @@ impl Default for DelayProbe {
 }
 
 impl DelayProbe {
-    /// At the beginning. The joint is at rest; its other chamber should be vented.
+    /// The start. The joint is at rest; its other chamber should be vented.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -112,7 +108,7 @@ impl DelayProbe {
     #[must_use]
     pub fn t_on(&self) -> Option<Micros> {
         let found = if self.is_done() { self.found } else { None };
-        // The piston moves with the second pulse that opens, on the average.
+        // On average, the piston moves with the second pulse that opens.
         found.map(|pulse| Micros(u32::from(pulse.saturating_sub(FINE))))
     }
 
@@ -139,7 +135,7 @@ impl DelayProbe {
                     self.base = Some(position);
                     self.phase = Phase::Pulses;
                 }
-                // What the pulses to A have left there would hold the piston.
+                // Air left in A by the pulses would hold the piston.
                 [0, if self.rod_side { 1000 } else { 0 }, 0, 0]
             }
             Phase::Pulses => {
@@ -202,7 +198,7 @@ impl DelayProbe {
             return;
         }
         if !self.rod_side {
-            // Against an end stop, or the load: the other way.
+            // Against an end stop, or the load: try the other way.
             self.empties = self.empties.map(|_| EMPTIES);
             self.begin(true);
         } else if self.found.is_none() && self.empties.is_none() {
@@ -252,7 +248,7 @@ mod tests {
         search.t_on()
     }
 
-    /// Chambers that are full let no pulse move the piston until both have been open to the atmosphere for a second.
+    /// Full chambers let no pulse move the piston until both have been vented for a second.
     #[test]
     fn chambers_that_are_full_at_first_are_emptied() {
         let t_on = 3_500;

@@ -1,9 +1,8 @@
 //! Gains from the data of an axis.
 //!
-//! Nothing here is tuned to a plant: every gain of every law follows from bore,
-//! stroke, volumes, valve, mass and delays by the same rules. The rules for the
-//! usual laws are stated beside each; the predictive law's own are in
-//! [`wheeleg_control::axis::AxisModel::new`].
+//! Nothing here is tuned to a plant: the same rules give every gain of every law from bore, stroke, volumes,
+//! valve, mass and delays. The rules for the usual laws are stated beside each; the predictive law's own are
+//! in [`wheeleg_control::axis::AxisModel::new`].
 
 use wheeleg_config::SENSOR_TRACK;
 use wheeleg_config::derived::{derived, limits};
@@ -64,22 +63,22 @@ impl Kind {
         }
     }
 
-    /// The controller of a name.
+    /// The controller with this name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 }
 
-/// What the designer knows of an axis: its data sheet. Load, and what differs
-/// from the data sheet, it does not know.
+/// The designer's knowledge of an axis: its data sheet. The designer does not know the load, nor deviations
+/// from the data sheet.
 #[derive(Debug, Clone, Copy)]
 struct Facts {
     /// Stroke \[mm\].
     stroke_mm: f64,
     /// Speed of the piston at a choked outlet, slower side \[mm/s\].
     speed_mm_s: f64,
-    /// Tick, t_on and line \[s\].
+    /// Tick, t_on and delay of the line \[s\].
     dead_time_s: f64,
     /// Shortest opening over PWM period \[-\].
     shortest_duty: f64,
@@ -104,8 +103,8 @@ pub fn design(axis: &AxisParams, kind: Kind) -> Design {
     }
 }
 
-/// No move takes three times as long as the whole stroke at full speed, or stays a tenth of the
-/// stroke behind (a board allows a piston that stands less).
+/// No move takes three times as long as the whole stroke at full speed, or stays a tenth of the stroke behind
+/// (a board allows less for a standing piston).
 fn supervision(facts: &Facts) -> Supervision {
     let limit_s = 0.5 + 3.0 * facts.stroke_mm / facts.speed_mm_s;
     Supervision {
@@ -124,7 +123,7 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
     let micros = |us: f64| Micros(us.round() as u32);
     let gain = |parameter: JointParam| Gain::saturating_from_num(of(parameter));
     let c = &axis.cylinder;
-    // No less than an eighth of what the smallest pulse does, too: below it, rest is luck.
+    // Also no less than an eighth of the smallest pulse's effect: below it, rest is luck.
     let band_mm = of(JointParam::RestBand).max(0.13e3 * free_step_m(axis));
     AxisData {
         bore: fixed(JointParam::Bore),
@@ -150,13 +149,13 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
     }
 }
 
-/// A value of the designer's choice, as near as a board can have it.
+/// A value of the designer's choice, as close as a board allows.
 fn within(parameter: JointParam, value: f64) -> f64 {
     let [low, high] = limits(parameter);
     value.clamp(low, high)
 }
 
-/// How far a free piston is moved by the shortest opening of one valve, at mid stroke \[m\].
+/// Distance by which the shortest opening of one valve moves a free piston, at mid stroke \[m\].
 fn free_step_m(axis: &AxisParams) -> f64 {
     let c = &axis.cylinder;
     let quarter_pi = std::f64::consts::FRAC_PI_4;
@@ -177,8 +176,8 @@ fn facts(axis: &AxisParams, data: &AxisData) -> Facts {
     let area_m2 = std::f64::consts::FRAC_PI_4 * c.bore_m * c.bore_m;
     let flow = data.conductance.to_num::<f64>() * 1e-8;
     let us = |value: Micros| f64::from(value.get()) * 1e-6;
-    // As fast as lets half of the period be used, 100 Hz at most; slower than 50 Hz only
-    // where a pulse or a gap that acts would not fit half a period of 20 ms.
+    // As fast as possible with half of the period usable, 100 Hz at most; slower than 50 Hz only if an
+    // effective pulse or gap would not fit half a period of 20 ms.
     let (on_s, off_s, margin_s) = (us(data.valve_on), us(data.valve_off), us(data.margin));
     let delays_s = on_s + off_s + 2.0 * margin_s;
     let least_s = 2.0 * (on_s.max(off_s) + margin_s);
@@ -200,9 +199,8 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     let duty = |value: f64| Duty::from_per_mille((value * 1000.0).round() as i16);
     // A PWM loop acts half a period and the dead time late.
     let lag_s = facts.dead_time_s + 0.5 * facts.period_s;
-    // Full duty at an error of six lags at full speed: the factors here and below
-    // were searched once, on the bench axis, for no limit cycle, then error and
-    // settling time; they have no unit.
+    // Full duty at an error of six lags at full speed: the factors here and below were searched once, on the
+    // bench axis, for no limit cycle, then for error and settling time; they have no unit.
     let full_mm = 6.0 * lag_s * facts.speed_mm_s;
     let proportional = 1.0 / full_mm;
     let (settle_mm, release_mm) = (0.5, 1.5);
@@ -231,8 +229,8 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     match kind {
         Kind::OnOff => JointGains {
             law: Law::OnOff,
-            // A full push cannot be shorter than the dead time: a dead band of four
-            // dead times at full speed, or it chatters all the more.
+            // A full push cannot be shorter than the dead time: a dead band of four dead times at full speed,
+            // or it chatters even more.
             settle_band: mm(P::SettleBand, 4.0 * facts.speed_mm_s * facts.dead_time_s),
             release_band: mm(P::ReleaseBand, 6.0 * facts.speed_mm_s * facts.dead_time_s),
             ..base
@@ -274,7 +272,7 @@ fn gains(data: &AxisData, facts: &Facts, kind: Kind) -> JointGains {
     }
 }
 
-/// Beyond its stops a piston is measured to this share of its stroke, and this much more \[m\].
+/// A piston is measured beyond its stops up to this share of its stroke, and this much more \[m\].
 const BEYOND_STOP: (f64, f64) = (0.02, 0.005);
 
 /// Calibration of the axis's position sensor, as commissioning would find it.
@@ -300,8 +298,8 @@ mod tests {
     use crate::axis_sim::{Delays, Node, design_with};
     use wheeleg_config::AxisConfig;
 
-    /// Valves of a few milliseconds and of forty: every controller's design is one that a
-    /// board accepts, as on the sheet and with the delays twice as long as told there.
+    /// Valves of a few milliseconds and of forty: a board accepts every controller's design, with the delays
+    /// of the sheet and with twice those delays.
     #[test]
     fn a_board_accepts_designs_for_fast_and_slow_valves() {
         let mut sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
@@ -339,7 +337,7 @@ mod tests {
         }
     }
 
-    /// Valves that fit a period of 10 to 20 ms have one.
+    /// Valves that fit a period of 10 to 20 ms get one.
     #[test]
     fn the_period_is_longer_than_20_ms_only_where_it_must_be() {
         let sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
@@ -356,8 +354,8 @@ mod tests {
         assert!((40.0..=46.0).contains(&slow), "{slow}");
     }
 
-    /// What an axis file may say, at and between the ends of its ranges, is what a board can hold:
-    /// no design is refused by the board.
+    /// A board can hold every design for values of an axis file at and between the ends of their ranges: it
+    /// refuses none.
     #[test]
     fn a_board_accepts_the_designs_for_every_axis_that_a_file_may_have() {
         use rand::{RngExt as _, SeedableRng as _};

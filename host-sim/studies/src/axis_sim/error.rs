@@ -1,10 +1,10 @@
-//! Why an experiment on one cylinder could not be made.
+//! Errors of experiments on one cylinder.
 
 use wheeleg_config::brief;
 use wheeleg_control::joint::ConfigError;
 use wheeleg_plant::PlantError;
 
-/// An experiment could not be made.
+/// An experiment was not possible.
 #[derive(Debug, Clone, thiserror::Error, miette::Diagnostic)]
 pub enum AxisSimError {
     /// The plant left the range of its model.
@@ -13,7 +13,7 @@ pub enum AxisSimError {
     Unphysical {
         /// When and how, and the last values that were sound.
         what: String,
-        /// What most likely did it.
+        /// The likely cause.
         help: String,
     },
     /// The plant refused its parameters.
@@ -48,7 +48,7 @@ pub enum AxisSimError {
     Parameter {
         /// Name in the table.
         name: &'static str,
-        /// What the design needs.
+        /// Value that the design needs.
         value: f64,
         /// Smallest value of the table.
         min: f64,

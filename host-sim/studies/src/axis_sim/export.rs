@@ -1,4 +1,4 @@
-//! Valve sequences and what the plant makes of them, for another integrator.
+//! Valve sequences and the plant's response to them, for another integrator.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -15,9 +15,9 @@ const TICKS: usize = 600;
 /// Laws of the closed-loop sequences.
 const LAWS: [Kind; 4] = [Kind::Predictive, Kind::FuzzyPd, Kind::PwmPid, Kind::OnOff];
 
-/// The axis as it is, and with every choice of the model that it leaves out. Per plant: parameters,
-/// and per sequence the on-times of every tick (µs, fill A, vent A, fill B, vent B), stroke \[m\] and
-/// pressures \[Pa\] at every tick's start.
+/// The axis as in its file, and with every option of the model that the file leaves out. Per plant:
+/// parameters, and per sequence the on-times of every tick (µs, fill A, vent A, fill B, vent B), stroke \[m\]
+/// and pressures \[Pa\] at every tick's start.
 ///
 /// # Errors
 /// [`AxisSimError`].
@@ -37,7 +37,7 @@ fn with_every_choice(params: &AxisParams) -> AxisParams {
         heat_transfer_w_m2_k: 60.0,
     };
     p.cylinder.friction.pressure_area_m2 = 1e-5;
-    // An eighth of what the supply can push.
+    // An eighth of the force that the supply can push with.
     let area_m2 = std::f64::consts::FRAC_PI_4 * p.cylinder.bore_m.powi(2);
     p.load_n -= 0.125 * area_m2 * (p.supply.set_pressure_pa - p.gas.ambient_pressure_pa);
     p.cylinder.timing_spread = [1.3, 0.8, 1.0, 1.2];

@@ -22,7 +22,7 @@ pub struct Design {
     pub correction: Correction,
     /// Calibration of the position sensor.
     pub sensor: SensorConfig,
-    /// What the whole board adds to the control path; see [`super::Node`].
+    /// Limits of the whole board around the control path; see [`super::Node`].
     pub supervision: Supervision,
 }
 
@@ -31,7 +31,7 @@ pub struct Design {
 pub struct Supervision {
     /// Largest rate of the reference.
     pub slew_rate: VelocityMmS,
-    /// Error that is a fault when it lasts …
+    /// Error that becomes a fault if it lasts …
     pub following_error: PositionMm,
     /// … for this long.
     pub following_time: Micros,
@@ -75,7 +75,7 @@ impl Firmware {
 }
 
 impl Firmware {
-    /// The stroke that a sample's reading stands for.
+    /// The stroke of a sample's reading.
     #[must_use]
     pub fn position(&self, sample: &Sample) -> PositionMm {
         self.sensor.position(sample.code)

@@ -13,7 +13,7 @@ use super::{Kind, Motion, design};
 /// Longest search \[s\].
 const LIMIT_S: f64 = 40.0;
 
-/// A board that looks for its valves' delays.
+/// A board that searches for its valves' delays.
 #[derive(Debug, Clone)]
 pub struct Probe {
     /// The search.
@@ -39,12 +39,12 @@ impl Board for Probe {
 pub struct Delays {
     /// Opening delay \[s\].
     pub t_on_s: f64,
-    /// Shutting delay \[s\]: the data sheet's, by the factor of the opening delay.
+    /// Shutting delay \[s\]: the data sheet's, scaled by the factor of the opening delay.
     pub t_off_s: f64,
 }
 
-/// Looks for the delays of the axis `real` with a board that knows `sheet`.
-/// `None` if the piston cannot be moved.
+/// Searches for the delays of the axis `real` with a board that knows `sheet`. `None` if the piston cannot be
+/// moved.
 ///
 /// # Errors
 /// [`AxisSimError`].

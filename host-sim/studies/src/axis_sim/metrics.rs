@@ -45,7 +45,7 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Works the figures out.
+    /// Computes the figures.
     #[must_use]
     pub fn of(trace: &Trace) -> Self {
         let rows = &trace.rows;
@@ -128,7 +128,7 @@ impl Metrics {
 fn reversals(rows: &[super::run::Row]) -> u32 {
     const HYSTERESIS_M: f64 = 0.2e-3;
     let Some(first) = rows.first() else { return 0 };
-    // The extreme since the last turn, and the direction in which it was reached.
+    // The extreme since the last turn, and the direction towards it.
     let (mut extreme, mut direction, mut turns) = (first.stroke_m, 0.0, 0);
     for row in rows {
         let travel = row.stroke_m - extreme;

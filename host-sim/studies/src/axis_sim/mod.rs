@@ -1,11 +1,10 @@
 //! One axis on the bench: any joint law against the single-cylinder plant.
 //!
-//! The controller is the firmware's own code ([`Firmware`]: converter
-//! code → stroke → [`wheeleg_control::joint::JointController`] → valve PWM →
-//! on-times of a tick); its gains follow from the axis's data ([`design`]). The
-//! plant is [`wheeleg_plant::axis::Axis`]. Outputs act one tick after the inputs
-//! they came from, as on the board. A run is a pure function of axis, design,
-//! seed, motion and loads; a second of it takes about 2 ms.
+//! The controller is the firmware's own code ([`Firmware`]: converter code → stroke →
+//! [`wheeleg_control::joint::JointController`] → valve PWM → on-times of a tick); its gains follow from the
+//! axis's data ([`design`]). The plant is [`wheeleg_plant::axis::Axis`]. Outputs act one tick after the
+//! inputs from which they were computed, as on the board. A run is a pure function of axis, design, seed,
+//! motion and loads; a second of it takes about 2 ms.
 //!
 //! ```
 //! use wheeleg_studies::axis_sim::{AxisSim, Firmware, Kind, Metrics, Motion, design};
@@ -20,12 +19,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! * [`AxisSim::run`] keeps chamber pressures, noise and what the board has learnt
-//!   from one motion to the next; so a learning move is simply a motion before.
-//! * [`Metrics::of`] works out the figures; [`suite`] has the experiments of the
-//!   comparison; [`valve_resolution`] says whether valves are fine enough for a cylinder;
-//!   [`optimal`] the bound that perfect knowledge gives; [`identify`]
-//!   finds the valves' delays at start-up, as a board would.
+//! * [`AxisSim::run`] keeps chamber pressures, noise and the board's learnt values from one motion to the
+//!   next; so a learning move is simply an earlier motion.
+//! * [`Metrics::of`] computes the figures; [`suite`] has the experiments of the comparison;
+//!   [`valve_resolution`] says whether valves are fine enough for a cylinder; [`optimal`] gives the bound for
+//!   perfect knowledge; [`identify`] finds the valves' delays at start-up, as a board would.
 
 pub mod commission;
 mod delay_probe;

@@ -1,4 +1,4 @@
-//! What a bench axis is asked to do: references and loads over time.
+//! Inputs of a bench axis: references and loads over time.
 
 /// A reference over time; positions in m, times in s from the start of the run.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +39,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// No motion: a reference that stays.
+    /// No motion: a constant reference.
     #[must_use]
     pub const fn hold(at_m: f64) -> Self {
         Self::Step {

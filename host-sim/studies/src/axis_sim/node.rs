@@ -1,10 +1,9 @@
 //! The joint board's whole application on the bench: bus, modes, supervision.
 //!
-//! [`super::Firmware`] is the control path alone. [`Node`] is what a board runs:
-//! SYNC frames every 10 ms, the slew limit, the sensor's checks, the
-//! following-error and link supervision and the seal of its state, all by
-//! [`wheeleg_node::joint::JointNode`]. It is powered up, tested and armed before
-//! the recording begins, on the reading of its first sample.
+//! [`super::Firmware`] is only the control path. [`Node`] is everything that runs on a board: SYNC frames
+//! every 10 ms, the slew limit, the sensor's checks, the following-error and link supervision and the seal of
+//! its state, all by [`wheeleg_node::joint::JointNode`]. It is powered up, tested and armed before the
+//! recording begins, on the reading of its first sample.
 
 use std::num::NonZeroU8;
 
@@ -27,16 +26,16 @@ use wheeleg_sim::{JointBoard, identity};
 
 /// Ticks of a bus cycle.
 const CYCLE_TICKS: u32 = CYCLE_US / TICK.get();
-/// A SYNC ends this long before the tick that uses it, µs (ASSUMED: any time
-/// within the tick before gives the same).
+/// A SYNC ends this long before the tick that uses it, µs (ASSUMED: any time within the tick before it gives
+/// the same result).
 const AHEAD_US: u32 = 100;
-/// The joint whose straps the board has: one without foot switches.
+/// The joint whose address straps the board has: one without foot switches.
 const JOINT: u8 = 2;
 /// Bus cycles from power-up to arming: the self-test takes ten readings.
 const START_CYCLES: u32 = 3;
 
-/// A joint board's application, fed by the bench as by a master. A clone goes on on its own from
-/// the same state.
+/// A joint board's application, with SYNC frames from the bench as from a master. A clone continues on its
+/// own from the same state.
 #[allow(missing_debug_implementations)] // The application has none.
 #[derive(Clone)]
 pub struct Node {
@@ -47,9 +46,9 @@ pub struct Node {
     cycle: u16,
     sequence: u16,
     running: bool,
-    /// The E-stop bit of the SYNC frames to come.
+    /// The E-stop bit of future SYNC frames.
     pub emergency_stop: bool,
-    /// What the slots of the SYNC frames to come allow after a stop.
+    /// Action after a stop that the slots of future SYNC frames allow.
     pub on_link_loss: LinkLossAction,
 }
 
@@ -63,13 +62,13 @@ impl Node {
         Self::with(design, &[])
     }
 
-    /// As [`Node::new`], with parameters (raw) that the design says nothing about.
+    /// As [`Node::new`], with further parameters (raw) that the design does not set.
     ///
     /// # Errors
     /// As [`Node::new`].
     pub fn with(design: &Design, others: &[(JointParam, i32)]) -> Result<Self, AxisSimError> {
         let address = Address::joint(JOINT).unwrap_or(Address::MASTER);
-        // First what its parameter table does not hold: that has a name and limits.
+        // First the values that its parameter table does not hold: such an error has a name and limits.
         let commissioned = commission(design)?;
         JointConfig::new(&design.gains, TICK).map_err(AxisSimError::Design)?;
         let stored: Vec<(u16, i32)> = commissioned
@@ -91,7 +90,7 @@ impl Node {
         })
     }
 
-    /// A request of the master between two ticks. Nobody looks at the answer.
+    /// Sends a request of the master between two ticks. The answer is ignored.
     pub fn request(&mut self, message: &Message) {
         self.send(self.address, message);
     }
@@ -114,12 +113,12 @@ impl Node {
         };
         self.sequence = self.sequence.wrapping_add(1);
         let mut buffer = [0; MAX_ENCODED];
-        // Every message fits the largest frame, and the master is no broadcast.
+        // Every message fits the largest frame, and the master is not a broadcast address.
         if let Ok(bytes) = message.emit(envelope, &mut buffer) {
             let t_end = Micros(self.now().get().wrapping_sub(AHEAD_US));
             self.board.on_bus_bytes(bytes, t_end);
         }
-        // Nobody listens to the replies.
+        // The replies are ignored.
         while self.board.take_transmission().is_some() {}
     }
 
@@ -144,7 +143,7 @@ impl Node {
 
     /// Self-test, link, arming. The valves stay shut, and nothing moves.
     fn start(&mut self, code: u16) {
-        // The first SYNC ends before the first tick, at a time that is not negative.
+        // The first SYNC ends before the first tick, and its time must not be negative.
         self.tick = CYCLE_TICKS;
         for _ in 0..START_CYCLES {
             self.sync(None);

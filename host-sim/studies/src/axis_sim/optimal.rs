@@ -1,12 +1,9 @@
-//! The bound that perfect knowledge gives: bang-bang with the plant itself as
-//! its model.
+//! The bound for perfect knowledge: bang-bang control with the plant itself as its model.
 //!
-//! Each chamber is filled and vented by a list of switching times; the list is
-//! searched on the plant, without noise, from the very state in which a
-//! controller begins its move. The time counts until the piston stays within
-//! 1 mm of the target. It is an upper bound of the true optimum (the search is a
-//! pattern search from many starts), and a lower one than any controller
-//! without that knowledge can be expected to reach.
+//! Each chamber is filled and vented by a list of switching times; the list is searched on the plant, without
+//! noise, from the very state in which a controller begins its move. The time counts until the piston stays
+//! within 1 mm of the target. It is an upper bound of the true optimum (the search is a pattern search from
+//! many starts), and lower than what any controller without that knowledge can be expected to reach.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -48,7 +45,7 @@ pub fn fastest(
     fastest_while(axis, state, target_m, seed, runs, &|| true)
 }
 
-/// As [`fastest`]; a search that is not to go on ends with the best so far, which is no bound.
+/// As [`fastest`]; a search that is stopped returns the best so far, which is not a bound.
 ///
 /// # Errors
 /// Any [`PlantError`].
@@ -118,8 +115,7 @@ pub fn fastest_while(
     })
 }
 
-/// Settling time, with a slope where the move does not settle: the worst error of
-/// the end counts.
+/// Settling time, with a slope if the move does not settle: the worst error at the end counts.
 fn cost(axis: &Axis, state: &AxisState, target_m: f64, s: &Schedule) -> Result<f64, PlantError> {
     let (settle_s, end_m) = settle(axis, state, target_m, s)?;
     Ok(if settle_s < HORIZON_S - 0.1 {
@@ -156,7 +152,7 @@ fn settle(
     for k in 0..ticks {
         let t0 = k as f64 * 1e-3;
         let on = coils.map(|spans| {
-            // The coil is on for the opening and the difference of its delays.
+            // The coil is on for the opening time plus the difference of its delays.
             let on = spans.iter().find_map(|(from, to)| {
                 let to = if to > from { to + lag_s } else { *from };
                 (*from < t0 + 1e-3 && to > t0).then(|| {

@@ -1,9 +1,8 @@
-//! What can be said of a plant without a recording of the real one: balances, agreement with a
-//! model from the text book, order of convergence, error of the step, continuity of the flow.
+//! Checks of a plant that need no recording of the real one: balances, agreement with a model from the text
+//! book, order of convergence, error of the step, continuity of the flow.
 //!
-//! A value beyond its limit has one of two causes. Either the plant is wrong, or the step of the
-//! file is too long to tell: then a shorter step brings the value into its limit. The two are
-//! told apart by trying.
+//! A value beyond its limit has one of two causes: either the plant is wrong, or the step of the file is too
+//! long. In the second case a shorter step brings the value into its limit, so shorter steps are tried.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -18,7 +17,7 @@ use super::error::AxisSimError;
 use super::textbook::{Commands, Textbook};
 use super::unphysical;
 
-/// What is checked.
+/// Checked quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
@@ -42,7 +41,7 @@ pub enum Quantity {
     FlowJump,
 }
 
-/// What is known of a quantity.
+/// Verdict on a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "verdict")]
 pub enum Verdict {
@@ -55,19 +54,19 @@ pub enum Verdict {
         /// A step with which it holds, s.
         try_s: f64,
     },
-    /// Errors are not of the form "constant × step to a power" at these steps, for instance
-    /// because they are near rounding or the piston stops at once: there is nothing to judge.
+    /// Errors are not of the form "constant × step to a power" at these steps, for instance because they are
+    /// near rounding or the piston stops at once: no verdict is possible.
     NotAsymptotic,
 }
 
-/// One quantity with its limits and what is known of it.
+/// One quantity with its limits and verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Finding {
-    /// What.
+    /// The quantity.
     pub quantity: Quantity,
     /// Its value.
     pub value: f64,
-    /// Least allowed value.
+    /// Smallest allowed value.
     pub min: f64,
     /// Largest allowed value.
     pub max: f64,
@@ -81,7 +80,7 @@ pub struct Finding {
 pub struct PlantCheck {
     /// Every quantity.
     pub findings: Vec<Finding>,
-    /// Nothing is wrong. A quantity that cannot be judged is not wrong.
+    /// Whether nothing is wrong. A quantity without a verdict is not wrong.
     pub passed: bool,
 }
 
@@ -96,25 +95,25 @@ pub const JUMP_LIMIT: f64 = 1e-6;
 /// Largest error of the stroke from the step, m.
 pub const STEP_LIMIT_M: f64 = 2e-6;
 
-/// Orders from neighbouring pairs of steps differ by less where there is one.
+/// Where there is an order, those from neighbouring pairs of steps differ by less than this.
 const ORDER_SPREAD: f64 = 0.15;
-/// The shortest step that is tried, ns: the errors are those from a run at 1.25 us.
+/// The shortest step tried, ns: the errors are relative to a run at 1.25 us.
 const SHORTEST_NS: u64 = 2_000;
-/// Share of the stroke before a stop where the piston is taken to have arrived.
+/// Share of the stroke before a stop within which the piston counts as arrived.
 const MARGIN: f64 = 0.02;
-/// Ticks of 1 ms that an order is judged by, two of which the valves take to open.
+/// Fewest ticks of 1 ms for judging an order; the valves take two of them to open.
 const LEAST_TICKS: usize = 6;
 /// Errors below this share of the value are rounding.
 const ROUNDING: f64 = 1e-11;
-/// Valves are open this long in the manoeuvre that is compared, ms.
+/// Valves are open this long in the compared manoeuvre, ms.
 const OPEN_MS: u64 = 20;
-/// They are shut this long at its end, when leaks and heat are seen, ms.
+/// They are shut this long at its end, to show leaks and heat, ms.
 const SHUT_MS: u64 = 150;
 /// Heat transfer of the thermal manoeuvre \[W/(m² K)\].
 const HEAT_TRANSFER_W_M2_K: f64 = 60.0;
 
-/// How a plant is built from parameters, and what happens to its state after each tick. Of the
-/// real plant nothing happens; tests plant errors here.
+/// Builds a plant from parameters, and acts on its state after each tick. For the real plant it does nothing;
+/// tests insert errors here.
 pub struct Made<'a> {
     /// Builds the plant.
     pub build: &'a dyn Fn(&AxisParams) -> Result<Axis, PlantError>,
@@ -123,7 +122,7 @@ pub struct Made<'a> {
 }
 
 impl Made<'_> {
-    /// The plant as it is.
+    /// The unchanged plant.
     #[must_use]
     pub fn as_it_is() -> Self {
         Self {
@@ -147,7 +146,7 @@ pub fn check(params: &AxisParams) -> Result<PlantCheck, AxisSimError> {
     check_made(params, &Made::as_it_is())
 }
 
-/// The same of a plant that is made in another way.
+/// The same for a plant that is built in another way.
 ///
 /// # Errors
 /// [`AxisSimError`].
@@ -206,8 +205,8 @@ fn balances(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 2], AxisSi
     ])
 }
 
-/// An axis of which the text book has the whole model: no leak, no dry friction, no cushions, a
-/// supply that does not give way, and so much mass that the piston stays away from its stops.
+/// An axis that the text book models completely: no leak, no dry friction, no cushions, a supply that does
+/// not give way, and enough mass to keep the piston away from its stops.
 fn plain(params: &AxisParams) -> AxisParams {
     let mut axis = params.clone();
     let cylinder = &mut axis.cylinder;
@@ -215,7 +214,7 @@ fn plain(params: &AxisParams) -> AxisParams {
     cylinder.friction.static_n = 0.0;
     cylinder.friction.coulomb_n = 0.0;
     cylinder.friction.pressure_area_m2 = 0.0;
-    // Those of a short stroke reach its middle.
+    // The cushions of a short stroke reach its middle.
     cylinder.end_stop.cushion_damping_n_s_m = 0.0;
     let ambient_pa = axis.gas.ambient_pressure_pa;
     cylinder.initial_pressure_a_pa = 1.5 * ambient_pa;
@@ -230,13 +229,13 @@ fn plain(params: &AxisParams) -> AxisParams {
     let piston_m2 = 0.25 * std::f64::consts::PI * cylinder.bore_m * cylinder.bore_m;
     let force_n = piston_m2 * axis.supply.set_pressure_pa;
     let lasts_s = (2 * OPEN_MS + SHUT_MS) as f64 * 1e-3 + 4.0 * slowest_s(params);
-    // A quarter of the stroke under full force all the time, were it not for the limit of mass.
+    // A quarter of the stroke under full force all the time, unless the limit of the mass prevents it.
     let mass_kg = 2.0 * force_n * lasts_s * lasts_s / cylinder.stroke_m;
     axis.moving_mass_kg = mass_kg.clamp(params.moving_mass_kg, 1000.0);
     axis
 }
 
-/// The longest delay from a command to what the chamber sees, s.
+/// The longest delay from a command to its effect in the chamber, s.
 fn slowest_s(params: &AxisParams) -> f64 {
     let c = &params.cylinder;
     let valves = [c.fill_valve, c.vent_valve];
@@ -257,7 +256,7 @@ struct Manoeuvre {
 impl Manoeuvre {
     fn new(params: &AxisParams) -> Self {
         let settle_ms = (2.0 * slowest_s(params) * 1e3).ceil() as u64;
-        // Poppets open for OPEN_MS whatever they take to move.
+        // Poppets are open for OPEN_MS whatever their delays.
         let on_ms = OPEN_MS + settle_ms;
         let second_ms = on_ms + settle_ms;
         let end_ms = second_ms + on_ms + settle_ms + SHUT_MS;
@@ -323,7 +322,7 @@ fn difference(params: &AxisParams, made: &Made<'_>) -> Result<[f64; 2], AxisSimE
     let axis = (made.build)(params)?;
     let mut state = axis.initial_state(1);
     let (mut worst, mut span) = ([0.0_f64; 3], [[f64::INFINITY, f64::NEG_INFINITY]; 3]);
-    // The text book has no stops. Where the largest mass is too little, it ends at one.
+    // The text book has no stops. If the largest mass is too small, the record ends at a stop.
     let stroke_m = 0.0..params.cylinder.stroke_m;
     let free = expected
         .iter()
@@ -346,11 +345,11 @@ fn difference(params: &AxisParams, made: &Made<'_>) -> Result<[f64; 2], AxisSimE
     Ok([shares[0].max(shares[1]), shares[2]])
 }
 
-/// Order of convergence on a smooth stretch of sliding, valves open throughout, and the error of
-/// the file's step there.
+/// Order of convergence on a smooth stretch of sliding, with valves open throughout, and the error of the
+/// file's step there.
 fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], AxisSimError> {
     let mut smooth = params.clone();
-    // No cushion that begins, and no bristle that breaks.
+    // No start of a cushion, and no breaking bristle.
     smooth.initial_stroke_m = 0.25 * params.cylinder.stroke_m;
     smooth.cylinder.end_stop.cushion_damping_n_s_m = 0.0;
     smooth.cylinder.friction.static_n = 0.0;
@@ -405,7 +404,7 @@ fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], Axi
         let most = orders.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let spread = most - orders.into_iter().fold(f64::INFINITY, f64::min);
         let is_rounding = errors[3][i] < ROUNDING * last[i].abs();
-        // Errors that fall faster than the method lets them cancel each other here.
+        // Errors that fall faster than the method allows cancel each other here.
         let cancel = orders[1] > ORDER_RANGE[1];
         let is_asymptotic = is_long && spread < ORDER_SPREAD && !is_rounding && !cancel;
         if finding.verdict == Verdict::Wrong && !is_asymptotic {
@@ -430,7 +429,7 @@ fn convergence(params: &AxisParams, made: &Made<'_>) -> Result<[Finding; 3], Axi
     ])
 }
 
-/// A step whose error is within its limit, tried: not everywhere does it fall with the square.
+/// Finds by trial a step whose error is within its limit: errors do not always fall with the square.
 fn shorter_step(
     mut step_ns: u64,
     mut error_m: f64,
@@ -438,7 +437,7 @@ fn shorter_step(
 ) -> Result<Verdict, AxisSimError> {
     while step_ns > SHORTEST_NS {
         let share = (0.8 * STEP_LIMIT_M / error_m).sqrt().min(0.9);
-        // In whole microseconds, as people write it.
+        // In whole microseconds, as usual in files.
         step_ns = ((step_ns as f64 * share * 1e-3) as u64 * 1000).max(SHORTEST_NS);
         error_m = worst(step_ns)?;
         if error_m <= STEP_LIMIT_M {

@@ -3,7 +3,7 @@
 use wheeleg_control::axis::AxisField;
 use wheeleg_control::joint::{ConfigError, JointParameter};
 
-/// What is wrong, and of which parameter.
+/// The error, with its parameter.
 pub(super) fn message(error: &ConfigError) -> String {
     match error {
         ConfigError::OutOfRange(which) => format!("{} is out of its range", name(which)),

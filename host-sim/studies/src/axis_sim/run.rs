@@ -9,12 +9,12 @@ use super::error::AxisSimError;
 use super::motion::{LoadEvent, Motion};
 use super::unphysical;
 
-/// References that a board on the bench may be given \[m\].
+/// Allowed references of a board on the bench \[m\].
 pub const REFERENCES_M: [f64; 2] = [-2.0, 2.0];
-/// Speeds of references that it may be given \[m/s\].
+/// Allowed speeds of its references \[m/s\].
 pub const SPEEDS_M_S: [f64; 2] = [-10.0, 10.0];
 
-/// What a board latches at the start of a tick.
+/// Inputs that a board latches at the start of a tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample {
     /// Reading of the position converter.
@@ -23,18 +23,18 @@ pub struct Sample {
     pub reference: PositionMm,
     /// Speed of the reference.
     pub reference_velocity: VelocityMmS,
-    /// The reference to come and the ticks until then, if announced.
+    /// The next reference and the ticks until then, if announced.
     pub announced: Option<(PositionMm, u32)>,
 }
 
-/// What a board gives at the end of a tick.
+/// Outputs of a board at the end of a tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Action {
     /// On-times of the four valves in the next tick, µs.
     pub on_us: OnTimes,
     /// Valves held shut because the joint is at rest at its target.
     pub settled: bool,
-    /// Position as the board understands its reading \[mm\].
+    /// Position as the board converts its reading \[mm\].
     pub measured_mm: f64,
     /// Latched faults; a board without supervision has none.
     pub faults: FaultBits,
@@ -48,8 +48,8 @@ pub trait Board {
     fn tick(&mut self, sample: &Sample) -> Action;
 }
 
-/// One tick of a recording. Everything is as it stands at the tick's start, but
-/// for the on-times, which are those in force during it.
+/// One tick of a recording. All values are from the tick's start, except for the on-times, which are those in
+/// force during it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Row {
     /// Reference \[m\].
@@ -70,14 +70,14 @@ pub struct Row {
     pub switches: u64,
     /// Air taken from the supply since the start \[kg\].
     pub air_kg: f64,
-    /// The board says that it is at rest at its target.
+    /// The board reports that it is at rest at its target.
     pub settled: bool,
 }
 
 /// A recording, one row a millisecond.
 #[derive(Debug, Clone)]
 pub struct Trace {
-    /// Motion that was asked for.
+    /// Requested motion.
     pub motion: Motion,
     /// Rows; row k is at k ms.
     pub rows: Vec<Row>,
@@ -87,8 +87,8 @@ pub struct Trace {
     pub drove: bool,
 }
 
-/// Plant and board, with the state that carries over from run to run: chamber
-/// pressures, what the board has learnt, noise.
+/// Plant and board, with the state that carries over from run to run: chamber pressures, the board's learnt
+/// values, noise.
 #[derive(Debug, Clone)]
 pub struct AxisSim<B> {
     axis: Axis,
@@ -97,7 +97,7 @@ pub struct AxisSim<B> {
     /// The board.
     pub board: B,
     pending: OnTimes,
-    /// Notice that the board gets of a step \[s\]; none if zero.
+    /// How far ahead the board knows of a step \[s\]; 0: not at all.
     pub preview_s: f64,
 }
 
@@ -189,8 +189,8 @@ impl<B: Board> AxisSim<B> {
         })
     }
 
-    /// One tick of 1 ms towards a reference \[m\] that moves at a speed \[m/s\]. Gives what the
-    /// board did, and the row of the tick's start; switches and air count from power-up.
+    /// One tick of 1 ms towards a reference \[m\] that moves at a speed \[m/s\]. Returns the board's action,
+    /// and the row of the tick's start; switches and air count from power-up.
     ///
     /// # Errors
     /// [`AxisSimError`]; the bench is not usable after one.
@@ -200,7 +200,7 @@ impl<B: Board> AxisSim<B> {
         Ok((action, row))
     }
 
-    /// The same with a reference to come, and shows row and board before the plant goes on.
+    /// The same with an announced reference; shows row and board before the plant continues.
     fn tick_with(
         &mut self,
         reference_m: f64,

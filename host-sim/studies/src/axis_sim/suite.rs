@@ -1,9 +1,8 @@
 //! The experiments of the comparison: moves, factors, combinations, delays.
 //!
-//! Every experiment is a function of an axis's data sheet, a controller and a
-//! seed. The controller's gains come from the data sheet alone; what a factor
-//! changes is changed in the plant only. [`identify`] may find the valves'
-//! delays before the first move, as on a board at start-up.
+//! Every experiment is a function of an axis's data sheet, a controller and a seed. The controller's gains
+//! come only from the data sheet; a factor changes only the plant. [`identify`] may find the valves' delays
+//! before the first move, as on a board at start-up.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -15,7 +14,7 @@ pub use super::error::AxisSimError;
 use super::{AxisSim, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
-/// What differs from the data sheet.
+/// Deviations from the data sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Factors {
     /// Force on the rod as a share of the force left at the actual supply on the
@@ -104,9 +103,9 @@ impl Factors {
         p
     }
 
-    /// What nobody tells a board at power-up, drawn by a number: both chamber pressures between the atmosphere and
-    /// the supply, such that with the load the piston stands within half of its friction. Gives the tick of the
-    /// law's period in which the first move falls, 0…3.
+    /// Draws the unknowns of a board at power-up by a number: both chamber pressures between the atmosphere
+    /// and the supply, such that with the load the piston stands within half of its friction. Returns the
+    /// tick of the law's period in which the first move falls, 0…3.
     pub fn draw_start(plant: &mut AxisParams, number: u64) -> u64 {
         let mut rng = Pcg64Mcg::seed_from_u64(number ^ 0x57A2_7000);
         let (low, high) = (
@@ -138,7 +137,7 @@ impl Factors {
     }
 }
 
-/// Force at the supply of a plant on the weaker side, less break-away friction \[N\].
+/// Force of a plant at its supply pressure on the weaker side, less break-away friction \[N\].
 #[must_use]
 pub fn force_left_n(p: &AxisParams) -> f64 {
     let c = &p.cylinder;
@@ -152,12 +151,12 @@ pub fn force_left_n(p: &AxisParams) -> f64 {
 pub enum StartUp {
     /// The data sheet's delays are used.
     Sheet,
-    /// They are found by [`identify`].
+    /// [`identify`] finds them.
     Identified,
 }
 
-/// The design of a controller for a plant of which it knows the sheet and,
-/// after [`StartUp::Identified`], the valves' delays.
+/// The design of a controller that knows the sheet of its plant and, after [`StartUp::Identified`], the
+/// valves' delays.
 ///
 /// # Errors
 /// [`AxisSimError`].
@@ -181,7 +180,7 @@ pub struct TestRig {
 }
 
 impl TestRig {
-    /// Power-up of a board with a design on a plant at rest.
+    /// Powers up a board with a design, on a plant at rest.
     ///
     /// # Errors
     /// [`AxisSimError`].
@@ -198,13 +197,13 @@ impl TestRig {
         &self.bench
     }
 
-    /// Where the reference stands \[m\].
+    /// The current reference \[m\].
     #[must_use]
     pub const fn at_m(&self) -> f64 {
         self.at_m
     }
 
-    /// So many milliseconds at the reference.
+    /// Waits for `ms` milliseconds at the reference.
     ///
     /// # Errors
     /// [`AxisSimError`].
@@ -246,7 +245,7 @@ impl TestRig {
         self.run(&motion, loads, seconds)
     }
 
-    /// Any motion; it must begin where the reference stands.
+    /// Any motion; it must begin at the current reference.
     ///
     /// # Errors
     /// [`AxisSimError`].
@@ -287,10 +286,9 @@ pub fn steps(
         .collect()
 }
 
-/// The retract move from the extended end stop, after the controller has pushed
-/// against the stop for 3 s: the start from home of the paper's test. Chamber
-/// pressures come from the simulation alone. `preview_s` is how long before the
-/// move the board is told of it.
+/// The retract move from the extended end stop, after the controller has pushed against the stop for 3 s: the
+/// start from home of the paper's test. Chamber pressures come from the simulation alone. The board gets the
+/// move `preview_s` ahead.
 ///
 /// # Errors
 /// [`AxisSimError`].

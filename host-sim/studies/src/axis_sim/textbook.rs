@@ -1,4 +1,4 @@
-//! One cylinder from the text book, on its own: what the plant is held against.
+//! A separate model of one cylinder from the text book, to compare the plant with.
 //!
 //! ```text
 //! d(p V)/dt = n R T_up mdot − (n − 1) p dV/dt + (n − 1) h A (T_amb − T)
@@ -7,9 +7,9 @@
 //! m x''     = p_A A_A − p_B A_B − p_amb A_rod − σ2 x' + load
 //! ```
 //!
-//! Polytropic: n as in the file, T = T_amb, h = 0. Thermal: n = γ, T = p V / (m R). No leak, no
-//! dry friction, a supply that does not give way, a piston away from its stops. Integrated by
-//! the classic Runge–Kutta method at a fixed, short step that begins anew at every edge.
+//! Polytropic: n as in the file, T = T_amb, h = 0. Thermal: n = γ, T = p V / (m R). No leak, no dry friction,
+//! a supply that does not give way, a piston away from its stops. Integrated by the classic Runge–Kutta
+//! method with a fixed, short step that restarts at every edge.
 
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::chamber::GasModel;
@@ -21,7 +21,7 @@ const STEP_S: f64 = 1e-5;
 /// p V of A and B \[J\], masses of A and B \[kg\], stroke \[m\], speed \[m/s\].
 type State = [f64; 6];
 
-/// What is compared with the plant.
+/// Values to compare with the plant.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     /// Pressures of A and B, Pa.
@@ -30,8 +30,8 @@ pub(super) struct Sample {
     pub(super) stroke_m: f64,
 }
 
-/// Commands of a manoeuvre: from when to when each valve is energised, s, in the order fill A,
-/// vent A, fill B, vent B.
+/// Commands of a manoeuvre: when each valve is energised, from and to, s, in the order fill A, vent A, fill
+/// B, vent B.
 pub(super) type Commands = [Vec<(f64, f64)>; 4];
 
 /// The cylinder.
@@ -95,7 +95,7 @@ impl<'a> Textbook<'a> {
         samples
     }
 
-    /// When each valve is open, as the chamber sees it.
+    /// When each valve is open, as seen from the chamber.
     fn effects(&self, commands: &Commands) -> [Vec<(f64, f64)>; 4] {
         let c = &self.axis.cylinder;
         std::array::from_fn(|i| {
@@ -198,7 +198,7 @@ impl<'a> Textbook<'a> {
         dy
     }
 
-    /// Wall of a chamber: dead volume, both ends, the tube as far as the piston.
+    /// Wall of a chamber: dead volume, both ends, the tube up to the piston.
     fn wall_m2(&self, chamber: usize, stroke_m: f64) -> f64 {
         let c = &self.axis.cylinder;
         let length_m = [stroke_m, c.stroke_m - stroke_m][chamber];

@@ -1,5 +1,4 @@
-//! A plant of one axis that leaves the range of its model: when, what most likely did it, and what
-//! was last known of it.
+//! A plant of one axis that leaves the range of its model: when, the likely cause, and its last known values.
 
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisState};
@@ -41,11 +40,11 @@ pub(super) fn tick(
     })
 }
 
-/// Parameters of the axis file that most likely make a state variable explode.
+/// Parameters of the axis file that are the likely cause if a state variable explodes.
 fn likely(name: &str) -> &'static str {
     match name {
         "bristle_m" => "`friction.bristle_damping`, `friction.bristle_stiffness`",
-        // What moves is too heavy for its stop, or for the air before the piston.
+        // The load is too heavy for its stop, or for the air in front of the piston.
         "stroke_m" => "`moving.mass`, `end_stop.stiffness`, `end_stop.damping`",
         "pressure_a_pa" | "mass_a_kg" => {
             "`moving.mass`, `cylinder.dead_volume_a`, `line.volume`, `fill_valve.conductance`"
@@ -63,7 +62,7 @@ mod tests {
     use super::*;
     use wheeleg_config::AxisConfig;
 
-    /// Whatever leaves its range is told by fields that an axis file has.
+    /// A quantity that leaves its range is reported by fields that an axis file has.
     #[test]
     fn every_state_of_an_axis_has_fields_of_the_file_to_blame() {
         let axis = AxisConfig::load("bench-vq110u").expect("built in");

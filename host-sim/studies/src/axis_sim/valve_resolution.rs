@@ -1,9 +1,8 @@
-//! How fine the valves of an axis are for its cylinder.
+//! Whether the valves of an axis are fine enough for its cylinder.
 //!
-//! An on/off valve cannot open for less than it takes to shut again. What flows in that
-//! time is the smallest step of pressure, hence of force; friction holds a piston against
-//! forces up to twice its break-away force apart. A step beyond that cannot bring a piston
-//! to where it rests but by luck, whatever the law.
+//! An on/off valve cannot open for less than its shutting time. The flow in that time gives the smallest step
+//! of pressure, hence of force; friction holds a piston over a range of forces of twice its break-away force.
+//! A step larger than that brings a piston to rest at its target only by luck, whatever the law.
 
 use fixed::types::I8F24;
 use schemars::JsonSchema;
@@ -14,15 +13,14 @@ use wheeleg_protocol::param::JointParam;
 
 use super::design::axis_data;
 
-/// Steps above this share of what friction holds are coarse. Measured on the 240 cylinders that
-/// `cargo xtask deep cylinders` draws at random, with 1,920 combinations of load, mass, supply,
-/// friction and delay: up to it 2.8 % of 1,688 missed their bars, none by a fault; above it 18 %
-/// of 232, 17 by a fault.
+/// Steps above this share of the friction's range are coarse. Measured on the 240 cylinders that `cargo xtask
+/// deep cylinders` draws at random, with 1,920 combinations of load, mass, supply, friction and delay: up to
+/// it 2.8 % of 1,688 missed their bars, none by a fault; above it 18 % of 232, 17 by a fault.
 pub const COARSE: f64 = 0.5;
-/// Friction that holds less than this holds nothing \[N\].
+/// Friction below this does not hold anything \[N\].
 const LEAST_N: f64 = 1e-3;
 
-/// Smallest step of force, against what friction holds.
+/// Smallest step of force, compared with the range that friction holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct ValveResolution {
     /// Shortest opening of a valve \[ms\].
@@ -31,10 +29,10 @@ pub struct ValveResolution {
     pub force_step_n: f64,
     /// Range of forces in which friction holds the piston: twice the break-away force \[N\].
     pub friction_holds_n: f64,
-    /// The first of these forces over the second; null where friction holds nothing.
+    /// The first of these forces over the second; null if friction holds nothing.
     pub ratio: Option<f64>,
-    /// Conductance of valve and line with which the ratio would be [`COARSE`] \[dm³/(s bar)\]; null
-    /// where friction holds nothing.
+    /// Conductance of valve and line for which the ratio would be [`COARSE`] \[dm³/(s bar)\]; null if
+    /// friction holds nothing.
     pub conductance_for_half_dm3_s_bar: Option<f64>,
 }
 
@@ -48,7 +46,7 @@ fn tenths(force_n: f64) -> String {
 }
 
 impl ValveResolution {
-    /// Of an axis, as its data sheet tells it.
+    /// For an axis, by its data sheet.
     #[must_use]
     pub fn of(axis: &AxisParams) -> Self {
         let c = &axis.cylinder;
@@ -81,7 +79,7 @@ impl ValveResolution {
         }
     }
 
-    /// What to do about valves that are too coarse; `None` if they are not.
+    /// Remedy for valves that are too coarse; `None` if they are not.
     #[must_use]
     pub fn advice(&self) -> Option<String> {
         let Some((ratio, conductance)) = self.ratio.zip(self.conductance_for_half_dm3_s_bar) else {
@@ -92,7 +90,7 @@ rests where its forces balance, and swings about it"
             );
         };
         (ratio > COARSE).then(|| {
-            // Rounded down: what is printed must be enough.
+            // Rounded down: the printed value must be enough.
             let throttled = (conductance * 1e3).floor() * 1e-3;
             let least = I8F24::from_bits(JointParam::Conductance.info().min).to_num::<f64>();
             let throttle = match throttled < least {
@@ -120,7 +118,7 @@ mod tests {
     use super::*;
     use wheeleg_config::AxisConfig;
 
-    /// What a board cannot be told is no advice.
+    /// Values that a board does not accept are not advised.
     #[test]
     fn no_axis_is_throttled_below_what_a_board_takes() {
         let mut axis = AxisConfig::load("bench-vq110u").expect("built in").axis;
@@ -143,7 +141,7 @@ mod tests {
             let share = fine.ratio.expect("there is friction");
             assert!((0.01..COARSE).contains(&share), "{name}: {fine:?}");
             assert_eq!(fine.advice(), None);
-            // Valves so wide that the advice is needed; what it says mends it.
+            // Valves so wide that advice is needed; following it mends them.
             let c = &mut axis.cylinder;
             c.line_flow = None;
             for valve in [&mut c.fill_valve, &mut c.vent_valve] {
@@ -164,7 +162,7 @@ mod tests {
         }
     }
 
-    /// Nothing is divided by it.
+    /// There is no division by zero friction.
     #[test]
     fn without_friction_there_is_no_ratio() {
         let mut axis = AxisConfig::load("bench-vq110u").expect("built in").axis;

@@ -1,3 +1,3 @@
-//! Checks of the model against numbers that others computed.
+//! Checks of the model against independently computed numbers.
 
 pub mod vectors;

@@ -1,4 +1,4 @@
-//! One case: controller, axis, move, variation and seed, and what came of it.
+//! One case: controller, axis, move, variation and seed, and its result.
 
 use std::fmt;
 use std::str::FromStr;
@@ -18,8 +18,7 @@ pub const MARGIN: f64 = 1.25;
 /// Error within which a move has recovered from the loss of contact \[m\].
 const RECOVERED_M: f64 = 2e-3;
 
-/// Name of a case: `axis/controller/move/variation/seed`, from which alone it can be
-/// played again.
+/// Name of a case: `axis/controller/move/variation/seed`, which is enough to play it again.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseId {
     /// Name of the axis.
@@ -28,13 +27,13 @@ pub struct CaseId {
     pub kind: Kind,
     /// Move.
     pub motion: Move,
-    /// What differs from the sheet.
+    /// Deviations from the sheet.
     pub variation: Variation,
     /// Seed of the ADC noise.
     pub seed: u64,
 }
 
-/// A text that is no case.
+/// A text that is not a case.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BadCaseId {
     /// Not five parts.
@@ -51,7 +50,7 @@ pub enum BadCaseId {
     /// Unknown variation.
     #[error(transparent)]
     Variation(#[from] UnknownVariation),
-    /// No number.
+    /// Not a number.
     #[error("`{0}` is not a seed: a whole number from 0 to {max}", max = u64::MAX)]
     Seed(String),
 }
@@ -90,15 +89,15 @@ impl FromStr for CaseId {
     }
 }
 
-/// A plant that differs from its sheet, and what a board finds out of it at
-/// start-up: common to all controllers and moves.
+/// A plant that differs from its sheet, and the board's findings about it at start-up: common to all
+/// controllers and moves.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// Name of the axis.
     pub axis: String,
     /// Its data sheet.
     pub sheet: AxisParams,
-    /// What differs.
+    /// Deviations.
     pub variation: Variation,
     /// Seed.
     pub seed: u64,
@@ -111,7 +110,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// The case; looks for the valves' delays where the variation says so.
+    /// The case; searches for the valves' delays if the variation says so.
     ///
     /// # Errors
     /// [`AxisSimError`] if the plant refuses its parameters.
@@ -246,7 +245,7 @@ fn feasible_margin() -> f64 {
 /// One case in tables and JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Row {
-    /// Which case.
+    /// The case.
     #[serde(flatten)]
     pub case: CaseFacts,
     /// Figures of merit.
@@ -254,7 +253,7 @@ pub struct Row {
     pub figures: Figures,
 }
 
-/// What was played.
+/// The played case.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CaseFacts {
     /// Name, for `--case`.
@@ -266,7 +265,7 @@ pub struct CaseFacts {
     /// Move.
     #[serde(rename = "move")]
     pub motion: Move,
-    /// What differs from the sheet.
+    /// Deviations from the sheet.
     #[schemars(with = "String")]
     pub variation: Variation,
     /// Seed.
@@ -291,14 +290,13 @@ pub struct CaseFacts {
     pub static_margin: f64,
     /// Margin at least [`MARGIN`]; other cases are listed, not played.
     pub feasible: bool,
-    /// Where the board has its valve delays from.
+    /// Source of the board's valve delays.
     pub delays: &'static str,
-    /// Opening delay that the board works with \[ms\].
+    /// Opening delay that the board uses \[ms\].
     pub valve_t_on_ms: f64,
 }
 
-/// Figures of a case: the worse of its measured moves. What a move does not have
-/// is absent.
+/// Figures of a case: the worse of its measured moves. Figures that a move does not have are absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Figures {
     /// Mean error of the last 0.2 s, signed, of the larger magnitude \[mm\].
@@ -352,7 +350,7 @@ fn worst(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
 }
 
 impl Figures {
-    /// Works the figures of a played case out.
+    /// Computes the figures of a played case.
     #[must_use]
     pub fn of(motion: Move, played: &Played, bound_s: Option<[f64; 2]>) -> Self {
         let all: Vec<Metrics> = played.measured.iter().map(Metrics::of).collect();

@@ -96,7 +96,7 @@ impl Comparison {
     }
 }
 
-/// A panel of lines over time; `y` is its range, or what the lines need.
+/// A panel of lines over time; `y` is its range, or that of the lines.
 pub(crate) fn panel(
     title: &str,
     unit: &str,
@@ -110,27 +110,27 @@ pub(crate) fn panel(
     Panel::new(title, (-0.05, end_s), 230, content)
 }
 
-/// End of the panels of a step \[s\], what is shown about its target \[mm\], and its last part, in which a curve
-/// should be at rest \[s\].
+/// End of the panels of a step \[s\], the range shown about its target \[mm\], and its last part, in which a
+/// curve should be at rest \[s\].
 const STEP_END_S: f64 = 1.5;
 const ABOUT_MM: f64 = 4.0;
 const AT_REST_S: f64 = 0.5;
 
-/// Whether a curve leaves the panel about its target where it should be at rest.
+/// Whether a curve leaves the panel about its target when it should be at rest.
 fn is_beyond(series: &Series) -> bool {
     let at_rest = STEP_END_S - AT_REST_S..=STEP_END_S;
     let mut rest = series.points.iter().filter(|(t, _)| at_rest.contains(t));
     rest.any(|(_, mm)| mm.abs() > ABOUT_MM)
 }
 
-/// The large step with its end enlarged: two panels.
+/// The large step, and its end enlarged: two panels.
 fn step_panels(comparison: &Comparison, axis: &str) -> Option<Vec<Panel>> {
     let step = comparison.overlay(axis, Move::Step100, |_, x| x);
     if step.is_empty() {
         return None;
     }
     let error = comparison.overlay(axis, Move::Step100, |r, x| x - r);
-    // What swings through the panel to its end hides the others.
+    // A curve that swings through the panel to its end hides the others.
     let (error, swinging): (Vec<Series>, Vec<Series>) =
         error.into_iter().partition(|series| !is_beyond(series));
     let left_out: Vec<String> = swinging.into_iter().map(|series| series.label).collect();
@@ -156,7 +156,7 @@ fn step_panels(comparison: &Comparison, axis: &str) -> Option<Vec<Panel>> {
     ])
 }
 
-/// What the README shows: the step of the first axis, and bars.
+/// The figure in the README: the step of the first axis, and bars.
 fn overview(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
     let name = axis.config.name.as_str();
     let mut panels = step_panels(comparison, name)?;
@@ -178,7 +178,7 @@ fn overview(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
                 .iter()
                 .map(|v| v.map_or_else(|| missing.to_owned(), |v| format!("{v:.digits$}")))
                 .collect(),
-            // A bar that has no value is as long as can be.
+            // A bar without a value has full length.
             values: values.iter().map(|v| Some(v.unwrap_or(full))).collect(),
             full,
             limit: None,
@@ -319,7 +319,7 @@ fn contact(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
         let series = comparison.overlay(name, motion, |_, x| x);
         if !series.is_empty() {
             let mut p = panel(title, "[mm]", 1.5, series, None, &[]);
-            // From the start of the motion, as the overlays are.
+            // From the start of the motion, like the overlays.
             p.marks = super::CONTACT_S
                 .map(|t| t - crate::axis_sim::suite::LEAD_S)
                 .to_vec();

@@ -1,5 +1,5 @@
-//! What random combinations say of a law: how likely it misses, quantiles of its figures, each with its bound, and
-//! one version against another, pair by pair.
+//! Statistics of random combinations: how likely a law misses, quantiles of its figures, each with its bound,
+//! and a pairwise comparison with another version.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,30 +13,30 @@ use super::{Comparison, Options, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
 
-/// Largest error at rest \[mm\] of a combination that is no miss.
+/// Largest error at rest \[mm\] of a combination that is not a miss.
 pub const ERROR_MM: f64 = 0.5;
-/// Largest overshoot of it \[mm\].
+/// Largest overshoot of such a combination \[mm\].
 pub const OVERSHOOT_MM: f64 = 6.0;
 
 /// Digest of the sources of `firmware/control`.
 const CONTROL: [u8; 24] = *include_bytes!(concat!(env!("OUT_DIR"), "/control"));
 
-/// Root of the combinations that judge the laws. It follows from the sources of `firmware/control`, so a change of a law
-/// is judged by combinations that it was not made with.
+/// Root of the combinations that judge the laws. It follows from the sources of `firmware/control`, so a
+/// changed law is judged by combinations that were not used to make it.
 #[must_use]
 pub const fn judging_root() -> u64 {
     let [a, b, c, d, ..] = CONTROL;
     u32::from_le_bytes([a, b, c, d]) as u64
 }
 
-/// A quantile, and its upper bound with 95 %, whatever the distribution is (order statistic).
+/// A quantile, and its upper bound with 95 %, for any distribution (order statistic).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Quantile {
     /// Share below it.
     pub share: f64,
-    /// The quantile; absent where that is a move that never ends as it should.
+    /// The quantile; absent if it is a move that never ends as it should.
     pub value: Option<f64>,
-    /// Its bound; absent where so few combinations give none.
+    /// Its bound; absent if there are too few combinations for one.
     pub at_most: Option<f64>,
 }
 
@@ -49,18 +49,18 @@ pub struct Paired {
     pub worse: u64,
     /// The other way round.
     pub better: u64,
-    /// Probability of as unequal a split if neither version is better: exact test of McNemar.
+    /// Probability of such an unequal split if neither version is better: exact test of McNemar.
     pub p: f64,
 }
 
-/// What the random combinations of a controller on an axis say.
+/// Statistics of the random combinations of a controller on an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Judged {
     /// Axis.
     pub axis: String,
     /// Controller.
     pub controller: Kind,
-    /// Combinations that were played.
+    /// Played combinations.
     pub combinations: u64,
     /// Of these: error beyond 0.5 mm, overshoot beyond 6 mm, a limit cycle, or stopped.
     pub missed: u64,
@@ -81,7 +81,7 @@ pub struct Judged {
 /// Which combinations another version kept, by their names.
 pub type Before = BTreeMap<String, bool>;
 
-/// The part of a row that says whether its bars are kept, as it is read again.
+/// The part of a row that decides whether its bars are kept, for reading it back.
 #[derive(Deserialize)]
 #[serde(expecting = "a case")]
 struct ReadCase {
@@ -122,12 +122,11 @@ impl Row {
     }
 }
 
-/// Reads which combinations another version kept, from its `summary.json`; `None` if nothing is to
-/// be compared with one.
+/// Reads from its `summary.json` which combinations another version kept; `None` without such a comparison.
 ///
 /// # Errors
-/// [`StudyError`] if the file cannot be read, is no summary of a comparison or has none of the
-/// combinations that are to be played.
+/// [`StudyError`] if the file cannot be read, is not a summary of a comparison or has none of the
+/// combinations to be played.
 pub(super) fn read(options: &Options) -> Result<Option<Before>, StudyError> {
     let against = options.against.as_deref();
     against.map(|path| read_from(path, options)).transpose()
@@ -169,7 +168,7 @@ fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
     Ok(before)
 }
 
-/// A quantile of values of which some are missing: larger than any.
+/// A quantile of values; missing ones count as larger than any.
 fn quantile(values: &[Option<f64>], share: f64) -> Quantile {
     let all: Vec<f64> = values.iter().map(|v| v.unwrap_or(f64::INFINITY)).collect();
     let [value, at_most] = stats::bounded_quantile(&all, share);
@@ -182,7 +181,7 @@ fn quantile(values: &[Option<f64>], share: f64) -> Quantile {
 }
 
 impl Comparison {
-    /// What the random combinations say, by axis and controller; nothing where none was played.
+    /// Statistics of the random combinations, by axis and controller; empty if none was played.
     #[must_use]
     pub fn judged(&self) -> Vec<Judged> {
         let axes = self.axes.iter().map(|axis| axis.config.name.as_str());

@@ -1,10 +1,9 @@
 //! Every controller on the same plants, moves and inputs: `wheeleg compare`.
 //!
-//! A case is a controller, an axis, a move, what differs from the axis's data
-//! sheet, and a seed. It is played from power-up by the joint board's whole
-//! application ([`crate::axis_sim::Node`]) with gains that the builder derives from the
-//! sheet. Cases know nothing of each other, so they run on any number of threads
-//! with the same result, and each can be played alone by its name.
+//! A case is a controller, an axis, a move, a deviation from the axis's data sheet, and a seed. The joint
+//! board's whole application ([`crate::axis_sim::Node`]) plays it from power-up, with gains that the builder
+//! derives from the sheet. Cases are independent, so they give the same result on any number of threads, and
+//! each can be played alone by its name.
 
 mod case;
 mod charts;
@@ -36,15 +35,14 @@ use wheeleg_config::AxisConfig;
 use wheeleg_report::number::counted;
 use wheeleg_report::results::CSV;
 
-/// What is compared.
+/// Options of a comparison.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Built-in axes or files.
     pub axes: Vec<String>,
     /// Controllers.
     pub kinds: Vec<Kind>,
-    /// Moves; `None`: all as on the sheet, steps of 100 mm and S-curves with what
-    /// differs from it.
+    /// Moves; `None`: all as on the sheet, steps of 100 mm and S-curves with deviations from it.
     pub moves: Option<Vec<Move>>,
     /// Number of seeds.
     pub seeds: u64,
@@ -52,9 +50,9 @@ pub struct Options {
     pub seed: u64,
     /// Random combinations per axis.
     pub combinations: u64,
-    /// Number of the first of them: [`judging_root`], or one that another version was played with.
+    /// Number of the first of them: [`judging_root`], or the one used for another version.
     pub root: u64,
-    /// `summary.json` of another version, whose combinations these are compared with.
+    /// `summary.json` of another version, to compare these combinations with.
     pub against: Option<PathBuf>,
     /// Fewer factors, a coarser bound.
     pub quick: bool,
@@ -91,17 +89,17 @@ pub struct Overlay {
 /// The whole comparison.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// What was asked for.
+    /// Its options.
     pub options: Options,
-    /// Axes, in the order asked for.
+    /// Axes, in the requested order.
     pub axes: Vec<ComparedAxis>,
     /// One row per case.
     pub rows: Vec<Row>,
     /// Of the first seed, as on the sheet.
     pub overlays: Vec<Overlay>,
-    /// What another version did in the random combinations.
+    /// Results of another version in the random combinations.
     pub before: Option<Before>,
-    /// What stopped it before all cases were played.
+    /// Why it stopped before all cases were played.
     pub stopped: Option<Stopped>,
 }
 
@@ -110,9 +108,9 @@ pub struct Comparison {
 pub struct Cases<'a> {
     /// One object per case that was played or is not feasible.
     pub(crate) cases: &'a [Row],
-    /// What the random combinations say, one object per axis and controller.
+    /// Statistics of the random combinations, one object per axis and controller.
     pub(crate) judged: &'a [Judged],
-    /// What made cases fail that could be simulated no further; they are not among `cases`.
+    /// Why cases failed that could not be simulated to their end; they are not among `cases`.
     pub(crate) failure: Option<String>,
 }
 
@@ -129,7 +127,7 @@ pub(crate) fn axis_error(file: &str, e: &AxisSimError) -> StudyError {
     StudyError::refused(format!("the axis `{file}` cannot be used: {e}"), help)
 }
 
-/// Loads an axis and has its gains derived for every controller.
+/// Loads an axis and derives its gains for every controller.
 pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError> {
     let config = AxisConfig::load(name)?;
     for kind in kinds {
@@ -142,7 +140,7 @@ pub(crate) fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError>
 /// Plays all cases and writes report, figures, tables and `summary.json`.
 ///
 /// # Errors
-/// [`StudyError`] if an axis cannot be read or used, or something not be drawn or written.
+/// [`StudyError`] if an axis cannot be read or used, or a result cannot be drawn or written.
 pub fn compare(options: &Options, settings: &Settings) -> Result<Finished<Comparison>, StudyError> {
     let configs = configs(options)?;
     let before = judged::read(options)?;
@@ -166,7 +164,7 @@ fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
         }
         configs.push(config);
     }
-    // Before the first case: one that no plant can be would cost all the others.
+    // Before the first case: an impossible one would cost all the others.
     for (axis, variation, _) in plan(options, &configs) {
         let config = &configs[axis];
         let plant = variation.factors(&config.axis).plant(&config.axis);
@@ -179,7 +177,7 @@ fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
 }
 
 impl Comparison {
-    /// Plays all cases, as far as it is not stopped.
+    /// Plays all cases, until it is stopped.
     ///
     /// # Errors
     /// [`StudyError`] if an axis cannot be read or used, or a case leaves the plant's model.
@@ -189,7 +187,7 @@ impl Comparison {
         unplayed.map_or(Ok(comparison), Err)
     }
 
-    /// The comparison, and what is to be told of cases that could not be played: they cost none of the others.
+    /// The comparison, and an error for cases that could not be played: the others are kept.
     fn play(
         options: &Options,
         configs: Vec<AxisConfig>,
@@ -280,7 +278,7 @@ impl Comparison {
     }
 }
 
-/// A case that was played, or why it could not be.
+/// A played case, or why it could not be played.
 type PlayedCase = Result<(Row, Option<Overlay>), Unplayed>;
 
 /// A case that left the model of the plant.
@@ -292,7 +290,7 @@ struct Unplayed {
     error: AxisSimError,
 }
 
-/// What is to be told of them, if there are any: how many, and all of the first.
+/// The error for unplayed cases, if there are any: their number, and details of the first.
 fn unplayed_error(unplayed: &[Unplayed], of: u64) -> Option<StudyError> {
     let first = unplayed.first()?;
     let help = match &first.error {
@@ -310,9 +308,8 @@ fn unplayed_error(unplayed: &[Unplayed], of: u64) -> Option<StudyError> {
     ))
 }
 
-/// Plays the cases of a variation, as far as the comparison is not stopped. They are played after
-/// its start-up rather than after those of all variations, so that there are rows from the
-/// beginning on.
+/// Plays the cases of a variation, until the comparison is stopped. They are played right after its start-up,
+/// not after those of all variations, so that there are rows from the beginning.
 fn play_case(
     options: &Options,
     axis: &ComparedAxis,
@@ -340,7 +337,7 @@ fn play_case(
     };
     let case = match Case::new(name, &axis.config.axis, variation, seed) {
         Ok(case) => case,
-        // Its start-up is that of all its cases.
+        // All its cases share its start-up.
         Err(error) => {
             let all = cases
                 .iter()
@@ -419,8 +416,8 @@ fn moves_of(options: &Options, variation: Variation) -> Vec<Move> {
     }
 }
 
-/// The fastest large and small step of an axis, retracting and extending, from the
-/// rest in which the predictive controller begins them. Of no use once it is stopped.
+/// The fastest large and small step of an axis, retracting and extending, from the rest in which the
+/// predictive controller begins them. Useless once the comparison is stopped.
 fn bounds(
     sheet: &AxisParams,
     runs: u32,
@@ -451,7 +448,7 @@ fn bounds(
     Ok(found)
 }
 
-/// Writes rows as CSV with a head line.
+/// Writes rows as CSV with a header line.
 fn table(path: &Path, rows: &[Row]) -> Result<(), StudyError> {
     write_table(path, rows).inspect_err(|_| {
         // A part of a table would be taken for the whole.
@@ -475,8 +472,8 @@ fn write_table(path: &Path, rows: &[Row]) -> Result<(), StudyError> {
         .map_err(|e| StudyError::output("write the table", path, e))
 }
 
-/// Names and values of a struct of numbers and texts. (The library writes no head
-/// line for a struct within a struct.)
+/// Names and values of a struct of numbers and texts. (The library writes no header line for a struct within
+/// a struct.)
 fn record<T: Serialize>(value: &T) -> Result<[csv::StringRecord; 2], StudyError> {
     let failed = |e: csv::Error| StudyError::output("write", "a table", e.into());
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -511,7 +508,7 @@ mod tests {
             threads: 1,
         };
         let sound = AxisConfig::load("bench-vq110u").expect("built in");
-        // So light that the step cannot follow its bristles: on reading this would be refused.
+        // So light that the step cannot follow its bristles: reading such a file would refuse it.
         let mut light = sound.clone();
         light.name = "light".to_owned();
         light.axis.moving_mass_kg = 0.02;

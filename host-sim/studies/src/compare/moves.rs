@@ -5,7 +5,7 @@ use wheeleg_plant::axis::AxisParams;
 use crate::axis_sim::suite::{AxisSimError, LEAD_S, TestRig, force_left_n};
 use crate::axis_sim::{LoadEvent, Motion, Trace};
 
-/// What a case asks of the axis.
+/// Motion of a case.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
 )]
@@ -23,14 +23,13 @@ pub enum Move {
     Sine,
     /// At rest for 10 s after a step.
     Hold,
-    /// A load against the move is taken away in its middle and comes back 0.4 s later.
+    /// A load against the move is removed in its middle and returns 0.4 s later.
     Contact,
     /// The same with a load that helps.
     ContactHelped,
 }
 
-/// Distances of the moves on one axis: those of the names, or less where the
-/// stroke is too short for them.
+/// Distances of the moves on one axis: as in their names, or less if the stroke is too short for them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
     /// The large step, about the middle: lower and upper end \[m\].
@@ -66,20 +65,20 @@ impl Sizes {
     }
 }
 
-/// A played move: the first move after power-up, then what is measured.
+/// A played move: the first move after power-up, then the measured ones.
 #[derive(Debug, Clone)]
 pub struct Played {
     /// The first move, in which the board learns.
     pub first: Trace,
-    /// What is measured, in the order of the name's text.
+    /// The measured moves, in the order of the name's description.
     pub measured: Vec<Trace>,
 }
 
 /// Time for a step \[s\].
 pub const STEP_S: f64 = 2.5;
-/// Time at rest that is watched for switches \[s\].
+/// Time at rest during which switches are counted \[s\].
 pub const REST_S: f64 = 10.0;
-/// When the load goes and when it comes back, from the start of the recording \[s\].
+/// When the load goes and returns, from the start of the recording \[s\].
 pub const CONTACT_S: [f64; 2] = [0.15, 0.55];
 /// From the return of the load to the time when the error counts \[s\].
 pub const RECOVERY_S: f64 = 0.5;
@@ -110,14 +109,14 @@ impl Move {
         }
     }
 
-    /// The move of a name.
+    /// The move with this name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
     }
 
-    /// The load of a foot on the ground \[N\], none for most moves. The move that is
-    /// measured extends, so a negative one is against it.
+    /// The load of a foot on the ground \[N\], none for most moves. The measured move extends, so a negative
+    /// load is against it.
     #[must_use]
     pub fn contact_n(self, sheet: &AxisParams) -> f64 {
         match self {
@@ -127,7 +126,7 @@ impl Move {
         }
     }
 
-    /// The plant at power-up: pressed from the start where contact is to be lost.
+    /// The plant at power-up: loaded from the start if contact is to be lost.
     #[must_use]
     pub fn plant(self, plant: &AxisParams, sheet: &AxisParams) -> AxisParams {
         let mut loaded = plant.clone();
@@ -135,7 +134,7 @@ impl Move {
         loaded
     }
 
-    /// Whether contact is lost and found.
+    /// Whether contact is lost and regained.
     #[must_use]
     pub const fn loses_contact(self) -> bool {
         matches!(self, Self::Contact | Self::ContactHelped)

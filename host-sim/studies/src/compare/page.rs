@@ -12,7 +12,7 @@ use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// Bar that cells are judged by: overshoot of one factor at a time \[mm\].
+/// Bar for cells: overshoot with one factor at a time \[mm\].
 const OVERSHOOT_MM: f64 = 3.0;
 
 /// The largest of the values; `None` if one is missing or there is none.
@@ -76,14 +76,14 @@ impl Comparison {
             .collect()
     }
 
-    /// What came of it, in a sentence: which controller is best, and on what grounds.
+    /// The result, in a sentence: which controller is best, and on what grounds.
     #[must_use]
     pub fn verdict(&self) -> String {
         best(self, &self.judged()).unwrap_or_else(|| supervised(self))
     }
 
-    /// Feasible cases in which the supervision latched a fault: no fault was put in,
-    /// so each is a false alarm.
+    /// Feasible cases in which the supervision latched a fault: no fault was injected, so each is a false
+    /// alarm.
     pub fn false_alarms(&self) -> impl Iterator<Item = &Row> + Clone {
         self.rows.iter().filter(|r| !r.figures.faults.is_empty())
     }
@@ -126,10 +126,10 @@ pub(super) const COLUMNS: [&str; 16] = [
     "limit cycles",
 ];
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
-    /// What stopped the comparison.
+    /// Why the comparison stopped.
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
@@ -236,7 +236,7 @@ impl Combined {
     }
 }
 
-/// A quantile and its bound, as far as there are such.
+/// A quantile and its bound, if they exist.
 fn bounded(quantile: Quantile, digits: usize) -> String {
     let value = or_dash(quantile.value, digits);
     match quantile.at_most {
@@ -344,10 +344,10 @@ pub(super) fn render(
     Ok(page(TEMPLATE, values)?)
 }
 
-/// What is said of a controller on all axes.
+/// Summary of a controller on all axes.
 struct Standing {
     kind: Kind,
-    /// Random combinations that it has missed, and those played.
+    /// Missed random combinations, and played ones.
     missed: u64,
     combinations: u64,
     /// Axes on which the large step of the sheet never settles, and those on which it was played.
@@ -393,7 +393,7 @@ impl Standing {
         counts(self) < counts(other) || counts(self) == counts(other) && sum(self) < sum(other)
     }
 
-    /// What it misses of the random combinations, and what the others do; how long its step takes.
+    /// Its share of missed random combinations, and that of the others; the duration of its step.
     fn grounds(&self, others: &str) -> String {
         let mut grounds = Vec::new();
         if self.combinations > 0 {
@@ -416,8 +416,8 @@ impl Standing {
     }
 }
 
-/// The page's first sentence: which controller is best, on what grounds, and which never settle. None where
-/// nothing was played that says so, or some have played less than others.
+/// The page's first sentence: which controller is best, on what grounds, and which never settle. None if the
+/// played cases do not show it, or some controllers have played fewer than others.
 fn best(comparison: &Comparison, judged: &[Judged]) -> Option<String> {
     if comparison.stopped.is_some() {
         return None;
@@ -468,7 +468,7 @@ fn best(comparison: &Comparison, judged: &[Judged]) -> Option<String> {
     })
 }
 
-/// What the supervision made of it.
+/// Faults that the supervision latched.
 fn supervised(comparison: &Comparison) -> String {
     let played = comparison.rows.iter().filter(|r| r.case.feasible).count();
     let controllers = comparison.options.kinds.len();

@@ -1,4 +1,4 @@
-//! One case alone: what happened in it, tick by tick.
+//! A single case, recorded tick by tick.
 
 use std::path::{Path, PathBuf};
 
@@ -12,19 +12,18 @@ use crate::study::{Finished, Job, Settings};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
 use wheeleg_report::results::{CSV, FIGURES, SUMMARY};
 
-/// A case that was played alone.
+/// A case that was run on its own.
 #[derive(Debug, Clone)]
 pub struct Single {
     /// Its row.
     pub row: Row,
-    /// What happened; `None` if it is not feasible.
+    /// Its recording; `None` if it is not feasible.
     pub played: Option<Played>,
-    /// The axis, as it was given.
+    /// The axis, as given.
     pub file: String,
 }
 
-/// Plays the case `id` on the axis that `axes` (built-in names or files) hold under
-/// its name.
+/// Plays the case `id` on the axis of that name among `axes` (built-in names or files).
 ///
 /// # Errors
 /// [`StudyError`] if no axis has the name, or it cannot be used.
@@ -58,8 +57,8 @@ pub fn play(id: &CaseId, axes: &[String]) -> Result<Single, StudyError> {
 }
 
 impl Single {
-    /// Writes `summary.json`, the rows of every measured move as CSV, and a figure of
-    /// each; earlier results in the folder are set aside. The result are the figures.
+    /// Writes `summary.json`, the rows of every measured move as CSV, and a figure of each; earlier results
+    /// in the folder are set aside. Returns the figures.
     ///
     /// # Errors
     /// [`StudyError`] if the folder cannot be used.
@@ -97,7 +96,7 @@ impl Single {
     }
 }
 
-/// A recording as CSV, units in the head line.
+/// A recording as CSV, units in the header line.
 fn rows(trace: &Trace) -> String {
     use std::fmt::Write as _;
     let mut text = String::from(
@@ -179,7 +178,7 @@ pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
     }
 }
 
-/// Range of all points with a little air.
+/// Range of all points with a small margin.
 pub(crate) fn range(series: &[Series]) -> (f64, f64) {
     let values = || series.iter().flat_map(|s| &s.points).map(|p| p.1);
     let (low, high) = (

@@ -1,4 +1,4 @@
-//! What differs from the data sheet in a case, as a word that can be typed.
+//! Deviations from the data sheet in a case, as a word that can be typed.
 
 use std::fmt;
 use std::str::FromStr;
@@ -35,15 +35,15 @@ pub enum Variation {
     Drawn(u64),
 }
 
-/// A word that is no variation.
+/// A word that is not a variation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{word}` is not a variation: {known}", known = known())]
 pub struct UnknownVariation {
     word: String,
 }
 
-/// A variation by a number: its name, what the number is, its smallest and largest value, and how it
-/// is made. An axis may allow less.
+/// A variation by a number: its name, the meaning of the number, its smallest and largest value, and its
+/// constructor. An axis may allow less.
 type Numbered = (&'static str, &'static str, [f64; 2], fn(f64) -> Variation);
 
 /// Every variation by a number.
@@ -57,7 +57,7 @@ const NUMBERED: [Numbered; 7] = [
     ("noise", "FACTOR", [0.0, 100.0], Variation::Noise),
 ];
 
-/// What may be typed.
+/// The accepted words.
 fn known() -> String {
     let numbered =
         NUMBERED.map(|(name, what, [low, high], _)| format!("{name}={what} ({low} to {high})"));
@@ -130,13 +130,13 @@ impl Variation {
         }
     }
 
-    /// The fields of an axis file that stand for it, with their values, where they differ from the sheet's.
+    /// The corresponding fields of an axis file, with their values, if they differ from the sheet's.
     #[must_use]
     pub fn changes(&self, sheet: &AxisParams) -> Vec<Change> {
         let plant = self.factors(sheet).plant(sheet);
         let fields = |p: &AxisParams| {
             let (supply, friction) = (&p.supply, &p.cylinder.friction);
-            // No board of a bench asks the contact: one that would never close is no reason.
+            // No bench board reads the contact, so one that would never close is no reason for a refusal.
             let contact_pa = |pa: f64| pa.min(supply.set_pressure_pa);
             [
                 ("moving.mass", vec![p.moving_mass_kg], "kg"),
@@ -178,10 +178,10 @@ impl Variation {
         changed.map(change).collect()
     }
 
-    /// Refuses what the axis cannot be, as its file would be refused with these values in it.
+    /// Refuses an impossible axis, as its file would be refused with these values in it.
     ///
     /// # Errors
-    /// [`ConfigError`] with the fields of the file, their values and what is allowed.
+    /// [`ConfigError`] with the fields of the file, their values and the allowed ones.
     pub fn ensure_possible(&self, axis: &AxisConfig) -> Result<(), ConfigError> {
         let what = format!("the axis {} cannot be compared with `{self}`", axis.name);
         match self.changes(&axis.axis) {
@@ -190,8 +190,8 @@ impl Variation {
         }
     }
 
-    /// Where the delays come from: as on the sheet, they are the sheet's; else they
-    /// are looked for at start-up, by every controller's board in the same way.
+    /// Source of the delays: as on the sheet, they are the sheet's; otherwise every controller's board
+    /// searches for them at start-up in the same way.
     #[must_use]
     pub const fn start_up(&self) -> StartUp {
         match self {
@@ -281,8 +281,8 @@ mod tests {
         }
     }
 
-    /// What may be typed is played on every built-in axis, or refused in words of its file; a step beyond
-    /// is no variation.
+    /// Every accepted word can be played on every built-in axis, or is refused in terms of its file; a step
+    /// beyond is not a variation.
     #[test]
     fn both_ends_of_every_variation_are_played_or_refused_with_the_field_of_the_file() {
         let (mut played, mut refused) = (0, 0);

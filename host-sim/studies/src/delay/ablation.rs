@@ -1,10 +1,9 @@
-//! What the delay is made of: each contribution taken away in turn.
+//! The causes of the delay: each contribution removed in turn.
 //!
-//! The base is the start from home, held against the stop by the paper's law, with
-//! the bus before it. A contribution is taken away alone, and in a second series on top of
-//! all before it; the second adds up to the whole by construction, the first does
-//! not, and what is left over is the interaction. Every row runs with the same seeds and
-//! the same gains: what is taken away is taken from the plant.
+//! The base is the start from home, held against the stop by the paper's law, with the bus before it. A
+//! contribution is removed alone, and in a second series together with all before it; the second adds up to
+//! the whole by construction, the first does not, and the rest is the interaction. Every row runs with the
+//! same seeds and the same gains: contributions are removed from the plant.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -20,18 +19,18 @@ use crate::study::{Ended, Progress};
 
 /// Most seeds of a row: wait for SYNC, phase of the command and noise.
 const SEEDS: u32 = 20;
-/// A valve so many times larger hardly holds the flow up.
+/// A valve this many times larger hardly restricts the flow.
 const WIDE_OPEN: f64 = 10.0;
-/// Least dead volume \[m³\]: without any, a chamber at its stop has none at all.
+/// Smallest dead volume \[m³\]: without any, a chamber at its stop would have no volume.
 const LEAST_DEAD_M3: f64 = 1e-6;
-/// Slope of the flow function where two pressures are nearly equal, over its
-/// choked value: the shortest time constant of a chamber is so many times shorter.
+/// Slope of the flow function where two pressures are nearly equal, over its choked value: the shortest time
+/// constant of a chamber is this many times shorter.
 const STEEPEST: f64 = 53.0;
 
-/// What a row does to a trial.
+/// Change of a trial for a row.
 type Change = fn(&mut Trial);
 
-/// A contribution that can be taken away.
+/// A contribution that can be removed.
 struct Cause {
     id: &'static str,
     text: &'static str,
@@ -42,7 +41,7 @@ const fn cause(id: &'static str, text: &'static str, remove: Change) -> Cause {
     Cause { id, text, remove }
 }
 
-/// In the order in which the second series takes them away: from the command on.
+/// In the order in which the second series removes them: from the command on.
 const CAUSES: [Cause; 15] = [
     cause(
         "bus",
@@ -121,7 +120,7 @@ const CAUSES: [Cause; 15] = [
     }),
 ];
 
-/// Changes that are no part of the chain: other histories, other commands, other data.
+/// Changes outside the chain: other histories, other commands, other data.
 const VARIATIONS: [Cause; 26] = [
     cause(
         "settle band on",
@@ -219,8 +218,8 @@ fn supply(trial: &mut Trial, gauge_pa: f64) {
     trial.axis.supply.initial_pressure_pa = absolute_pa;
 }
 
-/// A plant step that a small chamber behind a large valve allows: a third of its
-/// shortest time constant, V/(C ρ₀ R T₀) over the steepest flow.
+/// A plant step for a small chamber behind a large valve: a third of its shortest time constant, V/(C ρ₀ R
+/// T₀) over the steepest flow.
 fn fine_step(trial: &mut Trial) {
     let (c, gas) = (&trial.axis.cylinder, &trial.axis.gas);
     let volume_m3 = c.line_volume_m3 + c.dead_volume_a_m3.min(c.dead_volume_b_m3);
@@ -257,24 +256,24 @@ fn tube(trial: &mut Trial, length_m: f64, bore_m: f64) {
 pub struct Row {
     /// Short name.
     pub id: &'static str,
-    /// What is taken away.
+    /// Description of what is removed.
     pub text: &'static str,
-    /// Start delay without this one alone \[s\].
+    /// Start delay without only this one \[s\].
     pub alone_s: f64,
-    /// What it contributes by that: base less `alone_s` \[s\].
+    /// Its contribution by that: base less `alone_s` \[s\].
     pub contribution_s: f64,
     /// Start delay without this one and all before it \[s\].
     pub series_s: f64,
-    /// What it contributes in the series \[s\].
+    /// Its contribution in the series \[s\].
     pub step_s: f64,
 }
 
-/// Something else that was varied.
+/// Another variation.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Variation {
-    /// What.
+    /// Short name.
     pub id: &'static str,
-    /// How.
+    /// Description.
     pub text: &'static str,
     /// Start delay \[s\]; `None` if a start never came.
     pub delay_s: Option<f64>,
@@ -295,11 +294,11 @@ pub struct Ablation {
     pub residual_s: f64,
     /// Sum of the contributions taken alone \[s\].
     pub sum_s: f64,
-    /// What the sum leaves of base less residual \[s\].
+    /// Base less residual less the sum \[s\].
     pub interaction_s: f64,
     /// Without filling and venting: the pressure swap, alone \[s\].
     pub without_swap_s: f64,
-    /// Share of the base that the pressure swap makes \[-\].
+    /// Share of the pressure swap in the base \[-\].
     pub swap_share: f64,
     /// Other changes.
     pub variations: Vec<Variation>,
@@ -308,8 +307,7 @@ pub struct Ablation {
 /// Measures all rows, each with `seeds` seeds or 20, whichever is less.
 ///
 /// # Errors
-/// [`Ended`] if the axis cannot be simulated or does not start in the base case, or the study
-/// is stopped.
+/// [`Ended`] if the axis cannot be simulated or does not start in the base case, or the study is stopped.
 pub fn measure(
     axis: &AxisParams,
     bus: BusPath,

@@ -47,7 +47,7 @@ pub(super) fn figures(study: &Study) -> Vec<Figure> {
 /// End of the abscissa of the starts \[s\].
 const END_S: f64 = 0.35;
 
-/// Shares of starts that have come, over time.
+/// Shares of starts so far, over time.
 fn starts(study: &Study) -> Figure {
     let panel = |law: Law| {
         let series = Start::ALL.map(|start| {

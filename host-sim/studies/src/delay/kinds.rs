@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::axis_sim;
 
-/// Which law drives.
+/// Control law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
@@ -36,7 +36,7 @@ impl Law {
     }
 }
 
-/// From where a move starts.
+/// Start of a move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {

@@ -1,17 +1,16 @@
-//! The start delay of a pneumatic joint: its distribution, its causes, and its end.
+//! The start delay of a pneumatic joint: its distribution, its causes, and how to avoid it.
 //!
-//! The paper reports that model and robot agree but for a delay of 0.25 s, and
-//! leaves the cause to "a more accurate model of the pneumatic circuit" (section 9).
-//! Here the robot's own vertical cylinder stands on a bench ([`crate::axis_sim`]), driven
-//! by the firmware's own law, and
+//! The paper reports that model and robot agree except for a delay of 0.25 s, and leaves the cause to "a more
+//! accurate model of the pneumatic circuit" (section 9). Here the robot's own vertical cylinder is on a bench
+//! ([`crate::axis_sim`]), driven by the firmware's own law, and
 //!
 //! * [`starts`] measures how long a move takes to start, per kind of move;
-//! * [`ablation`] takes the contributions away, each alone and one after the other;
-//! * [`predictions`] tests what the explanation foretells, and its rivals;
-//! * [`preview`] shows what an announced move gains.
+//! * [`ablation`] removes the contributions, each alone and one after the other;
+//! * [`predictions`] tests the predictions of the explanation, and of its rivals;
+//! * [`preview`] shows the gain of an announced move.
 //!
-//! Nothing in the plant is fitted to a delay: the valves' conductance follows from
-//! the stroke time alone. Every trial is a pure function of axis, law and seed.
+//! Nothing in the plant is fitted to a delay: the valves' conductance follows only from the stroke time.
+//! Every trial is a pure function of axis, law and seed.
 
 pub mod ablation;
 mod charts;
@@ -52,14 +51,14 @@ pub const PREVIEW_LIMIT_S: f64 = 0.08;
 /// Largest motion before an announced move \[mm\].
 pub const EARLY_LIMIT_MM: f64 = 1.0;
 
-/// Masses that may be asked for \[kg\]; the step of a robot may allow less.
+/// Accepted masses \[kg\]; the step of a robot may allow less.
 pub const MASS_KG: [f64; 2] = [0.1, 50.0];
-/// Loads that may be asked for \[N\]; the cylinders of a study may start against less.
+/// Accepted loads \[N\]; the cylinders of a study may start only against less.
 pub const LOAD_N: [f64; 2] = [-100.0, 100.0];
-/// Starts per kind of move and law that may be asked for.
+/// Accepted numbers of starts per kind of move and law.
 pub const SEEDS: [u32; 2] = [1, 1000];
 
-/// What is asked for.
+/// Options.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Starts per kind of move and law.
@@ -71,7 +70,7 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// 50 seeds; 1.5 kg, no load (ASSUMED: a rod with carriage, lying).
+    /// 50 seeds; 1.5 kg, no load (ASSUMED: a rod with carriage, horizontal).
     fn default() -> Self {
         Self {
             seeds: 50,
@@ -81,7 +80,7 @@ impl Default for Options {
     }
 }
 
-/// Everything that was measured.
+/// All measurements.
 #[derive(Debug, Serialize)]
 pub struct Study {
     /// Name of the robot.
@@ -243,20 +242,20 @@ fn mean_delay(outcomes: &[Outcome]) -> Option<f64> {
     stats::mean(&delays?)
 }
 
-/// What was measured until the study ended or was stopped.
+/// Measurements until the study ended or was stopped.
 #[derive(Debug)]
 struct Collected {
     starts: starts::Starts,
     ablation: Option<ablation::Ablation>,
     preview: Option<preview::Preview>,
     predictions: Option<predictions::Predictions>,
-    /// What ended it before its end, unless it was stopped.
+    /// Why it failed early, unless it was stopped.
     failure: Option<StudyError>,
 }
 
 impl Collected {
-    /// Measures one part after the other, until one fails or the study is stopped; what was measured
-    /// before is kept.
+    /// Measures one part after the other, until one fails or the study is stopped; earlier measurements are
+    /// kept.
     fn measure(robot: &RobotConfig, options: &Options, progress: &Progress) -> Self {
         let axis = axis_of(robot, options.mass_kg, options.load_n);
         let bus = bus_of(robot);
@@ -303,7 +302,7 @@ impl Collected {
         parts
     }
 
-    /// What `summary.json` holds.
+    /// Contents of `summary.json`.
     fn summary<'a>(&'a self, robot: &'a RobotConfig, options: &Options) -> Summary<'a> {
         Summary {
             robot: &robot.name,
@@ -320,7 +319,7 @@ impl Collected {
         }
     }
 
-    /// The whole study, if it is whole.
+    /// The whole study, if it is complete.
     fn study(self, robot: &RobotConfig, options: &Options) -> Option<Study> {
         Some(Study {
             robot: robot.name.clone(),
@@ -337,7 +336,7 @@ impl Collected {
     }
 }
 
-/// Contents of `summary.json`. A part that a study was stopped before is null.
+/// Contents of `summary.json`. A part is null if the study was stopped before it.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Summary<'a> {
     /// Name of the robot.
@@ -360,7 +359,7 @@ pub struct Summary<'a> {
     predictions: Option<&'a predictions::Predictions>,
     /// Announced moves.
     preview: Option<&'a preview::Preview>,
-    /// What made a part fail; those before it are there.
+    /// Why a part failed; those before it are there.
     failure: Option<String>,
 }
 
@@ -378,12 +377,12 @@ pub fn study(robot: &RobotConfig, options: &Options) -> Result<Study, StudyError
     if let Some(failure) = collected.failure.take() {
         return Err(failure);
     }
-    // Nothing asks the silent one to stop.
+    // Nothing stops the silent one.
     let study = collected.study(robot, options);
     study.ok_or_else(|| StudyError::refused("the study was stopped", ""))
 }
 
-/// Measures and writes everything; the study itself is there if it was not stopped.
+/// Measures and writes everything; returns the study itself if it was not stopped.
 ///
 /// # Errors
 /// [`StudyError`] if a start with these options cannot be simulated or never comes, or the folder cannot

@@ -64,7 +64,7 @@ pub(super) fn findings(study: &Study) -> Vec<String> {
     list
 }
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     version: &'static str,
@@ -74,7 +74,7 @@ struct Page<'a> {
     findings: Vec<String>,
     kinds: Vec<Kind<'a>>,
     predictions: Vec<Predicted<'a>>,
-    /// Those that do not hold, and rivals that are not ruled out.
+    /// Predictions that do not hold, and rivals that are not ruled out.
     rejected: Vec<Predicted<'a>>,
     previews: Vec<Announced<'a>>,
     /// Medians \[s\].

@@ -1,9 +1,8 @@
-//! What the explanation foretells, tested; and its rivals.
+//! Tests of the explanation's predictions, and of its rivals.
 //!
-//! If the delay is a pressure swap (the counter chamber must vent and the drive chamber
-//! fill before the piston can move), then it must depend on pressures, volumes and
-//! conductance in known ways. Each statement below was made before the plant existed;
-//! its band is in the statement, and the verdict is the band's.
+//! If the delay is a pressure swap (the counter chamber must vent and the drive chamber fill before the
+//! piston can move), then it must depend on pressures, volumes and conductance in known ways. Each statement
+//! below was made before the plant existed; it contains its band, and the band decides the verdict.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -19,16 +18,16 @@ use super::trial::{Before, Law, Start, Trial};
 use super::{PAPER_BAND_S, PAPER_DELAY_S};
 use crate::study::{Ended, Progress};
 
-/// A statement and what became of it.
+/// A statement and its result.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Prediction {
     /// Short name.
     pub id: &'static str,
-    /// What is foretold, with its band.
+    /// The prediction, with its band.
     pub statement: String,
-    /// What was measured.
+    /// The measurement.
     pub measured: String,
-    /// The number that the verdict hangs on.
+    /// The number that decides the verdict.
     pub value: f64,
     /// Smallest value that agrees.
     pub min: f64,
@@ -36,13 +35,13 @@ pub struct Prediction {
     pub max: f64,
     /// Whether it does.
     pub holds: bool,
-    /// Whether it is what another cause would do: our explanation is right if it does not hold.
+    /// Whether it predicts the effect of another cause: our explanation is right if it does not hold.
     #[serde(skip)]
     pub rival: bool,
 }
 
 impl Prediction {
-    /// The same, of another cause.
+    /// The same for another cause.
     fn of_a_rival(self) -> Self {
         Self {
             rival: true,

@@ -1,5 +1,4 @@
-//! What an announced move gains: the counter chamber vented and the drive chamber
-//! filled ahead of time.
+//! The gain of an announced move: the counter chamber vented and the drive chamber filled ahead of time.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -12,7 +11,7 @@ use wheeleg_report::stats::{largest, median};
 
 /// Preview \[s\].
 pub const PREVIEWS_S: [f64; 9] = [0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4];
-/// Moves that are announced.
+/// Announced moves.
 const STARTS: [Start; 5] = [
     Start::HomeHeld,
     Start::HomeRest,
@@ -20,7 +19,7 @@ const STARTS: [Start; 5] = [
     Start::MidExtend,
     Start::MidRetract,
 ];
-/// Force beside the axis's own on the move from home \[N\], positive extends.
+/// Force in addition to the axis's own on the move from home \[N\], positive extends.
 const LOADS_N: [f64; 4] = [-30.0, -15.0, 15.0, 30.0];
 
 /// Starts of one kind at one preview, worst of all seeds.
@@ -30,7 +29,7 @@ pub struct Previewed {
     pub law: Law,
     /// Kind of move.
     pub start: Start,
-    /// Load beside the axis's own \[N\].
+    /// Load in addition to the axis's own \[N\].
     pub load_n: f64,
     /// Preview \[s\].
     pub preview_s: f64,
@@ -43,7 +42,7 @@ pub struct Previewed {
 }
 
 impl Previewed {
-    /// Starts in time, and stands until then.
+    /// Whether it starts in time, and stands still until then.
     #[must_use]
     pub fn meets(&self) -> bool {
         self.delay_s.is_some_and(|d| d <= PREVIEW_LIMIT_S) && self.early_mm <= EARLY_LIMIT_MM
@@ -70,7 +69,7 @@ impl Preview {
             .filter(move |r| r.law == law && r.start == start && r.load_n == 0.0)
     }
 
-    /// Shortest preview from which on every longer one meets the bar, without load \[s\].
+    /// Shortest preview from which every longer one meets the bar, without load \[s\].
     #[must_use]
     pub fn enough_s(&self, start: Start) -> Option<f64> {
         let rows: Vec<&Previewed> = self.of(Law::Default, start).collect();

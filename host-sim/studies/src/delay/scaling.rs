@@ -77,7 +77,7 @@ pub(super) fn fit(points: &[(f64, f64)]) -> Line {
     }
 }
 
-/// Seeds of every point, and who watches.
+/// Seeds of every point, and progress.
 #[derive(Clone, Copy)]
 pub(super) struct Work<'a> {
     pub(super) seeds: u32,
@@ -122,7 +122,7 @@ fn bored(axis: &AxisParams, (bore_m, rod_m): (f64, f64), scaled: bool) -> AxisPa
     at
 }
 
-/// The cylinder of the study with every bore that it is tried with, its own first.
+/// The cylinder of the study with every tried bore, its own first.
 pub(super) fn all_bores(axis: &AxisParams) -> Vec<AxisParams> {
     let mut all = vec![axis.clone()];
     for scaled in [false, true] {
@@ -216,7 +216,7 @@ pub(super) fn bores(axis: &AxisParams, stroke_s: f64, work: Work<'_>) -> Result<
                 p.cylinder.vent_valve.flow.conductance_m3_s_pa = conductance_m3_s_pa;
                 p
             };
-            // Bisection: the stroke takes longer the smaller the valves.
+            // Bisection: smaller valves make the stroke longer.
             let (mut low, mut high) = (0.3 * given, 4.0 * given);
             for _ in 0..12 {
                 let middle = 0.5 * (low + high);

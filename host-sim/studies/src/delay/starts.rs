@@ -17,7 +17,7 @@ pub struct Distribution {
     pub start: Start,
     /// Law.
     pub law: Law,
-    /// Starts that never came within the time watched.
+    /// Starts that did not come within the observed time.
     pub never: usize,
     /// Delays in the order of the seeds \[s\].
     pub delay_s: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Distribution {
     pub min_s: f64,
     /// Median \[s\].
     pub median_s: f64,
-    /// Nine of ten are at most this \[s\].
+    /// Nine out of ten are at most this \[s\].
     pub p90_s: f64,
     /// Largest \[s\].
     pub max_s: f64,

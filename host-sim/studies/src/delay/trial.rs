@@ -1,8 +1,8 @@
 //! One start: a history that ends at rest or in motion, a command, and the time
 //! until the piston has moved a millimetre.
 //!
-//! Chamber pressures at the command come from the simulated history alone: every
-//! trial begins with both chambers at the atmosphere and gets to its start by moves.
+//! Chamber pressures at the command come only from the simulated history: every trial begins with both
+//! chambers at atmospheric pressure and reaches its start by moves.
 
 use std::collections::VecDeque;
 
@@ -18,29 +18,29 @@ use super::valve_override::ValveOverride;
 use crate::axis_sim::suite::AxisSimError;
 use crate::axis_sim::{AxisSim, Design, Firmware, Motion, Row, design};
 
-/// A start counts from here: the first motion of this much from where the piston turned \[m\].
+/// The first motion that counts as a start, from where the piston turned \[m\].
 pub const STARTED_M: f64 = 1e-3;
-/// Where a law that is to hold an end stop has its reference, beyond the stop \[m\].
+/// Reference of a law that holds an end stop, beyond the stop \[m\].
 const BEYOND_M: f64 = 1e-3;
 /// Time for the move to the place of the start and for holding there \[s\].
 const HISTORY_S: f64 = 3.0;
-/// An end stop is held for so many seconds more, at most, until the pressures stand.
+/// An end stop is held for at most this many more seconds, until the pressures are steady.
 const HOLD_MORE: u32 = 6;
-/// Pressures stand when a second changes them by less than this \[Pa\].
+/// Pressures are steady if a second changes them by less than this \[Pa\].
 const STANDS_PA: f64 = 500.0;
-/// From the end of the history to the command, without what the seed adds \[s\].
+/// From the end of the history to the command, without the seed's part \[s\].
 const WAIT_S: f64 = 0.5;
-/// Time after the command in which a start is looked for \[s\].
+/// Time after the command to wait for a start \[s\].
 const WATCH_S: f64 = 1.5;
-/// All ticks of a valve on.
+/// A valve on for a whole tick.
 const FULL: u16 = 1000;
 
-/// What happens between the history and the command, beside the law.
+/// Preparation between the history and the command, besides the law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Before {
     /// Nothing.
     Nothing,
-    /// The counter chamber is vented by hand until it is at the atmosphere.
+    /// The counter chamber is vented by hand to atmospheric pressure.
     Vented,
     /// Both chambers are brought to a force balance by hand, the drive chamber to
     /// half of the supply's gauge pressure.
@@ -56,24 +56,24 @@ pub struct Trial {
     pub sheet: AxisParams,
     /// The law.
     pub law: Law,
-    /// From where.
+    /// Start of the move.
     pub start: Start,
     /// Noise, time of the command, place in mid-stroke.
     pub seed: u64,
-    /// How long before the command the board is told of it \[s\].
+    /// How long before the command the board knows of it \[s\].
     pub preview_s: f64,
     /// Whether the command waits for the next bus cycle and its SYNC frame, drawn
     /// from the seed. `None` counts from the set-point in the board.
     pub bus: Option<BusPath>,
-    /// What happens before.
+    /// Preparation before it.
     pub before: Before,
-    /// Both valves of the move are thrown open by the command, without law and PWM.
+    /// The command opens both valves of the move fully, without law and PWM.
     pub thrown: bool,
     /// Instead of a step: duration of an S-curve \[s\].
     pub s_curve_s: Option<f64>,
     /// Largest duty of the law, per mille.
     pub duty_permille: i16,
-    /// Ticks of the law's velocity window; `None` leaves the design's.
+    /// Ticks of the law's velocity window; `None` keeps the design's.
     pub window: Option<u8>,
 }
 
@@ -87,7 +87,7 @@ pub struct BusPath {
 }
 
 impl Trial {
-    /// A start of `axis` with nothing out of the ordinary.
+    /// An ordinary start of `axis`.
     #[must_use]
     pub fn new(axis: &AxisParams, law: Law, start: Start, seed: u64) -> Self {
         Self {
@@ -113,7 +113,7 @@ impl Trial {
             g.stroke_max = g.stroke_max.saturating_add(PositionMm::from_int(5));
             g.stroke_min = g.stroke_min.saturating_sub(PositionMm::from_int(5));
             if self.law == Law::Paper {
-                // The settle band off: the law pushes on against the stop.
+                // Without a settle band the law keeps pushing against the stop.
                 g.settle_band = PositionMm::ZERO;
                 g.minimum_duty = Duty::ZERO;
             }
@@ -128,7 +128,7 @@ impl Trial {
     }
 }
 
-/// What came of it.
+/// Its result.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Outcome {
     /// Command to the first millimetre in its direction \[s\]; `None` if it never moved.
@@ -141,24 +141,24 @@ pub struct Outcome {
     pub stroke_m: f64,
     /// Largest speed after the command \[m/s\].
     pub peak_m_s: f64,
-    /// Command to 99 % of the stroke \[s\], where the move is that long.
+    /// Command to 99 % of the stroke \[s\], if the move is that long.
     pub travel_s: Option<f64>,
     /// Every millisecond from [`LEAD_S`] before the command on.
     #[serde(skip)]
     pub rows: Vec<Row>,
 }
 
-/// Time before the command that an outcome's rows hold \[s\].
+/// Time before the command in an outcome's rows \[s\].
 pub const LEAD_S: f64 = 0.5;
 
-/// Pressures of the chambers as they are \[Pa\].
+/// True pressures of the chambers \[Pa\].
 fn pressures(bench: &AxisSim<ValveOverride>) -> [f64; 2] {
     let model = &bench.axis().assembly.cylinders[0];
     let stroke_m = bench.state.core.motion.stroke_m;
     model.pressures_pa(&bench.state.core.cylinders[0], stroke_m)
 }
 
-/// What the seed decides.
+/// Values drawn by the seed.
 struct Draw {
     /// Time of the command beyond the wait \[ms\]: its phase against pulses and drift.
     phase_ms: u32,
@@ -191,7 +191,7 @@ impl Trial {
         let draw = Draw::new(self.seed);
         let stroke_m = self.axis.cylinder.stroke_m;
         let beyond_m = if self.start.held() { BEYOND_M } else { 0.0 };
-        // Where the history begins, where it ends, and where the move goes.
+        // Begin of the history, its end, and the target of the move.
         let (begin, from_m, to_m) = match self.start {
             Start::HomeHeld | Start::HomeRest => (0.9, stroke_m + beyond_m, 0.1 * stroke_m),
             Start::StopHeld | Start::StopRest => (0.1, -beyond_m, 0.9 * stroke_m),
@@ -246,7 +246,7 @@ impl Trial {
         Ok(self.outcome(&rows[command.saturating_sub(lead)..], lead.min(command)))
     }
 
-    /// To the place of the start, and to rest or to hold there.
+    /// Moves to the place of the start, and rests or holds there.
     fn history(
         &self,
         bench: &mut AxisSim<ValveOverride>,
@@ -256,7 +256,7 @@ impl Trial {
         let mut at_m = begin_m;
         let stroke_m = self.axis.cylinder.stroke_m;
         let inside = matches!(self.start, Start::MidExtend | Start::MidRetract);
-        // A rest inside the stroke is come to from either side, by a move of its own.
+        // A rest inside the stroke is reached from either side, by a separate move.
         let side = if self.seed.is_multiple_of(2) {
             0.1
         } else {
@@ -314,7 +314,7 @@ impl Trial {
         for _ in 0..2000 {
             let p = pressures(bench);
             let mut on = [0; 4];
-            // Within 2 kPa is there: what a short pulse lets through.
+            // Within 2 kPa is enough: the effect of a short pulse.
             for i in 0..2 {
                 if self.before == Before::Vented && i == drive {
                     continue;
@@ -388,8 +388,8 @@ impl Trial {
     }
 }
 
-/// Time until the stroke is [`STARTED_M`] beyond where it turned, interpolated
-/// between rows of a millisecond \[s\].
+/// Time until the stroke is [`STARTED_M`] from its turning point, interpolated between rows of a millisecond
+/// \[s\].
 fn started_s(rows: &[Row], sign: f64) -> Option<f64> {
     let mut turned = f64::INFINITY;
     let mut last = f64::NAN;
@@ -422,7 +422,7 @@ mod tests {
 
     #[test]
     fn a_start_is_found_between_two_rows() {
-        // Stands for 82.3 ms, then 0.1 m/s: a millimetre takes 10 ms.
+        // It stands still for 82.3 ms, then moves at 0.1 m/s: a millimetre takes 10 ms.
         let out = rows(|t| 0.05 + (0.1 * (t - 0.0823)).max(0.0));
         let found = started_s(&out, 1.0).expect("moves");
         assert!((found - 0.0923).abs() < 1e-9, "{found}");
@@ -431,7 +431,7 @@ mod tests {
 
     #[test]
     fn a_start_counts_from_where_the_piston_turned() {
-        // Goes on for 50 ms, and comes back at the same speed.
+        // It continues for 50 ms, and comes back at the same speed.
         let back = rows(|t| 0.05 + 0.2 * (0.05 - (t - 0.05).abs()));
         let found = started_s(&back, -1.0).expect("turns");
         assert!((found - 0.055).abs() < 1e-9, "{found}");

@@ -6,7 +6,7 @@ use wheeleg_control::pwm::OnTimes;
 
 use crate::axis_sim::{Action, Board, Firmware, Sample};
 
-/// The board, and what overrides its valves.
+/// The board, and the override of its valves.
 pub(super) struct ValveOverride {
     pub(super) firmware: Firmware,
     pub(super) forced: Option<OnTimes>,

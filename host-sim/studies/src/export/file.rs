@@ -1,4 +1,4 @@
-//! One exported file; what stands in its place is kept.
+//! One exported file; an existing one in its place is kept.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,11 +16,11 @@ fn free_place_beside(path: &Path) -> PathBuf {
     })
 }
 
-/// Writes a file. One of the same name that says something else is set aside first, as the results
-/// of a run are, unless it is one that the command `reads`; a missing folder is created.
+/// Writes a file. An existing one with other contents is set aside first, like the results of a run, unless
+/// it is one that the command `reads`; a missing folder is created.
 ///
 /// # Errors
-/// [`StudyError::Report`] with the path, and what the operating system said or which input it is.
+/// [`StudyError::Report`] with the path, and the operating system's reason or the input.
 pub fn write_new(
     path: &Path,
     content: impl AsRef<[u8]>,
@@ -28,7 +28,7 @@ pub fn write_new(
 ) -> Result<(), StudyError> {
     ensure_no_input(path, reads)?;
     let content = content.as_ref();
-    // A device may have no end and a pipe no writer: only a file is read.
+    // A device may have no end and a pipe no writer: read only regular files.
     if path.is_file() && std::fs::read(path).is_ok_and(|old| old == content) {
         return Ok(());
     }
@@ -44,8 +44,8 @@ pub fn write_new(
     })
 }
 
-/// Whether there is something that is written to as it stands: a device, or the pipe behind the name
-/// of standard output. A pipe of its own may have no reader, and would be waited for.
+/// Whether the path is written to directly: a device, or the pipe behind the name of standard output. A named
+/// pipe may have no reader, and opening it would block.
 fn is_device(path: &Path) -> bool {
     #[cfg(unix)]
     {

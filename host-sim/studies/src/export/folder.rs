@@ -1,4 +1,4 @@
-//! The folder that an export fills: a new one, there once it is whole.
+//! The folder that an export fills: a new one, which appears once it is complete.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub fn log_of(run: &Path) -> PathBuf {
     }
 }
 
-/// A folder that is being filled beside its place. What is not finished leaves nothing.
+/// A folder that is filled beside its final place. An unfinished one leaves nothing.
 pub(super) struct Filling {
     beside: PathBuf,
     place: PathBuf,
@@ -47,12 +47,12 @@ impl Filling {
         })
     }
 
-    /// Where a file of it is written.
+    /// Temporary path of a file in it.
     pub(super) fn path(&self, name: &str) -> PathBuf {
         self.beside.join(name)
     }
 
-    /// Where that file is in the end, as the user knows it.
+    /// Final path of that file, as the user knows it.
     pub(super) fn shown(&self, name: &str) -> PathBuf {
         self.place.join(name)
     }
@@ -60,7 +60,7 @@ impl Filling {
     /// Puts the folder in its place.
     ///
     /// # Errors
-    /// [`StudyError::Report`] if the operating system does not.
+    /// [`StudyError::Report`] if the operating system fails to.
     pub(super) fn finish(mut self) -> Result<(), StudyError> {
         let moved = fs::rename(&self.beside, &self.place);
         moved.map_err(|e| StudyError::output("put in its place", &self.place, e))?;

@@ -21,10 +21,10 @@ use crate::study::Progress;
 
 /// Name of the column of simulated time.
 const TIME: &str = "t_ns";
-/// Rows of a row group: what stays in memory of each channel.
+/// Rows of a row group: the part of each channel kept in memory.
 const GROUP_ROWS: usize = 8_192;
 
-/// What was written.
+/// Summary of the written files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tables {
     /// Files.
@@ -35,9 +35,9 @@ pub struct Tables {
     pub whole: bool,
 }
 
-/// Writes every channel of the registry that has a message in `log` to `folder`, a new one: `/joint/3`
-/// to `joint-3.parquet`. `None`: it was stopped, and no folder is there. Units and meanings stand in
-/// the files' metadata `wheeleg.columns`.
+/// Writes every channel of the registry that has a message in `log` to `folder`, a new one: `/joint/3` to
+/// `joint-3.parquet`. `None`: it was stopped, and no folder is there. The files' metadata `wheeleg.columns`
+/// has units and meanings.
 ///
 /// # Errors
 /// [`StudyError::Log`] if the log cannot be read, [`StudyError::Refused`] if the folder exists,
@@ -92,7 +92,7 @@ struct Table {
     columns: Vec<Values>,
 }
 
-/// Definition levels and the values that there are.
+/// Definition levels and the existing values.
 fn split<T: Clone>(list: &mut Vec<Option<T>>) -> (Vec<i16>, Vec<T>) {
     let levels = list.iter().map(|v| i16::from(v.is_some())).collect();
     (levels, list.drain(..).flatten().collect())
@@ -126,7 +126,7 @@ impl Values {
             (Self::Whole(v), Scalar::Number(n)) => set_last(v, n as i64),
             (Self::Flag(v), Scalar::Number(n)) => set_last(v, n != 0.0),
             (Self::Text(v), Scalar::Text(text)) => set_last(v, text.into_bytes().into()),
-            // Of another type than the registry has it: no value.
+            // Of another type than in the registry: no value.
             _ => {}
         }
     }
@@ -185,7 +185,7 @@ fn schema(def: &ChannelDef) -> Result<Arc<Type>, ParquetError> {
     whole.build().map(Arc::new)
 }
 
-/// What a file says of its columns, JSON.
+/// Description of a file's columns, JSON.
 fn columns(def: &ChannelDef) -> String {
     let time = serde_json::json!({
         "name": TIME, "unit": "ns", "layer": "host", "meaning": "Simulated time",
@@ -347,11 +347,11 @@ mod tests {
             let row = row.expect("a row");
             assert_eq!(row.get_long(0).expect("t_ns"), i as i64 * 10_000_000);
             assert_eq!(row.get_double(1).expect("x_mm"), i as f64 / 8.0);
-            // No value is null.
+            // A missing value is null.
             assert_eq!(row.get_double(3).is_err(), i == 7, "row {i}");
         }
 
-        // A second export spoils nothing, and what fails leaves nothing.
+        // A second export spoils nothing, and a failed one leaves nothing.
         let again = export(&log, &out, &Progress::silent()).expect_err("refused");
         assert!(again.to_string().contains("is there already"), "{again}");
         let none = folder.path().join("none");

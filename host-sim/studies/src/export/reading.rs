@@ -1,4 +1,4 @@
-//! A log that is read into an export: up to the first message that fails, or until it is stopped.
+//! Reads a log into an export: up to the first message that fails, or until it is stopped.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::StudyError;
 use crate::study::Progress;
 
-/// A log under way.
+/// A log being read.
 pub(super) struct Reading<'a> {
     progress: &'a Progress,
     failed: Option<StudyError>,
@@ -21,7 +21,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// Whether it goes on after the message of `t_ns`, and what became of it.
+    /// Whether to go on after the message of `t_ns`, given its result.
     pub(super) fn after(&mut self, t_ns: u64, result: Result<(), StudyError>) -> ControlFlow<()> {
         self.progress.at(t_ns / 1_000_000);
         self.failed = result.err();
@@ -34,7 +34,7 @@ impl<'a> Reading<'a> {
     /// Whether the log was read to its end; false if it was stopped.
     ///
     /// # Errors
-    /// What made a message fail.
+    /// The error of the message that failed.
     pub(super) fn end(self) -> Result<bool, StudyError> {
         match self.failed {
             Some(failed) => Err(failed),

@@ -8,7 +8,7 @@ use super::{SCENARIOS, Summary, Tried};
 
 const HEIGHT: u32 = 130;
 
-/// A panel for each scenario that has a bar on its speed. Of one seed there is no curve to draw.
+/// A panel for each scenario with a bar on its speed. With one seed there is no curve to draw.
 pub(super) fn figures(summary: &Summary) -> Vec<Figure> {
     if summary.seeds < 2 {
         return Vec::new();

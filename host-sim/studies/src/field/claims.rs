@@ -1,4 +1,4 @@
-//! What the paper says of its field tests, how it is read, and which scenario speaks to it.
+//! The paper's claims about its field tests, their interpretation, and the scenario that tests each.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -9,15 +9,15 @@ use super::{Measured, Tried};
 /// A claim of the paper (section 10 and abstract).
 #[derive(Debug, Clone, Copy)]
 pub struct Claim {
-    /// What stands there.
+    /// The paper's words.
     pub paper: &'static str,
-    /// How it is read here; the paper names no duration, soil or number of rocks.
+    /// Our interpretation; the paper names no duration, soil or number of rocks.
     pub reading: &'static str,
-    /// What was expected before the robot was simulated, from statics and soil laws.
+    /// Expectation before the robot was simulated, from statics and soil laws.
     pub expected: &'static str,
     /// Scenario.
     pub scenario: &'static str,
-    /// Measure that is printed for it.
+    /// Measure printed for it.
     pub measure: Measure,
     /// Share of the runs that must pass.
     pub share: f64,
@@ -72,7 +72,7 @@ pub enum Met {
 }
 
 impl Met {
-    /// As the page shows it.
+    /// As shown on the page.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -83,22 +83,22 @@ impl Met {
     }
 }
 
-/// A claim with what was measured.
+/// A claim with its measurement.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Judged {
-    /// What the paper says.
+    /// The paper's words.
     pub paper: &'static str,
-    /// How it is read.
+    /// Our interpretation.
     pub reading: &'static str,
-    /// What was expected.
+    /// Expectation.
     pub expected: &'static str,
     /// Scenario.
     pub scenario: &'static str,
-    /// What was measured.
+    /// Measurement.
     pub measured: Measured,
     /// Runs that passed.
     pub passed: u64,
-    /// Of so many.
+    /// Number of runs.
     pub runs: u64,
     /// Share of the runs that must pass.
     pub share: f64,
@@ -109,7 +109,7 @@ pub struct Judged {
 }
 
 impl Claim {
-    /// Holds the claim against the scenarios that were tried; `None` if its own was not.
+    /// Judges the claim by the scenarios that were run; `None` if its own was not.
     pub(super) fn judge(&self, tried: &[Tried]) -> Option<Judged> {
         let tried = tried.iter().find(|t| t.scenario == self.scenario)?;
         let measured = tried
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
     use wheeleg_config::builtin;
 
-    /// A claim whose scenario or measure went away would vanish from the page without a word.
+    /// A claim whose scenario or measure was removed would silently vanish from the page.
     #[test]
     fn each_claim_has_a_scenario_with_its_measure_as_a_bar() {
         for claim in CLAIMS {

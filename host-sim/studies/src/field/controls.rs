@@ -1,5 +1,4 @@
-//! The control experiments of co-operation: the same ground with legs and wheels, and with wheels
-//! alone.
+//! The control experiments of co-operation: the same ground with legs and wheels, and with only wheels.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -37,7 +36,7 @@ pub const CONTROLS: &[Control] = &[
     },
 ];
 
-/// What is held against each other: the way of the robot.
+/// The compared measure: the robot's distance.
 const MEASURE: Measure = Measure::Distance;
 
 /// One side of a control experiment.
@@ -45,22 +44,22 @@ const MEASURE: Measure = Measure::Distance;
 pub struct Side {
     /// Scenario.
     pub scenario: &'static str,
-    /// Way of the robot.
+    /// Distance of the robot.
     pub way: Measured,
     /// Runs.
     pub runs: u64,
-    /// Runs in which the tail touched the ground; `None` where that is no bar.
+    /// Runs in which the tail touched the ground; `None` if there is no bar on it.
     pub on_tail: Option<u64>,
 }
 
-/// A control experiment with what was measured.
+/// A control experiment with its measurements.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Compared {
     /// The ground.
     pub ground: &'static str,
     /// Legs and wheels.
     pub legs: Side,
-    /// Wheels alone.
+    /// Only wheels.
     pub idle: Side,
 }
 
@@ -79,7 +78,7 @@ impl Side {
 }
 
 impl Control {
-    /// Both sides; `None` if one was not tried.
+    /// Both sides; `None` if one was not run.
     pub(super) fn compare(&self, tried: &[Tried]) -> Option<Compared> {
         Some(Compared {
             ground: self.ground,
@@ -95,7 +94,7 @@ mod tests {
     use wheeleg_config::{Motion, Scenario, builtin};
     use wheeleg_units::VelocityMmS;
 
-    /// Ground and robot are the same to the last number, or it is no control.
+    /// Without exactly the same ground and robot it would not be a control.
     #[test]
     fn both_sides_of_a_control_stand_on_the_same_ground() {
         for control in CONTROLS {

@@ -1,9 +1,8 @@
-//! The robot in the field: the built-in walks over terrain, each on several seeds, and what the
-//! paper claims beside what was measured.
+//! The robot in the field: the built-in walks over terrain, each on several seeds, and the paper's claims
+//! beside the measurements.
 //!
-//! A seed is that of all noise and, where there are rocks, of the field of rocks: another seed,
-//! another field. A scenario's bars say what a run is held against; a claim names the scenario
-//! that speaks to it, and how it is read.
+//! A seed sets all noise and, if there are rocks, the field of rocks: another seed, another field. A
+//! scenario's bars judge a run; a claim names the scenario that tests it, and its interpretation.
 
 mod charts;
 mod claims;
@@ -51,8 +50,7 @@ pub const SCENARIOS: &[&str] = &[
     "wall-30",
 ];
 
-/// Goals beyond what the paper is read to claim: shown as such, and a run that misses one is no
-/// failure.
+/// Goals beyond the paper's claims: marked as such, and a run that misses one is not a failure.
 pub const STRETCH: &[&str] = &["rock-30-boulder"];
 
 /// Whether a scenario is a stretch goal.
@@ -60,7 +58,7 @@ fn is_stretch(name: &str) -> bool {
     STRETCH.contains(&name)
 }
 
-/// What is asked for.
+/// Options.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Scenarios, of [`SCENARIOS`].
@@ -76,13 +74,13 @@ pub struct Run {
     pub scenario: &'static str,
     /// Seed of noise and rocks.
     pub seed: u64,
-    /// What ended it before its end; null if nothing did.
+    /// Why it ended early; null if it did not.
     pub error: Option<String>,
     /// It came to its end and met all required bars.
     pub passed: bool,
     /// Hash of its log.
     pub hash: String,
-    /// The bars with what was measured.
+    /// The bars with their measurements.
     pub bars: Vec<Target>,
 }
 
@@ -93,7 +91,7 @@ pub struct Measured {
     pub measure: String,
     /// Unit of all values.
     pub unit: &'static str,
-    /// What it is.
+    /// Its meaning.
     pub meaning: String,
     /// Lower end of the bar.
     pub min: Option<f64>,
@@ -103,7 +101,7 @@ pub struct Measured {
     pub required: bool,
     /// Runs in which it is met.
     pub met: u64,
-    /// Mean of the runs that have a value.
+    /// Mean of the runs with a value.
     pub mean: Option<f64>,
     /// Smallest of them.
     pub lowest: Option<f64>,
@@ -116,11 +114,11 @@ pub struct Measured {
 pub struct Tried {
     /// Name.
     pub scenario: &'static str,
-    /// What it is.
+    /// Its description.
     pub description: String,
     /// Robot.
     pub robot: String,
-    /// It is a goal beyond what is claimed.
+    /// It is a goal beyond the claims.
     pub stretch: bool,
     /// Runs.
     pub runs: u64,
@@ -170,14 +168,14 @@ impl Tried {
     }
 }
 
-/// What came of it.
+/// The results.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Summary {
     /// Seeds of each scenario.
     seeds: u32,
-    /// The paper's claims; those whose scenario was not tried are left out.
+    /// The paper's claims, without those whose scenario was not run.
     pub claims: Vec<claims::Judged>,
-    /// Legs and wheels beside wheels alone; those of which one side was not tried are left out.
+    /// Legs and wheels against only wheels, without those of which one side was not run.
     pub controls: Vec<Compared>,
     /// Scenarios.
     pub scenarios: Vec<Tried>,
@@ -211,7 +209,7 @@ impl Summary {
         self.runs.iter().filter(|run| !is_stretch(run.scenario))
     }
 
-    /// Whether every run passed that is no stretch goal.
+    /// Whether every run passed, except for stretch goals.
     #[must_use]
     pub fn passed(&self) -> bool {
         self.judged().all(|run| run.passed)
@@ -222,7 +220,7 @@ impl study::Summary for Summary {
     const SCHEMA: &'static str = "wheeleg.field/1";
 }
 
-/// One run in memory; `None` if it was asked to stop before its end.
+/// One run in memory; `None` if it was stopped before its end.
 fn tried(
     (name, seed): (&'static str, u64),
     stop: &study::Progress,
@@ -261,7 +259,7 @@ fn tried(
 /// Runs everything and writes page, pictures and summary.
 ///
 /// # Errors
-/// [`StudyError`] if a scenario or robot is wrong, or something cannot be drawn or written.
+/// [`StudyError`] if a scenario or robot is wrong, or a result cannot be drawn or written.
 pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>, StudyError> {
     let job = Job::begin("field", settings, &[])?;
     let cases: Vec<(&'static str, u64)> = options

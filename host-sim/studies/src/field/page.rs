@@ -11,7 +11,7 @@ use wheeleg_report::{Picture, page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// What is assumed wherever a number of this page stands.
+/// Assumptions behind every number of this page.
 const ASSUMED: &[&str] = &[
     "Soil: \"volcanic-sand\" was chosen where 20 degrees are near its limit, so climbing them there would be consistency, not evidence.",
     "Wheels: radius 0.15 m; for sand 0.10 m wide with lugs of 15 mm.",
@@ -20,7 +20,7 @@ const ASSUMED: &[&str] = &[
     "Rocks do not move; wheels leave no ruts and push no sand; the paper names no soil, no duration and no number of rocks.",
 ];
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     version: &'static str,
@@ -135,7 +135,7 @@ fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {} %", fixed(1e2 * low, 0), fixed(1e2 * high, 0))
 }
 
-/// The page's first sentence. Scenarios may be chosen of which the paper claims nothing.
+/// The page's first sentence. Chosen scenarios may not belong to any claim of the paper.
 fn verdict(summary: &Summary) -> String {
     let met = summary.claims.iter().filter(|c| c.met == Met::Met).count();
     let passed = summary.judged().filter(|run| run.passed).count();
@@ -216,7 +216,7 @@ pub(super) fn render(
 mod tests {
     use super::*;
 
-    /// Of scenarios that the paper says nothing about, and of one seed, nothing is empty.
+    /// For scenarios without a claim of the paper, and for one seed, nothing is empty.
     #[test]
     fn a_page_without_claims_has_no_section_of_them() {
         let summary = Summary {
@@ -234,7 +234,7 @@ mod tests {
         assert!(page.contains("What is assumed"));
     }
 
-    /// It is shown as what it is, and a run that misses it fails nothing.
+    /// It is marked as a stretch goal, and a run that misses it fails nothing.
     #[test]
     fn a_stretch_goal_that_is_missed_is_no_failure() {
         let name = super::super::STRETCH[0];

@@ -32,7 +32,7 @@ fn curves(
     Panel::new(title, x_range, 190, content)
 }
 
-/// What the caption says about the axes of a figure.
+/// The caption's text about the axes of a figure.
 fn compared(checks: &[AxisCheck], figure: u8, reading: &str) -> String {
     let parts: Vec<String> = checks
         .iter()

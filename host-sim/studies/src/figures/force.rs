@@ -94,7 +94,7 @@ mod tests {
         // A13, A14: inside the axis, positive maximum at the start (MODEL.md §6.2: 25.78 N).
         let check = force.check();
         assert!(check.fits, "{check:?}");
-        // The later steps begin a residual of the motion away from the first.
+        // The later steps begin with a small remaining motion, unlike the first.
         let first = force.instants[0].f6_n;
         assert!((first - 25.78).abs() < 0.01, "{first}");
         assert!(

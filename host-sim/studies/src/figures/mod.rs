@@ -1,5 +1,5 @@
-//! Figs. 5 to 9 of the paper, its misprints, and the precision of the master's kinematics: computed
-//! and drawn by `wheeleg figures`.
+//! Figs. 5 to 9 of the paper, its misprints, and the precision of the master's kinematics: computed and drawn
+//! by `wheeleg figures`.
 
 pub mod audit;
 mod charts;
@@ -34,14 +34,14 @@ const MAP_STEPS: usize = 180;
 /// Steps along s6: 10 mm.
 const MAP_LEVELS: usize = 18;
 
-/// Everything that is shown.
+/// All results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Results {
     /// Both readings of the trajectory of section 6 with their motions.
     pub readings: [(Reading, Vec<Instant>); 2],
     /// Fig. 9.
     pub force: Force,
-    /// Axes of the paper beside what was computed.
+    /// Axes of the paper beside the computed values.
     pub checks: Vec<AxisCheck>,
     /// Equations as printed beside the corrected ones.
     pub misprints: Vec<Misprint>,
@@ -58,7 +58,7 @@ impl Results {
     }
 }
 
-/// What was computed until the study ended or was stopped.
+/// Results until the study ended or was stopped.
 struct Collected {
     readings: [(Reading, Vec<Instant>); 2],
     force: Force,
@@ -75,7 +75,7 @@ impl Collected {
                 "please report this",
             )
         };
-        // Steps of the bar: thousandths of a part.
+        // Steps of the progress bar: thousandths of a part.
         let at = |share: f64| progress.at((1e3 * share) as u64);
         progress.begin("trajectories", 1000);
         let geometry = LegGeometry::new(LegParameters::wheeleg_2003()).map_err(|e| failed(&e))?;
@@ -121,7 +121,7 @@ impl Collected {
         .map(|(name, done)| (name.to_owned(), done))
     }
 
-    /// What `summary.json` holds.
+    /// Contents of `summary.json`.
     fn summary(&self) -> Summary<'_> {
         Summary {
             axes: &self.checks,
@@ -152,10 +152,10 @@ impl Collected {
     }
 }
 
-/// Contents of `summary.json`. A part that the study was stopped before is null.
+/// Contents of `summary.json`. A part is null if the study was stopped before it.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Summary<'a> {
-    /// Axes of the paper beside what was computed.
+    /// Axes of the paper beside the computed values.
     axes: &'a [AxisCheck],
     /// Fig. 9.
     fig9: Fig9,
@@ -193,10 +193,10 @@ struct SinglePrecision {
     pass: bool,
 }
 
-/// Computes and writes everything; the results are there if the study was not stopped.
+/// Computes and writes everything; returns the results if the study was not stopped.
 ///
 /// # Errors
-/// [`StudyError`] if something cannot be computed, drawn or written.
+/// [`StudyError`] if a result cannot be computed, drawn or written.
 pub fn write(settings: &Settings) -> Result<Finished<Option<Results>>, StudyError> {
     let job = Job::begin("figures", settings, &[])?;
     let collected = Collected::compute(&job.progress)?;

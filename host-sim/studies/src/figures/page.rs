@@ -12,14 +12,14 @@ use wheeleg_report::{Picture, page, pictures, plot::Figure};
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     version: &'static str,
     verdict: String,
     figures: Vec<Picture<'a>>,
     axes: &'a [AxisCheck],
-    /// Those that do not hold what is computed.
+    /// Axes that do not hold the computed values.
     misfits: Vec<&'a AxisCheck>,
     misprints: &'a [Misprint],
     equations: usize,

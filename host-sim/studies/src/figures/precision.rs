@@ -1,4 +1,4 @@
-//! Single precision, in which the master computes, against double over the whole workspace.
+//! Single precision, which the master uses, against double over the whole workspace.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -7,8 +7,8 @@ use wheeleg_kinematics::{KinematicsError, LegGeometry, LegParameters};
 /// Largest difference allowed (m): 0.02 mm.
 pub const LIMIT_M: f64 = 0.02e-3;
 
-/// Differences over a grid of strokes, the way the master computes: strokes to lengths to foot, and
-/// foot to lengths to strokes, in `f32`, against `f64`. Rounding of the input is part of it.
+/// Differences over a grid of strokes, computed as in the master: strokes to lengths to foot, and foot to
+/// lengths to strokes, in `f32`, against `f64`. The rounding of the input is included.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PrecisionMap {
     /// Strokes s2 and s5 of the grid (m), equal for both.
@@ -30,8 +30,8 @@ pub struct PrecisionMap {
 }
 
 impl PrecisionMap {
-    /// Computes the map with `n` + 1 strokes of the yaw and the horizontal cylinder and `levels` + 1
-    /// of the vertical one, ends included. `progress` is told the share that is done.
+    /// Computes the map with `n` + 1 strokes of the yaw and the horizontal cylinder and `levels` + 1 of the
+    /// vertical one, ends included. `progress` gets the share that is done.
     ///
     /// # Errors
     /// [`KinematicsError`]; not inside the strokes.
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(map.poses, 61 * 61 * 7);
         assert_eq!((map.forward_m.len(), told.len()), (61 * 61, 61));
         assert_eq!(told.last(), Some(&1.0));
-        // A float of 0.49 m is 3e-8 m from the next; a map of zeros compares a thing with itself.
+        // A float of 0.49 m is 3e-8 m from the next; a map of zeros would compare a value with itself.
         for worst in [map.worst_forward_m, map.worst_inverse_m] {
             assert!(worst > 1e-8 && worst < LIMIT_M, "{worst:e} m");
         }

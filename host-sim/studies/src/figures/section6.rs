@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_kinematics::{FootState, KinematicsError, LegGeometry};
 
-/// How the words "y = sin²(time/8)" and a time axis of 0 to 3.5 are read.
+/// A reading of the words "y = sin²(time/8)" and a time axis of 0 to 3.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// `argument` or `literal`.
@@ -27,7 +27,7 @@ pub struct Reading {
     pub omega_rad_s: f64,
     /// Duration (s).
     pub duration_s: f64,
-    /// Abscissa per second: 1/8 where it is the argument time/8, 1 where it is seconds.
+    /// Abscissa per second: 1/8 if it is the argument time/8, 1 if it is seconds.
     pub abscissa_per_s: f64,
 }
 
@@ -36,8 +36,8 @@ const B6_HOME_M: f64 = 0.19;
 /// Length of the horizontal cylinder at the start (m). PAPER Table 1.
 const B5_START_M: f64 = 0.01;
 
-/// The abscissa is the argument τ = time/8 from 0 to π: 8π s. INFERRED; A, X ASSUMED inside the
-/// window that the axes leave.
+/// The abscissa is the argument τ = time/8 from 0 to π: 8π s. INFERRED; A, X ASSUMED within the range that
+/// the axes allow.
 pub const ARGUMENT: Reading = Reading {
     name: "argument",
     text: "the abscissa is the argument time/8, so the motion lasts 8π = 25.1 s",
@@ -76,7 +76,7 @@ pub struct Instant {
     pub rate_m_s: [f64; 2],
     /// Their accelerations (m/s²).
     pub acceleration_m_s2: [f64; 2],
-    /// Yaw cylinder length, rate and acceleration: must not move.
+    /// Yaw cylinder length, rate and acceleration: it must not move.
     pub yaw: [f64; 3],
 }
 
@@ -97,8 +97,8 @@ impl Reading {
         }
     }
 
-    /// The motion at `n` + 1 instants, by the inverse kinematics (7*), (13*), (16*), and the foot
-    /// by the forward kinematics of what it gave.
+    /// The motion at `n` + 1 instants, by the inverse kinematics (7*), (13*), (16*), and the foot by the
+    /// forward kinematics of its result.
     ///
     /// # Errors
     /// [`KinematicsError`] where no leg can follow.
@@ -127,7 +127,7 @@ impl Reading {
     }
 }
 
-/// An axis of a figure of the paper and what was computed for it.
+/// An axis of a figure of the paper and the values computed for it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AxisCheck {
     /// Id of MODEL.md §11.

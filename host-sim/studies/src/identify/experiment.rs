@@ -1,4 +1,4 @@
-//! The next experiment: of some valve sequences, the one that tells most of what is not known.
+//! The next experiment: of some valve sequences, the one that reveals most of the unknowns.
 
 use super::fit::Problem;
 use super::free::Logs;
@@ -11,16 +11,16 @@ const OUT: [u16; 4] = [1000, 0, 0, 1000];
 const BACK: [u16; 4] = [0, 1000, 1000, 0];
 const SHUT: [u16; 4] = [0; 4];
 
-/// A valve sequence, and what it would tell.
+/// A valve sequence, and its expected information.
 #[derive(Debug, Clone)]
 pub struct Experiment {
     /// Name.
     pub name: &'static str,
-    /// What is done.
+    /// Description.
     pub words: &'static str,
     /// On-times of each ms \[µs\].
     pub on_us: Vec<[u16; 4]>,
-    /// Mean of the logarithms of what would stay unknown, beside the file.
+    /// Mean of the logarithms of the remaining uncertainties, relative to the file.
     pub ignorance: f64,
 }
 
@@ -82,8 +82,8 @@ const SEQUENCES: [(&str, &str, Valves); 6] = [
     ),
 ];
 
-/// All sequences, the most telling first: each after what has been measured already, which has
-/// `known` as its information. Positions are measured every ms, pressures where they were.
+/// All sequences, the most informative first: each after the measurements so far, which have `known` as their
+/// information. Positions are measured every ms, pressures if they were before.
 #[must_use]
 pub fn ranked(
     problem: &Problem<'_>,

@@ -1,8 +1,8 @@
-//! Least squares: the factors under which the plant comes closest to what was measured.
+//! Least squares: the factors that bring the plant closest to the measurement.
 //!
-//! Levenberg–Marquardt in Marquardt's form (Nocedal, Wright: Numerical Optimization, ch. 10), on
-//! logarithms of the factors. The file is a measurement, too: each logarithm has its trust as a
-//! standard deviation, so that what the data cannot tell stays close to where the file has it.
+//! Levenberg–Marquardt in Marquardt's form (Nocedal, Wright: Numerical Optimization, ch. 10), on logarithms
+//! of the factors. The file counts as a measurement, too: each logarithm has its trust as a standard
+//! deviation, so that parameters that the data does not determine stay close to the file's value.
 
 use nalgebra::{DMatrix, DVector};
 use wheeleg_plant::axis::AxisParams;
@@ -20,7 +20,7 @@ const ENOUGH: f64 = 1e-7;
 /// Two-sided 95 % of a normal distribution, in standard deviations.
 pub(super) const Z95: f64 = 1.959_964;
 
-/// Standard deviations of what was measured.
+/// Standard deviations of the measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct Noise {
     /// Of positions \[m\].
@@ -29,14 +29,14 @@ pub struct Noise {
     pub pressure_pa: f64,
 }
 
-/// A measurement to be fitted: the axis as its file has it, and how many ticks count.
+/// A measurement to be fitted: the axis of its file, and the number of ticks that count.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
-    /// File of the axis, as messages name it.
+    /// File of the axis, as named in messages.
     pub file: &'a str,
     /// The axis.
     pub axis: &'a AxisParams,
-    /// What was measured.
+    /// The measurement.
     pub lab: &'a Lab,
     /// Ticks that are fitted.
     pub ticks: usize,
@@ -57,14 +57,14 @@ pub struct Fit {
     pub residuals: DVector<f64>,
 }
 
-/// Standard deviation of what a file is trusted to, logarithm.
+/// Standard deviation of a file's value by its trust, logarithm.
 #[must_use]
 pub fn trust(index: usize) -> f64 {
     FREE[index].trust.ln() / Z95
 }
 
 impl Problem<'_> {
-    /// Residuals over their standard deviation; `None` where there is no such plant.
+    /// Residuals over their standard deviation; `None` if the plant is impossible.
     #[must_use]
     pub fn residuals(&self, logs: &Logs) -> Option<DVector<f64>> {
         let predicted = predict(&applied(self.axis, logs), self.lab, self.ticks).ok()?;
@@ -86,7 +86,7 @@ impl Problem<'_> {
         DVector::from_vec(all)
     }
 
-    /// How the residuals change with each logarithm; `None` where there is no such plant.
+    /// Derivatives of the residuals by each logarithm; `None` if the plant is impossible.
     #[must_use]
     pub fn jacobian(&self, logs: &Logs) -> Option<DMatrix<f64>> {
         self.jacobian_while(logs, &|| true)
@@ -116,7 +116,7 @@ impl Problem<'_> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// The least cost from a start with some factors held at the file's value.
+    /// The smallest cost from a start with some factors held at the file's value.
     pub(super) fn held(
         &self,
         start: &Logs,
@@ -137,7 +137,7 @@ impl Problem<'_> {
         0.5 * (residuals.norm_squared() + trusted)
     }
 
-    /// The least cost from a start; `None` if there is no plant there. `go_on` ends it early.
+    /// The smallest cost from a start; `None` if the plant is impossible there. `go_on` ends it early.
     #[must_use]
     pub fn fit(&self, start: &Logs, go_on: &dyn Fn() -> bool) -> Option<Fit> {
         let residuals = self.residuals(start)?;
@@ -206,7 +206,7 @@ impl Problem<'_> {
     }
 }
 
-/// Standard deviation and correlation of neighbours of positions in a fit's residuals, relative.
+/// Standard deviation and correlation of neighbouring position residuals of a fit, relative.
 #[must_use]
 pub fn scatter(residuals: &DVector<f64>) -> (f64, f64) {
     let n = residuals.len().max(2) as f64;

@@ -1,4 +1,4 @@
-//! What an identification may change: factors on parameters of the axis file.
+//! The free parameters of an identification: factors on parameters of the axis file.
 
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
@@ -13,9 +13,9 @@ pub struct Free {
     pub words: &'static str,
     /// Parameters that it multiplies.
     pub paths: &'static [&'static str],
-    /// What the file is trusted to: its value is right within this factor, 19 times of 20.
+    /// Trust in the file: its value is right within this factor, 19 times out of 20.
     pub trust: f64,
-    /// Multiplies.
+    /// Applies the factor.
     pub(super) apply: fn(&mut AxisParams, f64),
 }
 
@@ -142,7 +142,7 @@ pub fn applied(axis: &AxisParams, logs: &Logs) -> AxisParams {
     changed
 }
 
-/// Least and largest logarithm of each factor that the ranges of the file allow.
+/// Smallest and largest logarithm of each factor that the ranges of the file allow.
 #[must_use]
 pub fn limits(config: &AxisConfig) -> [[f64; 2]; COUNT] {
     FREE.map(|free| {
@@ -153,7 +153,7 @@ pub fn limits(config: &AxisConfig) -> [[f64; 2]; COUNT] {
                 let log = |limit: f64| (limit.max(1e-12 * value) / value).ln();
                 [low.max(log(p.min)), high.min(log(p.max))]
             }
-            // What is nothing has no factor.
+            // A value of zero has no factor.
             _ => [0.0, 0.0],
         })
     })

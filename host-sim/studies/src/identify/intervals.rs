@@ -1,4 +1,4 @@
-//! Intervals of a fit, and what the data do not determine.
+//! Intervals of a fit, and parameters that the data do not determine.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -7,7 +7,7 @@ use super::free::{COUNT, FREE};
 
 /// A parameter is determined if the data leave less than this share of the file's uncertainty.
 const DETERMINED: f64 = 0.5;
-/// Least share of a parameter in a direction that is named.
+/// Smallest share of a parameter that is named in a direction.
 const SHARE: f64 = 0.3;
 
 /// How well the data determine one factor.
@@ -20,7 +20,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Least and largest factor, 95 %.
+    /// Smallest and largest factor, 95 %.
     #[must_use]
     pub fn factors(&self, log: f64) -> [f64; 2] {
         [-1.0, 1.0].map(|sign| (log + sign * Z95 * self.deviation).exp())
@@ -51,11 +51,11 @@ pub fn intervals(information: &DMatrix<f64>) -> [Interval; COUNT] {
     })
 }
 
-/// What can change together without the data noticing, in words: directions in which the data
-/// say less than the file.
+/// Parameters that can change together without an effect on the data, in words: directions in which the data
+/// have less information than the file.
 #[must_use]
 pub fn undetermined(information: &DMatrix<f64>) -> Vec<String> {
-    // In units of what the file is trusted to.
+    // In units of the trust in the file.
     let scaled = DMatrix::from_fn(COUNT, COUNT, |i, k| {
         trust(i) * information[(i, k)] * trust(k)
     });
@@ -94,8 +94,8 @@ pub fn undetermined(information: &DMatrix<f64>) -> Vec<String> {
         .collect()
 }
 
-/// Volume of what is not known, as the mean of the logarithms of the deviations over the file's
-/// along the main directions: 0 is what the file says, smaller is better.
+/// Volume of the uncertainty, as the mean of the logarithms of the deviations over the file's along the main
+/// directions: 0 is that of the file, smaller is better.
 #[must_use]
 pub fn ignorance(information: &DMatrix<f64>) -> f64 {
     let scaled = DMatrix::from_fn(COUNT, COUNT, |i, k| {

@@ -1,8 +1,8 @@
 //! Measurements of a cylinder: a CSV file, read and checked.
 //!
 //! Columns: `time_s`; `position_mm`; the valves either as on-times of a tick of 1 ms (`fill_a_us`,
-//! `vent_a_us`, `fill_b_us`, `vent_b_us`) or as states (`fill_a`, …, 0 or 1) that hold until the
-//! next row; if there are any, `pressure_a_bar` and `pressure_b_bar`, absolute, and `load_n`.
+//! `vent_a_us`, `fill_b_us`, `vent_b_us`) or as states (`fill_a`, …, 0 or 1) that hold until the next row;
+//! optionally `pressure_a_bar` and `pressure_b_bar`, absolute, and `load_n`.
 
 use std::path::Path;
 
@@ -17,18 +17,18 @@ const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
 const PRESSURES: [&str; 2] = ["pressure_a_bar", "pressure_b_bar"];
 /// Longest measurement, s.
 const LONGEST_S: f64 = 600.0;
-/// Largest time that a row may have, s: a clock that counts from 1970 has 2e9.
+/// Largest time of a row, s: a clock that counts from 1970 has 2e9.
 const LATEST_S: f64 = 1e10;
 /// Longest time between two rows, ms.
 const PERIOD_MAX_MS: f64 = 100.0;
 /// Fewest rows.
 const ROWS_MIN: usize = 200;
-/// Fastest piston, m/s: a sensor that tells more has lost its track. As a joint board has it at most.
+/// Fastest piston, m/s: a sensor that shows more has lost its track. The limit of a joint board.
 const FASTEST_M_S: f64 = 20.0;
-/// How far beyond its stroke a position may be, as a share of it: sensors are not set that well.
+/// How far beyond its stroke a position may be, as a share of it: sensors are not adjusted that well.
 const BEYOND: f64 = 0.02;
 
-/// What was measured at a time.
+/// The measured values at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Tick since the begin.
@@ -42,20 +42,20 @@ pub struct Sample {
 /// A measurement, in ticks of 1 ms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lab {
-    /// Its file, as messages name it.
+    /// Its file, as named in messages.
     pub file: String,
     /// On-times of each tick \[µs\].
     pub on_us: Vec<[u16; 4]>,
     /// Force on the rod in each tick \[N\], positive extends; `None`: the axis file's.
     pub load_n: Option<Vec<f64>>,
-    /// What was measured, in order of time.
+    /// The measured values, in order of time.
     pub samples: Vec<Sample>,
 }
 
 /// Longest text of a file that is quoted, characters.
 const QUOTED: usize = 40;
 
-/// What stands in a file, as long as anybody reads it.
+/// Text of a file, shortened to a readable length.
 fn shown(text: &str) -> String {
     shown_at(text, QUOTED)
 }
@@ -98,7 +98,7 @@ impl At<'_> {
     }
 }
 
-/// Where a value stands in a row, and what makes it one in our unit.
+/// Position of a value in a row, and its conversion to our unit.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     column: usize,
@@ -106,9 +106,9 @@ struct Place {
     offset: f64,
 }
 
-/// Where the columns are.
+/// Positions of the columns.
 struct Columns {
-    /// As the file has them.
+    /// Names as in the file.
     names: Vec<String>,
     time: Place,
     position: Place,
@@ -119,8 +119,8 @@ struct Columns {
     load: Option<Place>,
 }
 
-/// What parts the columns of a table: whatever stands most often between the names of its first line.
-/// Tables of many countries' programs have semicolons, as their numbers have commas.
+/// The separator of a table's columns: the character most frequent between the names of its first line.
+/// Programs of many countries use semicolons, since their numbers have commas.
 fn delimiter(text: &str) -> u8 {
     let mut lines = text.lines();
     let head = lines.find(|line| !line.trim().is_empty());
@@ -132,13 +132,13 @@ fn delimiter(text: &str) -> u8 {
             *count += i32::from(byte == *delimiter && !is_quoted);
         }
     }
-    // Of equal ones the first.
+    // If several are equal, the first.
     let most = counts.into_iter().rev().max_by_key(|(_, count)| *count);
     most.map_or(b',', |(delimiter, _)| delimiter)
 }
 
 impl Columns {
-    /// `map` tells where those are that have another name in the file.
+    /// `map` gives the columns that have another name in the file.
     fn of(file: &str, line: u64, names: Vec<String>, map: &[Mapped]) -> Result<Self, StudyError> {
         mapped(file, line, &names, map)?;
         let find = |name: &str| -> Option<Place> {
@@ -185,7 +185,7 @@ impl Columns {
             names,
         };
         if !map.is_empty() {
-            // A table of a user's own has columns that are nothing to us.
+            // A user's own table may have columns that do not concern us.
             return Ok(columns);
         }
         let mut known = vec![columns.time, columns.position];
@@ -207,7 +207,7 @@ impl Columns {
     }
 }
 
-/// Whether each column that is named is in the table, once.
+/// Checks that each named column is in the table, once.
 fn mapped(file: &str, line: u64, names: &[String], map: &[Mapped]) -> Result<(), StudyError> {
     for (place, mapped) in map.iter().enumerate() {
         let Mapped { name, column, .. } = mapped;
@@ -239,7 +239,7 @@ fn mapped(file: &str, line: u64, names: &[String], map: &[Mapped]) -> Result<(),
 }
 
 impl Lab {
-    /// Reads a file; the axis has the ranges, `map` the columns that have another name in it.
+    /// Reads a file; the axis has the ranges, `map` the columns with another name in it.
     ///
     /// # Errors
     /// [`StudyError`] names file, line, column, value and allowed range.
@@ -254,7 +254,7 @@ impl Lab {
         Self::parse(&file, &text, axis, map)
     }
 
-    /// The same from text.
+    /// The same from a text.
     ///
     /// # Errors
     /// As [`Lab::load`].
@@ -293,7 +293,7 @@ impl Lab {
     }
 }
 
-/// The line of a record: the reader counts blank lines before it as a part of it.
+/// The line of a record: the reader counts blank lines before it as part of it.
 fn line_of(text: &str, at: &csv::Position) -> u64 {
     let begin = usize::try_from(at.byte()).ok();
     let rest = begin.and_then(|begin| text.as_bytes().get(begin..));
@@ -302,7 +302,7 @@ fn line_of(text: &str, at: &csv::Position) -> u64 {
     at.line() + blank.filter(|byte| **byte == b'\n').count() as u64
 }
 
-/// A line that is no row of the table.
+/// The error for a line that is not a row of the table.
 fn bad_row(file: &str, text: &str, columns: &[String], error: &csv::Error) -> StudyError {
     const HELP: &str =
         "each line has a value for each column, parted by commas, semicolons or tabs";
@@ -327,7 +327,7 @@ fn bad_row(file: &str, text: &str, columns: &[String], error: &csv::Error) -> St
     )
 }
 
-/// A row as it stands.
+/// A row as read.
 #[derive(Debug, Clone, Copy)]
 struct Row {
     time_s: f64,
@@ -348,7 +348,7 @@ fn row(
             &columns.names[place.column],
             record.get(place.column).unwrap_or(""),
         );
-        // A comma within a cell parts no columns: it is a decimal one.
+        // A comma within a cell does not separate columns: it is a decimal comma.
         let value = match text.split_once(',') {
             Some((whole, decimals)) => format!("{whole}.{decimals}").parse::<f64>(),
             None => text.parse::<f64>(),
@@ -426,7 +426,7 @@ fn row(
     })
 }
 
-/// A piston that hardly moves is one in metres, or one that tells nothing.
+/// Reports a piston that hardly moves: its positions may be in metres, or constant.
 fn units(
     file: &str,
     column: &str,
@@ -454,7 +454,7 @@ fn units(
     ))
 }
 
-/// How far rows are apart as a rule: a clock that jitters has none that is exact.
+/// Usual time between rows: a clock with jitter has no exact one.
 fn period_ms(rows: &[(u64, Row)]) -> f64 {
     let pairs = rows.windows(2);
     let mut apart: Vec<f64> = pairs

@@ -1,4 +1,4 @@
-//! Where the columns of a measurement are in a user's own table.
+//! Maps the columns of a user's own table to those of a measurement.
 
 use std::str::FromStr;
 
@@ -19,19 +19,19 @@ const NAMES: [&str; 13] = [
     "load_n",
 ];
 
-/// One column: `NAME=COLUMN`, and if its unit is another one `NAME=COLUMN*FACTOR+OFFSET`.
+/// One column: `NAME=COLUMN`, or for another unit `NAME=COLUMN*FACTOR+OFFSET`.
 ///
-/// `position_mm=x (m)*1000`, `pressure_a_bar=P1*0.01+1.013`; a column may tell two valves:
-/// `fill_a=V1` and `vent_a=V1*-1+1`.
+/// `position_mm=x (m)*1000`, `pressure_a_bar=P1*0.01+1.013`; a column may hold two valves: `fill_a=V1` and
+/// `vent_a=V1*-1+1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mapped {
     /// Its name here.
     pub name: &'static str,
     /// Its name in the table.
     pub column: String,
-    /// What its values are multiplied by.
+    /// Factor on its values.
     pub factor: f64,
-    /// What is added to them then.
+    /// Offset added to them then.
     pub offset: f64,
 }
 
@@ -55,7 +55,7 @@ impl FromStr for Mapped {
             let (before, after) = text.rsplit_once(sign)?;
             Some((before.to_owned(), number(after)?))
         };
-        // The exponent of a factor has a sign, too: what is a number as a whole has no offset.
+        // The exponent of a factor has a sign, too: a text that is a number as a whole has no offset.
         let (column, factor, offset) = if let Some((column, factor)) = tail(rest, '*') {
             (column, factor, 0.0)
         } else if let Some((before, offset)) = tail(rest, '+') {

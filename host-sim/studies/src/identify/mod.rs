@@ -1,9 +1,9 @@
-//! A user's cylinder from measurements: `wheeleg identify`.
+//! Identifies a user's cylinder from measurements: `wheeleg identify`.
 //!
-//! A measurement ([`lab`]) has what the valves were told and where the piston was. The plant is
-//! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and
-//! judged by the rest. Every parameter gets an interval; what the data cannot tell is said
-//! ([`intervals`]), and which valve sequence would tell most of it ([`experiment`]).
+//! A measurement ([`lab`]) holds the commands of the valves and the position of the piston. The plant is
+//! fitted to its first part ([`fit`]) by factors on parameters of the axis file ([`free`]), and judged by the
+//! rest. Every parameter gets an interval; parameters that the data does not determine are reported
+//! ([`intervals`]), with the valve sequence that would determine most of them ([`experiment`]).
 
 pub mod experiment;
 pub mod fit;
@@ -39,19 +39,19 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 
 /// Starts of the fit: the file, and others around it.
 const STARTS: usize = 4;
-/// Fits of an identification: the starts, and one with the noise that they leave.
+/// Number of fits: the starts, and one with the noise that they leave.
 const FITS: u64 = STARTS as u64 + 1;
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;
-/// A rest of the measurement that is missed by more than this many times the sensor's noise is
-/// not explained by the model.
+/// If the rest of the measurement is missed by more than this many times the sensor's noise, the model does
+/// not explain it.
 const EXPLAINED: f64 = 3.0;
 
 /// The identified axis, below the folder of the results.
 pub const AXIS: &str = "axis.toml";
 /// The next experiment.
 pub const NEXT: &str = "next-experiment.csv";
-/// What an identification writes beside what every study does.
+/// Files of an identification in addition to those of every study.
 const FILES: [&str; 2] = [AXIS, NEXT];
 
 /// One factor.
@@ -65,18 +65,18 @@ pub struct Parameter {
     pub paths: &'static [&'static str],
     /// Factor on the file's value; 1 if that is kept.
     pub factor: f64,
-    /// Least factor, 95 %.
+    /// Smallest factor, 95 %.
     pub low: f64,
     /// Largest factor, 95 %.
     pub high: f64,
-    /// Whether the data determine it; otherwise it is what the file is trusted to.
+    /// Whether the data determine it; otherwise it comes from the trust in the file.
     pub determined: bool,
-    /// Whether the file's value is kept, because that of the fit contradicts others of the axis file.
+    /// Whether the file's value is kept, because the fitted one contradicts others of the axis file.
     pub kept: bool,
 }
 
 impl Parameter {
-    /// What is to be said of its value, in words; empty if the data determine it.
+    /// Remark on its value, in words; empty if the data determine it.
     #[must_use]
     pub fn note(&self) -> &'static str {
         match (self.kept, self.determined) {
@@ -87,43 +87,43 @@ impl Parameter {
     }
 }
 
-/// How far the plant is from what was measured.
+/// Errors of the plant against the measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Misses {
-    /// Root mean square of the position's error in what was fitted \[mm\].
+    /// Root mean square of the position's error in the fitted part \[mm\].
     pub fitted_mm: f64,
-    /// The same in the rest, which the fit has not seen \[mm\].
+    /// The same in the rest, which was not used for the fit \[mm\].
     pub held_out_mm: f64,
 }
 
-/// What came of an identification.
+/// Result of an identification.
 #[derive(Debug, Clone)]
 pub struct Identified {
     /// The axis of the file.
     pub config: AxisConfig,
-    /// What was measured.
+    /// The measurement.
     pub lab: Lab,
-    /// Ticks that were fitted.
+    /// Fitted ticks.
     pub ticks: usize,
-    /// The fit, with what is kept.
+    /// The fit, with the kept values.
     pub fit: Fit,
     /// All factors.
     pub parameters: Vec<Parameter>,
-    /// With the file as it is.
+    /// Errors with the file's values.
     pub before: Misses,
-    /// With the factors.
+    /// Errors with the factors.
     pub after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     pub noise_mm: f64,
-    /// What the data do not determine.
+    /// Parameters that the data do not determine.
     pub undetermined: Vec<String>,
-    /// Next experiments, the most telling first.
+    /// Next experiments, the most informative first.
     pub experiments: Vec<Experiment>,
     /// Stroke by the file and by the fit, at every sample.
     pub played: [Vec<Predicted>; 2],
     /// The identified axis.
     pub toml: String,
-    /// What stopped it before its end.
+    /// Why it stopped before its end.
     pub stopped: Option<Stopped>,
 }
 
@@ -136,24 +136,24 @@ pub struct Summary<'a> {
     rows: usize,
     /// Length of the measurement \[s\].
     measured_s: f64,
-    /// Length of the part that was fitted \[s\].
+    /// Length of the fitted part \[s\].
     fitted_s: f64,
     /// All factors.
     parameters: &'a [Parameter],
-    /// How far the file was off.
+    /// Errors with the file's values.
     before: Misses,
-    /// How far the identified axis is off.
+    /// Errors with the identified axis.
     after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     noise_mm: f64,
     /// Whether the rest of the measurement is met within three times the noise.
     explained: bool,
-    /// Whether the file's own values meet it and the fit's do not: the measurement is too short, and no
-    /// axis is written.
+    /// Whether the file's own values explain it and the fitted ones do not: the measurement is too short, and
+    /// no axis is written.
     worse_than_the_file: bool,
-    /// What the data do not determine.
+    /// Parameters that the data do not determine.
     undetermined: &'a [String],
-    /// The most telling next experiment, null if the plant plays none or the fit was stopped.
+    /// The most informative next experiment, null if the plant can play none or the fit was stopped.
     next_experiment: Option<&'a str>,
 }
 
@@ -161,14 +161,14 @@ impl study::Summary for Summary<'_> {
     const SCHEMA: &'static str = "wheeleg.identify/1";
 }
 
-/// What is asked for.
+/// Options.
 #[derive(Debug, Clone)]
 pub struct Options<'a> {
     /// The measurement.
     pub lab: &'a Path,
     /// Built-in axis or path of an axis file.
     pub axis: &'a str,
-    /// Columns that have another name or unit in the measurement.
+    /// Columns with another name or unit in the measurement.
     pub map: &'a [Mapped],
     /// Fraction of the measurement, at its end, that is held out from the fit, 0.1 to 0.9.
     pub hold_out: f64,
@@ -179,8 +179,8 @@ pub struct Options<'a> {
 /// Identifies an axis, and writes report, figures, `summary.json`, [`AXIS`] and [`NEXT`].
 ///
 /// # Errors
-/// [`StudyError`] if a file is wrong, the plant cannot follow the measurement, or something cannot
-/// be drawn or written.
+/// [`StudyError`] if a file is wrong, the plant cannot follow the measurement, or a result cannot be drawn or
+/// written.
 pub fn identify(
     options: &Options<'_>,
     settings: impl FnOnce(&str) -> Settings,
@@ -195,7 +195,7 @@ pub fn identify(
     Ok(Identified { toml, ..identified }.write(job))
 }
 
-/// Noise of the position by the axis file, and a guess of that of pressures.
+/// Noise of the position by the axis file, and a guess for pressures.
 #[must_use]
 pub fn noise(axis: &AxisParams) -> Noise {
     let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
@@ -224,10 +224,10 @@ fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
     all
 }
 
-/// The best of several fits, if there is any, and what stopped them.
+/// The best of several fits, if there is any, and why they stopped.
 ///
 /// # Errors
-/// [`StudyError::Refused`] if the plant plays the measurement from no start.
+/// [`StudyError::Refused`] if the plant can play the measurement from none of the starts.
 pub fn best(
     problem: &Problem<'_>,
     starts: &[Logs],
@@ -236,14 +236,14 @@ pub fn best(
     let go_on = || !progress.is_stopped();
     let fits = progress.each("starts", starts, |start| {
         let fit = problem.fit(start, &go_on);
-        // One that was under way when the study was stopped has not come to its end.
+        // A fit under way when the study was stopped has not come to its end.
         Ok::<_, StudyError>((fit, go_on()))
     })?;
     let done = fits.iter().flatten().filter(|(_, whole)| *whole).count();
     let stopped = progress.stopped(done as u64, FITS, "fits");
     let fits = fits.into_iter().flatten().filter_map(|(fit, _)| fit);
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-    // Stopped before the first: the file's values are what there is.
+    // Stopped before the first: only the file's values are there.
     let file = || starts.first().and_then(|start| problem.fit(start, &go_on));
     let best = best
         .or_else(file)
@@ -251,7 +251,7 @@ pub fn best(
     Ok((best, stopped))
 }
 
-/// A measurement with which the plant of an axis does not do.
+/// The error for a measurement that the plant of an axis cannot play.
 fn unplayed(problem: &Problem<'_>, what: &str, why: &str) -> StudyError {
     let Problem { file, lab, .. } = problem;
     StudyError::refused(
@@ -260,7 +260,7 @@ fn unplayed(problem: &Problem<'_>, what: &str, why: &str) -> StudyError {
     )
 }
 
-/// Variance of a residual that counts: of residuals that follow each other, fewer do.
+/// Variance of an effective residual: correlated residuals count for fewer.
 fn variance(fit: &Fit, channels: usize) -> f64 {
     let of = |first: usize| {
         let residuals = fit.residuals.iter().skip(first).step_by(channels);
@@ -290,22 +290,22 @@ fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
     }
 }
 
-/// A fit, and what it tells.
+/// A fit, and its information.
 #[derive(Debug, Clone)]
 pub struct Fitted<'a> {
-    /// What was fitted, with the noise that the fit leaves.
+    /// The problem, with the noise that the fit leaves.
     pub problem: Problem<'a>,
     /// The fit of all factors.
     pub fit: Fit,
-    /// Of each factor.
+    /// Interval of each factor.
     pub intervals: [Interval; COUNT],
     /// Information of the data about the logarithms.
     pub information: DMatrix<f64>,
-    /// What stopped it before all starts were tried.
+    /// Why it stopped before all starts were tried.
     pub stopped: Option<Stopped>,
 }
 
-/// The fit of a measurement, with what it tells: used by the study and by its tests.
+/// The fit of a measurement, with its information: used by the study and by its tests.
 ///
 /// # Errors
 /// As [`best`].
@@ -317,7 +317,7 @@ pub fn fitted<'a>(
     let pressures = problem.lab.samples.iter().any(|s| s.pressure_pa.is_some());
     let channels = if pressures { 3 } else { 1 };
     let (first, stopped) = best(problem, &starts(&problem.limits, seed), progress)?;
-    // What the model misses is noise to the fit: the file is not overruled by it.
+    // The model's errors are noise to the fit: they do not overrule the file.
     let share = variance(&first, channels).sqrt();
     let second = Problem {
         noise: Noise {
@@ -342,7 +342,7 @@ pub fn fitted<'a>(
     })
 }
 
-/// What becomes of the axis file under these factors; `said` gives the source of each value.
+/// Changes of the axis file under these factors; `said` gives the source of each value.
 fn changes(
     config: &AxisConfig,
     logs: &Logs,
@@ -364,8 +364,8 @@ fn changes(
     changes
 }
 
-/// A fit that the program accepts in an axis file, and what is held at the file's value for that:
-/// factors that contradict other values of the file.
+/// A fit that the program accepts in an axis file, and the factors held at the file's value for that: those
+/// that contradict other values of the file.
 fn accepted(
     fitted: &Fitted<'_>,
     config: &AxisConfig,
@@ -395,7 +395,7 @@ fn accepted(
             logs[*i] = 0.0;
             is_sound(&logs)
         };
-        // Some contradict each other only: then one of them is held.
+        // Some contradict only each other: then one of them is held.
         let one = || moved.iter().copied().find(mends).unwrap_or(moved[0]);
         refused.extend(if wrong.is_empty() { vec![one()] } else { wrong });
         fit = fitted
@@ -405,19 +405,19 @@ fn accepted(
     Some((fit, refused))
 }
 
-/// What stands between the measurement that left a value open, and what was known of it before.
+/// Text between the measurement that left a value open, and the earlier knowledge of it.
 const UNDETERMINED: &str = " does not determine it; before: ";
-/// What stands before the measurement that a value was kept against.
+/// Text before the measurement against which a value was kept.
 const CONTRADICTS: &str = "; what fits ";
 
-/// Where a value came from before this measurement. What an earlier identification has added to it is
-/// left out: identified again and again, a file says it once.
+/// The source of a value before this measurement, without the additions of an earlier identification:
+/// identified again and again, a file has them once.
 struct Before<'a> {
-    /// The value that was there before any measurement left it open, with its unit.
+    /// The value before any measurement left it open, with its unit.
     value: String,
     /// Its source.
     source: &'a str,
-    /// The source as it stands, without what it was kept against.
+    /// The source as written, without the measurement it was kept against.
     whole: &'a str,
 }
 
@@ -450,7 +450,7 @@ fn left_open(lab: &str, info: &ParameterInfo) -> String {
     format!("ASSUMED: {lab}{UNDETERMINED}{value}, {source}")
 }
 
-/// The source of a value that is kept, as what fits the measurement is none that the file may have.
+/// The source of a value that is kept, because the file may not have the fitted one.
 fn kept_against(lab: &str, info: &ParameterInfo) -> String {
     let whole = Before::of(info).whole;
     format!("{whole}{CONTRADICTS}{lab} contradicts other values of this file")
@@ -498,7 +498,7 @@ impl Identified {
                 words: free.words,
                 paths: free.paths,
                 factor,
-                // What is held moves the others, within their intervals as far as the plant is linear.
+                // Holding one moves the others, within their intervals as far as the plant is linear.
                 low: low.min(factor),
                 high: high.max(factor),
                 determined: intervals[i].determined,
@@ -511,7 +511,7 @@ impl Identified {
             after: misses(&lab, &played[1], ticks),
             noise_mm: noise.position_m * 1e3,
             undetermined: intervals::undetermined(&information),
-            // A fit that was stopped is none to plan with.
+            // A stopped fit is no basis for planning.
             experiments: if stopped.is_some() {
                 Vec::new()
             } else {
@@ -527,20 +527,20 @@ impl Identified {
         })
     }
 
-    /// Whether the rest of the measurement is met.
+    /// Whether the rest of the measurement is explained.
     #[must_use]
     pub fn is_explained(&self) -> bool {
         self.after.held_out_mm <= EXPLAINED * self.noise_mm
     }
 
-    /// Whether the file's own values meet the rest of the measurement and those of the fit do not: what was
-    /// measured is too short to tell more than the file does.
+    /// Whether the file's own values explain the rest of the measurement and the fitted ones do not: the
+    /// measurement is too short to add to the file.
     #[must_use]
     pub fn is_worse_than_the_file(&self) -> bool {
         !self.is_explained() && self.before.held_out_mm <= EXPLAINED * self.noise_mm
     }
 
-    /// The axis file with what was found.
+    /// The axis file with the results.
     ///
     /// # Errors
     /// [`StudyError::Config`] if the program would not accept it.
@@ -570,7 +570,7 @@ impl Identified {
         Ok(toml)
     }
 
-    /// What `summary.json` holds.
+    /// Contents of `summary.json`.
     #[must_use]
     pub fn summary(&self) -> Summary<'_> {
         Summary {
@@ -593,7 +593,7 @@ impl Identified {
         let stopped = self.stopped.clone();
         let summary = json(&self.summary(), stopped.as_ref());
         job.finish(self, summary, stopped, |job, identified| {
-            // Neither a fit that was stopped nor one that is worse than the file is one to build on.
+            // Neither a stopped fit nor one that is worse than the file is a basis for further work.
             if identified.stopped.is_none() && !identified.is_worse_than_the_file() {
                 job.keep(job.save(AXIS, &identified.toml));
             }
@@ -610,8 +610,8 @@ impl Identified {
 mod tests {
     use super::*;
 
-    /// Whoever goes on with the axis that was written, any number of times and in any order, finds where
-    /// each value came from, once.
+    /// If the written axis is identified again, any number of times and in any order, the source of each
+    /// value is still given once.
     #[test]
     fn the_source_of_a_value_that_stays_open_does_not_grow() {
         let config = AxisConfig::load("bench-vq110u").expect("built in");
@@ -626,7 +626,7 @@ mod tests {
                 info.source,
                 format!("ASSUMED: {lab} does not determine it; before: {was}, {own}")
             );
-            // What a fit has made of the value is not what it was.
+            // A fit has changed the value.
             info.value[0] *= 1.1;
         }
         for lab in ["a.csv", "b.csv", "a.csv"] {

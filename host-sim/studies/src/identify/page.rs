@@ -68,7 +68,7 @@ pub(super) fn figures(identified: &Identified) -> Vec<Figure> {
     }]
 }
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     stopped: Option<String>,

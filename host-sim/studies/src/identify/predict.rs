@@ -1,11 +1,11 @@
-//! What the plant does under the valve commands of a measurement.
+//! The plant's response to the valve commands of a measurement.
 
 use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisParams};
 
 use super::lab::{Lab, Sample};
 
-/// What the plant has at a sample.
+/// State of the plant at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Predicted {
     /// Stroke \[m\].
@@ -14,8 +14,8 @@ pub struct Predicted {
     pub pressure_pa: [f64; 2],
 }
 
-/// How the piston stands before the first valve is driven: the mean of what was measured until
-/// then, so that the noise of one sample is not taken for the start.
+/// State of the piston before the first valve is driven: the mean of the measurements until then, so that the
+/// noise of one sample is not taken for the start.
 fn start(lab: &Lab, axis: &AxisParams) -> AxisParams {
     let driven = lab.on_us.iter().position(|on| *on != [0; 4]);
     let until = driven.unwrap_or(0).min(1000);
@@ -36,7 +36,7 @@ fn start(lab: &Lab, axis: &AxisParams) -> AxisParams {
 /// The plant at every sample of the first `ticks` ticks.
 ///
 /// # Errors
-/// Any [`PlantError`]: the parameters are none, or the plant leaves its range.
+/// Any [`PlantError`]: the parameters are invalid, or the plant leaves its range.
 pub(super) fn predict(
     axis: &AxisParams,
     lab: &Lab,

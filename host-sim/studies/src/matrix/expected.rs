@@ -1,4 +1,4 @@
-//! What the user of a row must be told, or must not: an event with its cause, not its text.
+//! Messages that the user of a row must get, or must not: an event with its cause, not its text.
 
 use std::fmt;
 
@@ -15,7 +15,7 @@ use wheeleg_protocol::{
 };
 use wheeleg_telemetry::event::{BadRequest, BoardChange, Cause, ServiceOutcome};
 
-/// An event that is looked for. Boards are bus addresses, 1 to 8.
+/// An expected event. Boards are bus addresses, 1 to 8.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Expected {
     /// Any board latches the fault.
@@ -28,20 +28,19 @@ pub enum Expected {
     AnyLost,
     /// The master misses this board.
     Lost(u8),
-    /// The master tells all axes to hold, for this reason.
+    /// The master commands all axes to hold, for this reason.
     Hold(HoldReason),
-    /// The master finds this, of any board or of none.
+    /// The master reports this finding, about any board or none.
     Found(Finding),
-    /// The master finds this of this board.
+    /// The master reports this finding about this board.
     FoundAt(u8, Finding),
-    /// This board says that the fault was its first.
+    /// This board reports this fault as its first.
     SaysFault(u8, Fault),
-    /// This board says that it has restarted, for this cause.
+    /// This board reports that it has restarted, for this cause.
     SaysReset(u8, ResetCause),
     /// Two boards answer at this address.
     Duplicate(u8),
-    /// This board, of this program's version, has another interface, and the archive tells in
-    /// what it differs.
+    /// This board, of this program's version, has another interface, and the archive says how it differs.
     OtherInterface(u8),
     /// A switch of a foot does not follow the other three.
     FootSwitch(Side, Sector, Warning),
@@ -49,7 +48,7 @@ pub enum Expected {
     ChecksumErrors,
     /// A command is carried out.
     Done(CommandCode),
-    /// A command that was queued is refused because of this board.
+    /// A queued command is refused because of this board.
     Refused(CommandCode, u8),
     /// A command of a flood of them finds the queue to this layer full.
     FloodRefused(Layer),
@@ -57,14 +56,14 @@ pub enum Expected {
     Parameter(u8, &'static str, f64),
     /// This board refuses a service tool's request.
     ServiceRefused(u8, BadRequest, NackReason),
-    /// A parameter of this board is what it was before the service tool's requests.
+    /// A parameter of this board has kept its value from before the service tool's requests.
     ServiceUnchanged(u8),
     /// Messages could not be written to the log: no event, but a count of the recording.
     MessagesLost,
 }
 
 impl Expected {
-    /// Whether this event is what is looked for.
+    /// Whether this event is the expected one.
     pub(super) fn is(self, cause: &Cause) -> bool {
         match cause {
             Cause::Board { board, change } => self.is_change(board.raw(), *change),
@@ -100,7 +99,7 @@ impl Expected {
         }
     }
 
-    /// `about` is the board that the event is about, 0 for none.
+    /// `about` is the board concerned, 0 for none.
     fn is_reported(self, event: &MasterEvent, about: u8) -> bool {
         match (self, *event) {
             (Self::AnyLost, MasterEvent::NodeLost(_)) => true,
@@ -256,7 +255,7 @@ mod tests {
         let wanted = Expected::SaysReset(2, ResetCause::PowerUp);
         assert!(wanted.is(&says(DisarmReason::Reset, ResetCause::PowerUp)));
         assert!(!wanted.is(&says(DisarmReason::Reset, ResetCause::Pin)));
-        // Every board has been switched on once: that alone is no restart.
+        // Every board has been switched on once: that alone is not a restart.
         assert!(!wanted.is(&says(DisarmReason::Fault, ResetCause::PowerUp)));
         let wanted = Expected::SaysReset(2, ResetCause::Watchdog);
         assert!(wanted.is(&says(DisarmReason::Fault, ResetCause::Watchdog)));
@@ -305,7 +304,7 @@ mod tests {
         let earlier = wheeleg_interface::archive::newest_earlier().expect("one");
         let wanted = Expected::OtherInterface(4);
         assert!(wanted.is(&mismatch(earlier, version)));
-        // Nothing is known of it; it is the same; the board says another version.
+        // Not so if nothing is known of it, it is the same, or the board reports another version.
         assert!(!wanted.is(&mismatch(0x1234, version)));
         assert!(!wanted.is(&mismatch(SCHEMA_HASH, version)));
         assert!(!wanted.is(&mismatch(earlier, [9, 9, 9])));

@@ -1,4 +1,4 @@
-//! Holds what was measured against what must come of a row.
+//! Compares the measurements of a row with the required response.
 
 use super::expected::Expected;
 use super::measure::{Measured, line, lost_messages, messages};
@@ -11,23 +11,23 @@ use wheeleg_protocol::{Node, NodeMode};
 use wheeleg_sim::SimError;
 use wheeleg_telemetry::event::{Cause, ServiceOutcome};
 
-/// Wheels must stand within this after their ramp may begin at the latest, ms.
+/// Wheels must stand within this after the latest start of their ramp, ms.
 const WHEEL_STOP_MS: f64 = 440.0;
 /// Sampling of the log and rounding of times, ms.
 const TICK_MS: f64 = 1.0;
 /// Load of the line that counts as full.
 const FULL: f64 = 0.95;
-/// What degrades may leave its course by this before it is stopped, mm.
+/// Largest deviation of a degraded motion before it is stopped, mm.
 pub(super) const DEGRADED_MM: f64 = 40.0;
-/// From the detection to the safe state, where the begin of the trouble is chance, ms.
+/// From the detection to the safe state, if the start of the trouble is random, ms.
 pub(super) const REACTION_MS: f64 = 60.0;
 
-/// How a row came out.
+/// Verdict on a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// As it must.
+    /// As required.
     Pass,
-    /// Not as it must.
+    /// Not as required.
     Fail,
     /// It was not run.
     NotImplemented,
@@ -45,22 +45,22 @@ impl Verdict {
     }
 }
 
-/// A row with what came of it.
+/// A row with its result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The row.
     pub row: Row,
-    /// Whether it came out as it must.
+    /// Whether it passed.
     pub verdict: Verdict,
-    /// What did not, or why it was not run.
+    /// Its failures, or why it was not run.
     pub failures: Vec<String>,
-    /// What parts of a stop may take beyond the limit for all axes.
+    /// Time that parts of a stop may take beyond the limit for all axes.
     pub after_all: AfterAll,
-    /// What was measured.
+    /// The measurements.
     pub measured: Measured,
-    /// The first message of each that the user must be able to read.
+    /// The first of each message that the user must get.
     pub quoted: Vec<String>,
-    /// The faults as they were injected.
+    /// The injected faults.
     pub faults: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ impl Outcome {
     }
 }
 
-/// Collects what is wrong.
+/// Collects failures.
 #[derive(Default)]
 struct Failures(Vec<String>);
 
@@ -111,7 +111,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
             if m.stopped {
                 stop(&mut f, &row, &expected, &after_all, &m);
             } else {
-                // Then nothing of the stop has a time.
+                // Then no part of the stop has a time.
                 f.0.push("not all axes stop".to_owned());
             }
         }
@@ -179,7 +179,7 @@ pub(super) fn judge(row: Row, robot: &RobotConfig, ran: &Ran, m: Measured) -> Ou
     }
 }
 
-/// The first message that is what is looked for, as the user reads it.
+/// The first expected message, as the user reads it.
 fn message(ran: &Ran, expected: Expected) -> Option<String> {
     match expected {
         Expected::MessagesLost => lost_messages(&ran.recording),
@@ -189,7 +189,7 @@ fn message(ran: &Ran, expected: Expected) -> Option<String> {
     }
 }
 
-/// What is left of a stop when all axes are commanded to: beyond their limit, ms.
+/// Remaining parts of a stop once all axes are commanded to stop: beyond their limit, ms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AfterAll {
     /// Until the slowest valve is shut.
@@ -207,7 +207,7 @@ impl AfterAll {
     }
 }
 
-/// Valves that were commanded shut at the latest after `all_ms` let no more air through.
+/// Checks that valves commanded shut at the latest after `all_ms` let no more air through.
 fn physically_shut(f: &mut Failures, after_all: &AfterAll, m: &Measured, all_ms: f64) {
     f.within(
         "valves physically shut",
@@ -311,7 +311,7 @@ fn goes_on(f: &mut Failures, limit_mm: f64, m: &Measured) {
         Some(mm) => f.check(mm <= limit_mm, || {
             format!("a stroke deviates by {mm:.3} mm, allowed {limit_mm}")
         }),
-        // One that stops has failed already.
+        // A motion that stops has failed already.
         None => f.check(m.stopped, || "nothing to compare with".to_owned()),
     }
 }
@@ -392,7 +392,7 @@ mod tests {
         let failures = |m| judge(*row, &robot, &ran, m).failures.join("; ");
         let on = failures(Measured::default());
         assert!(on.contains("detected: never") && on.contains("not all axes stop"));
-        // One that has stopped is judged by every time that it lacks.
+        // A stop is judged by every missing time.
         let stopped = failures(Measured {
             stopped: true,
             ..Measured::default()

@@ -1,5 +1,5 @@
-//! What is measured of a row: latencies on commanded, sensed and physical signals,
-//! latching, deviation, and what the user can read.
+//! Measurements of a row: latencies on commanded, sensed and physical signals, latching, deviation, and
+//! messages to the user.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,18 +15,17 @@ const TICK_S: f64 = 1e-3;
 /// Modes of a board in which its closed loop may drive, as logged.
 const DRIVING: [u8; 2] = [NodeMode::Armed.code(), NodeMode::Tracking.code()];
 const EXHAUST: u8 = NodeMode::Exhaust.code();
-/// The tick in which a staged exhaust is ended, and the time in which its outlets shut: samples.
+/// Samples of the tick in which a staged exhaust ends, and of the closing of its outlets.
 const OUTLETS_SHUT: usize = 10;
 /// A rim slower than this stands, mm/s.
 const STANDING_MM_S: f64 = 5.0;
-/// Motion that tells a reading that stands from rest, mm.
+/// Motion that distinguishes a stuck reading from rest, mm.
 const EXPECTED_MM: f64 = 2.0;
 /// Trapped air is watched for this long after the stop, s.
 const HELD_S: f64 = 0.5;
 
-/// What was measured. Times in ms count from the row's instant; `None`: never. Those of the stop
-/// are `None`, too, where axes go on or none has driven: the last pulse of a motion that goes on
-/// is no latency.
+/// Measurements. Times in ms count from the row's instant; `None`: never. Those of the stop are also `None`
+/// if axes go on or none has driven: the last pulse of a motion that goes on is not a latency.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Measured {
     /// Instant of the fault, s of scenario time.
@@ -35,7 +34,7 @@ pub struct Measured {
     pub since_s: f64,
     /// First latched fault of a board, or the master's HOLD.
     pub detected_ms: Option<f64>,
-    /// Valves of the affected axis commanded shut for good (a wheel: ramp begun).
+    /// Valves of the affected axis commanded shut and staying so (a wheel: ramp begun).
     pub own_commanded_ms: Option<f64>,
     /// The same of the slowest axis.
     pub commanded_ms: Option<f64>,
@@ -47,20 +46,20 @@ pub struct Measured {
     pub wheels_stand_ms: Option<f64>,
     /// Supply dump valve commanded open.
     pub dump_ms: Option<f64>,
-    /// Pressure switch open, as its board sees it.
+    /// Pressure switch open, as its board reads it.
     pub supply_switch_ms: Option<f64>,
     /// Largest sensed movement of a held joint in the half second after the stop, mm.
     pub held_mm: Option<f64>,
-    /// Largest deviation of a true stroke from the same run without the fault, mm; only where
-    /// the motion goes on.
+    /// Largest deviation of a true stroke from the same run without the fault, mm; only if the motion goes
+    /// on.
     pub deviation_mm: Option<f64>,
     /// No axis drives at the end.
     pub stopped: bool,
-    /// No axis drives again, though the cause may be gone and arming was asked for.
+    /// No axis drives again, though the cause may be gone and arming was requested.
     pub latched: bool,
     /// An axis drives at or after the instant.
     pub drives: bool,
-    /// Frames that were put on the line, start-up included.
+    /// Frames put on the line, start-up included.
     pub sent_frames: u64,
     /// Frames that a receiver accepted.
     pub accepted_frames: u64,
@@ -70,13 +69,13 @@ pub struct Measured {
     pub bus_load: f64,
     /// Fewest boards that answered in a cycle in the 0.3 s after the instant.
     pub replies: u8,
-    /// Messages that the log did not take.
+    /// Messages missing in the log.
     pub dropped: u64,
-    /// Everything that the user reads of it, in order of time.
+    /// All messages to the user about it, in order of time.
     pub reads: Vec<String>,
 }
 
-/// An affected axis, 0 to 7, and what cannot be seen of it.
+/// An affected axis, 0 to 7, and its unobservable signals.
 #[derive(Debug, Clone, Copy, Default)]
 struct Blind {
     /// Boards without power or program: their telemetry stands still.
@@ -160,7 +159,7 @@ pub(super) fn measure(row: &Row, ran: &Ran, baseline: Option<&Recording>) -> Mea
     let after = |t: f64| t >= since_s;
     let loads = r.bus.iter().filter(|b| after(b.t_s()));
     m.bus_load = loads.fold(0.0, |most, b| b.v.load.max(most));
-    // A cycle's replies are known, and logged, at the begin of the next.
+    // A cycle's replies are known, and logged, at the start of the next.
     let soon = r.bus.iter();
     let soon = soon.filter(|b| b.t_s() > at_s + 0.02 && b.t_s() < at_s + 0.3);
     m.replies = soon.map(|b| b.v.replies).min().unwrap_or(0);
@@ -262,7 +261,7 @@ fn until_s<S>(last: Option<usize>, rows: &[Sample<S>], from_s: f64) -> Option<f6
     }
 }
 
-/// When the outputs of an axis, 0 to 7, were commanded off for good.
+/// When the outputs of an axis, 0 to 7, were commanded off and stayed so.
 fn shut_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64> {
     match r.joints.get(axis) {
         Some(rows) => open_until_s(rows, from_s, commanded_open),
@@ -270,7 +269,7 @@ fn shut_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64>
     }
 }
 
-/// When the telemetry of an axis, 0 to 7, showed a safe mode for good.
+/// When the telemetry of an axis, 0 to 7, showed a safe mode and kept showing it.
 fn safe_s(r: &Recording, axis: usize, from_s: f64, blind: &Blind) -> Option<f64> {
     if blind.dark[axis] {
         return Some(from_s);
@@ -340,7 +339,7 @@ fn deviation_mm(r: &Recording, baseline: &Recording, from_s: f64) -> Option<f64>
         .max_by(f64::total_cmp)
 }
 
-/// What the robot says from the instant on. What the scenario does is not that.
+/// Messages of the robot from the instant on, without the scenario's own events.
 pub(super) fn messages(ran: &Ran) -> impl Iterator<Item = &Sample<Event>> {
     let from_ns = (ran.at_s * 1e9).round() as u64;
     let silent = [EventKind::Contact, EventKind::Scenario];
@@ -353,13 +352,13 @@ pub(super) fn line(event: &Sample<Event>) -> String {
     format!("{:.3} s: {}", event.t_s(), event.v)
 }
 
-/// That messages are lost, if there are any, as the user reads it.
+/// The message about lost messages, if there are any.
 pub(super) fn lost_messages(recording: &Recording) -> Option<String> {
     let lost = recording.dropped;
     (lost > 0).then(|| format!("{lost} messages could not be written to the log"))
 }
 
-/// What the user reads from the instant on, each line once.
+/// Messages to the user from the instant on, each once.
 fn reads(ran: &Ran) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let lost = lost_messages(&ran.recording);

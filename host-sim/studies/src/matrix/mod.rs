@@ -1,10 +1,10 @@
-//! The fault matrix (host-sim/FAULTS.md): a table of what can go wrong with what must
-//! come of it, run on the simulated robot and held against what was measured.
+//! The fault matrix (host-sim/FAULTS.md): a table of failures with their required responses, run on the
+//! simulated robot and compared with the measurements.
 //!
-//! * [`row`], [`rows`]: the table; [`expected`]: what the user must be told;
+//! * [`row`], [`rows`]: the table; [`expected`]: the messages that the user must get;
 //! * [`run`]: one run per row;
 //! * [`measure`]: latencies, latching, deviation, messages;
-//! * [`judge`]: measured against expected;
+//! * [`judge`]: measurements against requirements;
 //! * [`page`], [`summary`]: report and JSON.
 
 mod expected;
@@ -30,7 +30,7 @@ use crate::StudyError;
 use crate::study::schema::json;
 use crate::study::{Finished, Job, Settings};
 
-/// Rows that came out so.
+/// Rows with this verdict.
 #[must_use]
 pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
     outcomes.iter().filter(|o| o.verdict == verdict).count()
@@ -40,7 +40,7 @@ pub fn count(outcomes: &[Outcome], verdict: Verdict) -> usize {
 /// rows.
 ///
 /// # Errors
-/// [`StudyError`] if a run without a fault fails or something cannot be written.
+/// [`StudyError`] if a run without a fault fails or a result cannot be written.
 pub fn write(
     rows: &[&'static Row],
     seed: u64,
@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(ids, listed);
     }
 
-    /// A second board at an address is found as fast as one that is missing.
+    /// A second board at an address is found as quickly as a missing one.
     #[test]
     fn duplicate_addresses_have_the_limits_of_a_board_that_is_silent() {
         let expected = |id: &str| select(&[id.to_owned()]).expect("a row")[0].expect;

@@ -1,5 +1,5 @@
-//! An operator at a console, in simulated time and without a network: frames, doors and desk are
-//! those of the server, the line between is a script.
+//! An operator at a console, in simulated time and without a network: frames, doors and desk are those of the
+//! server, and a script replaces the line between them.
 
 use std::time::{Duration, Instant};
 
@@ -16,24 +16,24 @@ use wheeleg_telemetry::Recorder;
 
 use super::row::Connection;
 
-/// A frame takes so long, µs; the picture of the robot as well.
+/// Delay of a frame, µs, and of the robot's state for the operator.
 const DELAY_US: u64 = 5_000;
-/// The same on a line that is slow: more than the operator may be late.
+/// The same on a slow line: more than the operator may be late.
 const SLOW_US: u64 = 500_000;
-/// How often the robot is shown, µs.
+/// How often the operator gets the robot's state, µs.
 const PICTURE_US: u64 = 10_000;
-/// How often the operator tells what is seen, ms.
+/// How often the operator sends a beat, ms.
 const BEAT_MS: u64 = 50;
-/// How long the line is cut before the operator connects anew, ms.
+/// How long the line is cut before the operator reconnects, ms.
 const CUT_MS: u64 = 1_000;
-/// Commands that were given meanwhile.
+/// Commands given meanwhile.
 const QUEUED: u64 = 1_000;
 /// How often an intruder tries, ms.
 const INTRUDER_MS: u64 = 20;
-/// Life of a command, ms.
+/// Validity of a command, ms.
 const VALID_MS: u64 = 500;
 
-/// The robot, and who records it.
+/// The robot, and its recorder.
 pub(super) struct Robot<'a, 'r> {
     pub(super) session: &'a mut Session,
     pub(super) recorder: &'a mut Recorder<'r>,
@@ -48,9 +48,9 @@ impl Robot<'_, '_> {
 /// Frames that must have no effect.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Intrusion {
-    /// How many came.
+    /// Number of frames.
     pub(super) frames: u32,
-    /// How many of them had one.
+    /// Number of those that had an effect.
     pub(super) taken: u32,
 }
 
@@ -64,7 +64,7 @@ struct Client {
 
 impl Client {
     fn new(id: ClientId, begin: Instant) -> Self {
-        // Another key for each session, as the handshake gives it.
+        // A different key for each session, as from the handshake.
         let key = Key::new([0x40 + id as u8; 32]);
         Self {
             id,
@@ -85,7 +85,7 @@ impl Client {
     }
 }
 
-/// The server's side: who is in control, and what goes on to the master.
+/// The server's side: who is in control, and what is passed to the master.
 struct Counter {
     desk: Desk,
     /// The wall clock at power-up; only its differences count.
@@ -143,7 +143,7 @@ impl Counter {
         }
     }
 
-    /// What the master says of the control.
+    /// Takes the master's state of control.
     fn look(&mut self, session: &Session) {
         let now_us = session.now_ns() / 1_000;
         let held = session.master().layer0().lease().is_held();
@@ -154,19 +154,19 @@ impl Counter {
     }
 }
 
-/// An operator in control while a robot walks, and what goes wrong with the connection.
+/// An operator in control while a robot walks, and the failure of the connection.
 pub(super) struct Operator {
     connection: Connection,
     counter: Counter,
     holder: Client,
     intruder: Client,
-    /// Frames on their way: when they arrive, µs.
+    /// Frames on their way, with their time of arrival, µs.
     line: Vec<(u64, Vec<u8>)>,
-    /// Newest master time that the operator was shown, µs.
+    /// Newest master time shown to the operator, µs.
     shown_us: u64,
-    /// Frames of the holder that somebody has kept.
+    /// Frames of the holder that an intruder has kept.
     kept: Vec<Vec<u8>>,
-    /// What had to have no effect.
+    /// Frames that must have no effect.
     pub(super) intrusion: Intrusion,
 }
 
@@ -189,7 +189,7 @@ impl Operator {
         }
     }
 
-    /// A millisecond of the scenario, its number `ms`; `since_ms`: after the instant.
+    /// Runs a millisecond of the scenario, its number `ms`; `since_ms`: after the instant.
     pub(super) fn tick(&mut self, ms: u64, since_ms: Option<u64>, robot: &mut Robot<'_, '_>) {
         let now_us = robot.now_us();
         self.counter.look(robot.session);
@@ -238,7 +238,7 @@ impl Operator {
         }
     }
 
-    /// A frame that must have no effect, at a door of `key` that is as far as the holder's.
+    /// Tries a frame that must have no effect, at a door of `key` that is as far as the holder's.
     fn try_door(&mut self, frame: &[u8], key: Option<Key>, robot: &mut Robot<'_, '_>) {
         let now = self.counter.wall(robot.now_us());
         let mut client = Client {
@@ -252,7 +252,7 @@ impl Operator {
         self.intrusion.taken += u32::from(taken);
     }
 
-    /// The holder's next frame with each of its bits the other way, and under another key.
+    /// Tries the holder's next frame with each of its bits flipped, and under another key.
     fn forge(&mut self, frame: &[u8], robot: &mut Robot<'_, '_>) {
         if self.connection != Connection::BadMac {
             return;
@@ -268,20 +268,20 @@ impl Operator {
         self.try_door(&forged, None, robot);
     }
 
-    /// Frames that the holder has sent, once more: at its own door and at another's.
+    /// Repeats frames of the holder: at its own door and at another's.
     fn replay(&mut self, robot: &mut Robot<'_, '_>) {
         for frame in self.kept.clone() {
             self.try_door(&frame, None, robot);
             let other = self.intruder.key.clone();
             self.try_door(&frame, Some(other), robot);
         }
-        // One of those to come before its turn.
+        // A future frame before its turn.
         let next = json!({ "n": self.holder.n + 2, "op": "beat", "seen_us": self.shown_us });
         let early = self.holder.key.seal(next.to_string().as_bytes());
         self.try_door(&early, None, robot);
     }
 
-    /// Another client with the key of control commands, takes and beats.
+    /// Lets another client with the control key send commands, take control and send beats.
     fn intrude(&mut self, now_us: u64, robot: &mut Robot<'_, '_>) {
         let intruder = &mut self.intruder;
         let frames = [
@@ -298,10 +298,10 @@ impl Operator {
         }
     }
 
-    /// A client that connects anew, takes the control and sends what was given while it was cut.
+    /// A client reconnects, takes control and sends the commands that were given while it was cut off.
     fn reconnect(&mut self, now_us: u64, robot: &mut Robot<'_, '_>) {
         let cut_us = now_us - CUT_MS * 1_000;
-        // What was written into the old session does not open the new one.
+        // Frames for the old session are not valid in the new one.
         let queued = |of: &mut Client, i: u64| {
             let args = json!({ "joint": 3, "stroke": 60.0 });
             of.command(cut_us + i * CUT_MS * 1_000 / QUEUED, "JointReference", args)

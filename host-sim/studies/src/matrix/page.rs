@@ -38,12 +38,12 @@ pub(super) fn reaction(row: &Row) -> String {
     }
 }
 
-/// A sum of limits without the tail of its binary fraction.
+/// A sum of limits without the rounding tail of its binary fraction.
 pub(super) fn tidy(ms: f64) -> f64 {
     (ms * 1e3).round() / 1e3
 }
 
-/// Limits by which a row is judged, each for the column of what it limits; none where nothing is.
+/// Limits of a row, each for its column; none if nothing is limited.
 #[derive(Default, Serialize)]
 struct Limits {
     detected: String,
@@ -53,12 +53,12 @@ struct Limits {
     physical: String,
     wheels: String,
     deviation: String,
-    /// Those that have no column.
+    /// Limits without a column.
     others: Vec<String>,
 }
 
 impl Limits {
-    /// Those of a row on which all axes stop, `all_ms` after the fault at the latest.
+    /// Limits of a row in which all axes stop, `all_ms` after the fault at the latest.
     fn all(outcome: &Outcome, all_ms: f64) -> Self {
         let AfterAll {
             physical_ms,
@@ -113,7 +113,7 @@ impl Limits {
 fn what_goes_wrong(outcome: &Outcome) -> String {
     let mut all = outcome.faults.clone();
     if outcome.row.estop {
-        // The instant from which the row counts is that of the E-stop.
+        // The row counts from the instant of the E-stop.
         all.push(format!("E-stop@{:.3}s", outcome.measured.since_s));
     }
     if let Some(connection) = outcome.row.connection {
@@ -126,15 +126,15 @@ fn what_goes_wrong(outcome: &Outcome) -> String {
     all.join(", ")
 }
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
-    /// What stopped the matrix.
+    /// Why the matrix stopped.
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
     seed: u64,
-    /// That of the rows in which the robot walks.
+    /// Scenario of the rows in which the robot walks.
     scenario: &'static str,
     rows: Vec<Shown<'a>>,
     passed: usize,
@@ -194,7 +194,7 @@ pub(super) fn render(
 ) -> Result<String, StudyError> {
     let [passed, failed, missing] = [Verdict::Pass, Verdict::Fail, Verdict::NotImplemented]
         .map(|verdict| count(outcomes, verdict));
-    // What failed comes first, what was not run last.
+    // Failed rows come first, those not run last.
     let rows = [Verdict::Fail, Verdict::Pass, Verdict::NotImplemented].map(|verdict| {
         let rows = outcomes.iter().filter(move |o| o.verdict == verdict);
         rows.map(Shown::new)

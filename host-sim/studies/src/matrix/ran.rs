@@ -1,4 +1,4 @@
-//! What a run of a row leaves for measuring and judging.
+//! Results of a run of a row, for measuring and judging.
 
 use super::operator::Intrusion;
 use wheeleg_config::faults::FaultSpec;
@@ -14,9 +14,9 @@ pub(super) struct Ran {
     pub(super) faults: Vec<FaultSpec>,
     pub(super) recording: Recording,
     pub(super) line: LineAudit,
-    /// Arming was asked for when every fault was over.
+    /// Arming was requested when every fault was over.
     pub(super) arming_asked: bool,
-    /// Frames that had to have no effect.
+    /// Frames that must have no effect.
     pub(super) intrusion: Option<Intrusion>,
     /// From power-up on.
     pub(super) outputs: Outputs,
@@ -24,10 +24,10 @@ pub(super) struct Ran {
     pub(super) error: Option<SimError>,
 }
 
-/// What the joint boards had on their outputs from power-up on, in the time of the start-up, too.
+/// Outputs of the joint boards from power-up on, start-up included.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Outputs {
-    /// Ticks that were looked at, of all joints.
+    /// Checked ticks, of all joints.
     pub(super) ticks: u64,
     /// Ticks among them with a valve energised, or under control.
     pub(super) driven: u64,

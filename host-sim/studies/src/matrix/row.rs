@@ -1,4 +1,4 @@
-//! What a row of the matrix says: what goes wrong, when, and what must come of it.
+//! A row of the matrix: the failure, its time, and the required response.
 
 use super::expected::Expected;
 use wheeleg_config::faults::NOT_IMPLEMENTED;
@@ -54,22 +54,22 @@ pub struct RowFault {
     pub what: &'static str,
     /// Begin after the row's instant, s.
     pub after_s: f64,
-    /// Duration, s; infinite: it stays.
+    /// Duration, s; infinite: permanent.
     pub lasts_s: f64,
 }
 
-/// What must come of it.
+/// The required response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Expect {
     /// Every axis is stopped and stays so.
     Stop(Stop),
-    /// The motion goes on.
+    /// The motion continues.
     GoesOn {
         /// Largest deviation of a stroke from the same run without the fault, mm.
         deviation_mm: f64,
     },
-    /// The motion goes on, or every axis is stopped and stays so; what was not on
-    /// the line is not acted on.
+    /// The motion goes on, or every axis is stopped and stays so; nothing is done that was not commanded on
+    /// the line.
     Degrades,
     /// This board, disarmed, is reset and stays disarmed; nothing else happens.
     Restarts {
@@ -93,7 +93,7 @@ pub struct Stop {
     pub own_ms: f64,
     /// The same of all axes.
     pub all_ms: f64,
-    /// From when on the instant counts.
+    /// Start of the latencies.
     pub since: Since,
 }
 
@@ -102,12 +102,12 @@ pub struct Stop {
 pub enum Since {
     /// The begin of the fault.
     Fault,
-    /// The stroke that the board of this joint reads is 2 mm from that of the same run
-    /// without the fault: before, motion that was expected has not failed to come.
+    /// The stroke that the board of this joint reads is 2 mm from that of the same run without the fault:
+    /// until then, no expected motion is missing.
     Motion(u8),
 }
 
-/// Which robot it happens to.
+/// The robot of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Variant {
     /// As in the robot file.
@@ -118,35 +118,35 @@ pub enum Variant {
     Long,
 }
 
-/// What the user asks of a board's parameters in a row.
+/// A user's request about a board's parameters in a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ask {
     /// Disarm the robot: parameters are stored only then.
     Disarm,
-    /// Set one of a joint's, by name, to a value in its unit.
+    /// Set a parameter of a joint, by name, to a value in its unit.
     Write(u8, &'static str, f64),
-    /// Store those of a board.
+    /// Store a board's parameters.
     Save(u8),
-    /// Read one of a joint's.
+    /// Read a parameter of a joint.
     Read(u8, &'static str),
 }
 
-/// What goes wrong with the connection of an operator who is in control.
+/// Failure of the connection of an operator in control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Connection {
     /// It is cut.
     Lost,
-    /// What the robot sends no longer arrives; what the operator sends does.
+    /// The robot's messages no longer arrive; the operator's do.
     HalfOpen,
-    /// What the operator sends takes 0.5 s.
+    /// The operator's messages take 0.5 s.
     Slow,
-    /// It is cut for 1 s; then the client connects anew and sends 1,000 commands of before.
+    /// It is cut for 1 s; then the client reconnects and sends 1,000 old commands.
     Reconnects,
-    /// Another client commands, takes and beats.
+    /// Another client sends commands, takes control and sends beats.
     SecondClient,
-    /// Frames come with a bit the other way, or under another session's key.
+    /// Frames have a flipped bit, or come under another session's key.
     BadMac,
-    /// Frames come twice, at another session, or before their turn.
+    /// Frames come twice, in another session, or before their turn.
     Replay,
 }
 
@@ -177,32 +177,31 @@ impl Connection {
 pub struct Row {
     /// Its name.
     pub id: &'static str,
-    /// What goes wrong.
+    /// The faults.
     pub faults: &'static [RowFault],
-    /// What the user asks, s after the instant.
+    /// The user's requests, s after the instant.
     pub asks: &'static [(f64, Ask)],
     /// Whether the E-stop is pressed 100 ms after the instant; latencies count from then.
     pub estop: bool,
-    /// What goes wrong with the connection of an operator, who is in control in such a row.
+    /// Failure of the connection of an operator, who is in control in such a row.
     pub connection: Option<Connection>,
     /// When.
     pub phase: Phase,
-    /// How long the run goes on after the instant, s.
+    /// How long the run continues after the instant, s.
     pub after_s: f64,
-    /// To which robot.
+    /// The robot.
     pub variant: Variant,
-    /// What must come of it.
+    /// The required response.
     pub expect: Expect,
-    /// Boards that must go on answering in their slots.
+    /// Boards that must keep answering in their slots.
     pub answering: u8,
-    /// Largest movement of a held joint in the half second after the stop, mm, where
-    /// that is judged.
+    /// Largest movement of a held joint in the half second after the stop, mm, if it is judged.
     pub held_mm: Option<f64>,
-    /// What the user must be able to read: all of it.
+    /// Messages that the user must get: all of them.
     pub reads: &'static [Expected],
-    /// What the user must not read: it would blame what is sound.
+    /// Messages that the user must not get: they would blame a sound part.
     pub silent_about: &'static [Expected],
-    /// Anything that the numbers do not tell.
+    /// Remark beyond the numbers.
     pub note: &'static str,
 }
 
@@ -218,10 +217,10 @@ impl Row {
     }
 }
 
-/// A run goes on for this long after the instant, s.
+/// A run continues for this long after the instant, s.
 const AFTER_S: f64 = 2.0;
 
-/// It stays.
+/// A permanent fault.
 pub(super) const FOR_GOOD: f64 = f64::INFINITY;
 
 /// A row of the matrix.

@@ -16,32 +16,31 @@ use wheeleg_master::finding::Finding;
 use wheeleg_protocol::{Fault, NackReason, ResetCause, Warning};
 use wheeleg_telemetry::event::BadRequest;
 
-/// Watchdog of 50 ms and one bus cycle; not before the watchdog time less the
-/// cycle that has just been heard.
+/// Watchdog of 50 ms and one bus cycle; not before the watchdog time less the cycle heard last.
 const LINK_MS: [f64; 2] = [38.0, 60.0];
 /// Valves shut, or wheel ramp begun, after loss of the link, ms.
 const LINK_SHUT_MS: f64 = 60.0;
-/// Three missed replies in a row: they are known at the begin of the next cycle.
+/// Three missed replies in a row: known at the start of the next cycle.
 const ABSENT_MS: [f64; 2] = [19.0, 41.0];
-/// Then the others are asked to brake, one after the other, ms.
+/// Then the others are commanded to brake, one after the other, ms.
 const ABSENT_SHUT_MS: f64 = 60.0;
 /// Two ticks of the board, and the tick in which the fault begins.
 const SENSOR_MS: [f64; 2] = [0.9, 3.1];
 /// A board stops in the tick in which it sees the fault, ms.
 const SENSOR_SHUT_MS: f64 = 4.1;
-/// The next reply tells the master, and the next cycle asks the others to brake, ms.
+/// The next reply reports it to the master, and the next cycle commands the others to brake, ms.
 const OTHERS_MS: f64 = 35.0;
 /// Two bus cycles and a tick: every board has heard the E-stop, ms.
 const ESTOP_MS: f64 = 23.0;
 
-/// An operator was seen last up to 65 ms before the line goes wrong, is gone 400 ms after that, and
+/// The operator was last heard up to 65 ms before the line fails, counts as gone 400 ms after that, and is
 /// missed at the next cycle.
 const OPERATOR_MS: [f64; 2] = [330.0, 420.0];
 /// All boards have heard of it, ms.
 const OPERATOR_SHUT_MS: f64 = 460.0;
 const OPERATOR_GONE: &[Expected] = &[Hold(HoldReason::OperatorLost)];
 
-/// A user changes a parameter and stores it, and looks at it later.
+/// A user changes a parameter, stores it, and reads it later.
 const SAVE: [(f64, Ask); 5] = [
     (-0.3, Ask::Disarm),
     (-0.2, Ask::Read(3, FOLLOWING)),
@@ -49,14 +48,14 @@ const SAVE: [(f64, Ask); 5] = [
     (0.0, Ask::Save(3)),
     (0.8, Ask::Read(3, FOLLOWING)),
 ];
-/// A fault that outlasts its detection and ends before arming is asked for: if that is then
-/// refused, it is because the fault is latched.
+/// A fault that outlasts its detection and ends before arming is requested: if that is then refused, it is
+/// because the fault is latched.
 const LONG_S: f64 = 1.2;
 /// The same in the longer runs.
 const LONGER_S: f64 = 2.7;
 const FOLLOWING: &str = "following_error";
 
-/// Faults by which a board tells that its axis does not follow.
+/// Faults by which a board reports that its axis does not follow.
 const STUCK: &[Fault] = &[Fault::NoMotion, Fault::FollowingError];
 const LEFT_FRONT_CLOSED: Expected =
     FootSwitch(Side::Left, Sector::Front, Warning::SwitchStuckClosed);
@@ -72,7 +71,7 @@ const fn later(what: &'static str, after_s: f64, lasts_s: f64) -> RowFault {
     }
 }
 
-/// A board refuses all that a service tool asks for, and changes nothing.
+/// A board refuses all requests of a service tool, and changes nothing.
 const fn refusals(board: u8) -> [Expected; 4] {
     [
         ServiceRefused(board, BadRequest::AboveLimit, NackReason::OutOfRange),

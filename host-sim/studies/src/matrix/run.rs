@@ -27,7 +27,7 @@ use wheeleg_sim::faults::check;
 use wheeleg_sim::{self as sil, Boards, JointProbe, LineAudit, Observers, Session, SimError};
 use wheeleg_telemetry::{Recorder, Recording};
 
-/// Arming is asked for this long before the end, s.
+/// Arming is requested this long before the end, s.
 const ARM_S: f64 = 0.6;
 /// Steps of the long walk.
 const LONG_STEPS: u16 = 18;
@@ -36,15 +36,15 @@ const LONG_STEPS: u16 = 18;
 struct Robots {
     scenario: Scenario,
     robots: [RobotConfig; 3],
-    /// By the robot and by whether it stands.
+    /// By the robot and whether it stands.
     baselines: BTreeMap<(Variant, bool), Baseline>,
     seed: u64,
 }
 
-/// A run without a fault, with which others are compared.
+/// A run without a fault, as a reference for others.
 #[derive(Default)]
 struct Baseline {
-    /// As long as the longest run that is compared with it.
+    /// Length of the longest run that is compared with it.
     duration_s: f64,
     /// None if the study was stopped in it.
     run: OnceLock<Option<Result<Recording, String>>>,
@@ -65,7 +65,7 @@ impl Robots {
             baselines: BTreeMap::new(),
             seed,
         };
-        // The long walk is too long to be made twice.
+        // The long walk is too long to run twice.
         for row in rows.iter().filter(|row| row.variant != Variant::Long) {
             let duration_s = robots.duration_s(row);
             let baseline = robots.baselines.entry(compared_with(row)).or_default();
@@ -99,13 +99,12 @@ impl Robots {
         }
     }
 
-    /// How long a row's run is, s.
+    /// Duration of a row's run, s.
     fn duration_s(&self, row: &Row) -> f64 {
         instant_s(row, self.robot(row.variant), self.seed) + row.after_s
     }
 
-    /// The same run without the fault, which the long walk does not have; none at all if the study
-    /// is stopped in it.
+    /// The same run without the fault, which the long walk does not have; none if the study is stopped in it.
     fn baseline(
         &self,
         row: &Row,
@@ -125,7 +124,7 @@ impl Robots {
             .map_err(|e| StudyError::refused(format!("the run without a fault fails: {e}"), ""))
     }
 
-    /// What comes of a row; none if the study is stopped in it.
+    /// The outcome of a row; none if the study is stopped in it.
     fn run(&self, row: &Row, progress: &Progress) -> Result<Option<Outcome>, StudyError> {
         let robot = self.robot(row.variant);
         if let Some(reason) = row.not_implemented() {
@@ -184,7 +183,7 @@ impl Robots {
     }
 }
 
-/// What a user asks of a board's parameters.
+/// The command for a user's request about a board's parameters.
 ///
 /// # Panics
 /// If a row names a parameter that its board does not have.
@@ -208,7 +207,7 @@ fn asked(ask: &Ask) -> Command {
     }
 }
 
-/// Robot, and whether it stands, of the run without a fault that is a row's.
+/// Robot, and whether it stands, of a row's run without a fault.
 fn compared_with(row: &Row) -> (Variant, bool) {
     (row.variant, stands(row.phase))
 }
@@ -264,7 +263,7 @@ fn simulate(
     })
 }
 
-/// What was recorded, and what failed first.
+/// The recording, and the first failure.
 fn recorded(recorder: Recorder<'_>, failed: Option<SimError>) -> (Recording, Option<SimError>) {
     match recorder.finish() {
         Ok(recording) => (recording, failed),
@@ -272,7 +271,7 @@ fn recorded(recorder: Recorder<'_>, failed: Option<SimError>) -> (Recording, Opt
     }
 }
 
-/// The same with an operator in control, whose connection goes wrong at `at_s`.
+/// The same with an operator in control, whose connection fails at `at_s`.
 fn operated(
     scenario: &Scenario,
     robot: &RobotConfig,
@@ -385,10 +384,10 @@ fn faults(row: &Row, at_s: f64) -> Result<Vec<FaultSpec>, StudyError> {
         .collect()
 }
 
-/// Rows by name; all where `ids` is empty.
+/// Rows by name; all if `ids` is empty.
 ///
 /// # Errors
-/// [`StudyError::Refused`] for a name that no row has, and for one that is not implemented.
+/// [`StudyError::Refused`] for an unknown name, and for a row that is not implemented.
 pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, StudyError> {
     if ids.is_empty() {
         return Ok(ROWS.iter().collect());
@@ -417,7 +416,7 @@ pub fn select(ids: &[String]) -> Result<Vec<&'static Row>, StudyError> {
     Ok(rows)
 }
 
-/// Rows that a name which none has may stand for: those that begin with it, else the nearest.
+/// Rows that an unknown name may mean: those that begin with it, otherwise the nearest.
 fn meant(id: &str) -> String {
     let ids = ROWS.iter().map(|row| row.id);
     let begin: Vec<String> = ids
@@ -431,7 +430,7 @@ fn meant(id: &str) -> String {
     wheeleg_config::closest(id, ids).map_or_else(String::new, |n| format!("; did you mean `{n}`?"))
 }
 
-/// Runs rows, as far as the study is not stopped.
+/// Runs rows, until the study is stopped.
 ///
 /// # Errors
 /// [`StudyError`] if a run without a fault fails, or a row of the table is wrong.
@@ -482,8 +481,8 @@ mod tests {
         }
     }
 
-    /// A row is compared with a run that does what its own does: of two rows on one robot, one that
-    /// stands and one that walks, each has its own.
+    /// A row is compared with a run of the same motion: of two rows on one robot, one that stands and one
+    /// that walks, each has its own.
     #[test]
     fn a_row_that_stands_is_not_compared_with_one_that_walks() {
         let of = |standing: bool, variant: Variant| {

@@ -19,9 +19,9 @@ pub struct Summary<'a> {
     #[serde(serialize_with = "study::schema::seed_text")]
     #[schemars(with = "String")]
     seed: u64,
-    /// Rows that came out as they must.
+    /// Rows that passed.
     passed: usize,
-    /// Rows that did not.
+    /// Rows that failed.
     failed: usize,
     /// Rows that are not implemented, and were not run.
     not_implemented: usize,
@@ -33,43 +33,43 @@ impl study::Summary for Summary<'_> {
     const SCHEMA: &'static str = "wheeleg.faults/2";
 }
 
-/// A row with what came of it.
+/// A row with its result.
 #[derive(Debug, Serialize, JsonSchema)]
 struct RowSummary<'a> {
     /// Name.
     row: &'static str,
-    /// The faults as they were injected.
+    /// The injected faults.
     faults: &'a [String],
     /// When the fault begins.
     phase: &'static str,
-    /// What must come of it.
+    /// The required response.
     expected: Expected,
-    /// What did; null if it was not run.
+    /// The measurements; null if it was not run.
     measured: Option<&'a Measured>,
     /// Whether the stop is latched; null if it was not run.
     latched: Option<bool>,
-    /// Whether it came out as it must; null if it was not run.
+    /// Whether it passed; null if it was not run.
     pass: Option<bool>,
     /// The same in words.
     verdict: &'static str,
-    /// What did not come out as it must, or why the row was not run.
+    /// Its failures, or why the row was not run.
     failures: &'a [String],
     /// A remark.
     note: &'static str,
 }
 
-/// What must come of a row.
+/// The required response of a row.
 #[derive(Debug, Serialize, JsonSchema)]
 struct Expected {
     /// In words.
     reaction: String,
     #[serde(flatten)]
     limits: Limits,
-    /// What the user must be able to read.
+    /// Messages that the user must get.
     reads: Vec<String>,
 }
 
-/// Limits of what must come of a row, by the kind of it. Times in ms.
+/// Limits of the required response of a row, by its kind. Times in ms.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum Limits {
@@ -87,9 +87,9 @@ enum Limits {
         physical_ms: f64,
         /// Both rims stand.
         wheels_stand_ms: f64,
-        /// The supply is dumped; null where no E-stop is pressed.
+        /// The supply is dumped; null if no E-stop is pressed.
         dump_ms: Option<f64>,
-        /// Axes held within so many mm.
+        /// Axes are held within this many mm.
         held_mm: Option<f64>,
         /// Whether the stop must be latched.
         latched: bool,
@@ -109,7 +109,7 @@ enum Limits {
         physical_ms_after_detection: f64,
         /// Both rims stand, from the detection on.
         wheels_stand_ms_after_detection: f64,
-        /// Largest deviation where nothing is detected.
+        /// Largest deviation if nothing is detected.
         deviation_mm_without_detection: f64,
         /// When the stop must be latched.
         latched: &'static str,
@@ -119,7 +119,7 @@ enum Limits {
 }
 
 impl<'a> Summary<'a> {
-    /// Of what came of the rows.
+    /// From the outcomes of the rows.
     #[must_use]
     pub fn new(outcomes: &'a [Outcome], seed: u64) -> Self {
         Self {

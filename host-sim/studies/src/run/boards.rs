@@ -1,4 +1,4 @@
-//! Boards outside of this process, as the page shows them.
+//! Boards outside of this process, for the page.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use wheeleg_remote_host::{BoardFigures, PilSummary};
 pub(super) struct Boards<'a> {
     summary: &'a PilSummary,
     nodes: Vec<Node<'a>>,
-    /// Something was compared and nothing differed: nothing compared is nothing shown.
+    /// Something was compared and nothing differed: without a comparison nothing is proven.
     equal: bool,
 }
 

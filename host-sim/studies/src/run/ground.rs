@@ -1,5 +1,4 @@
-//! The terrain as the page draws it: heights along both wheels' tracks, and rocks and blocks from
-//! above.
+//! The terrain for the page's drawing: heights along both wheels' tracks, and rocks and blocks from above.
 
 use super::figures::Source;
 use crate::motion::{GroundPicture, MOST_ROCKS, Strip, mm};
@@ -29,7 +28,7 @@ pub(super) fn picture(source: &Source<'_>) -> Option<GroundPicture> {
     })
 }
 
-/// What is seen of the rocks from above, within a range of x.
+/// The visible part of the rocks from above, within a range of x.
 fn rocks(terrain: &Terrain, strip: &Strip) -> Vec<[f64; 5]> {
     let mut seen = Vec::new();
     for part in &terrain.parts {
@@ -43,7 +42,7 @@ fn rocks(terrain: &Terrain, strip: &Strip) -> Vec<[f64; 5]> {
         {
             continue;
         }
-        // The ground that it lies on, seen beside it, cuts the ellipsoid.
+        // The surrounding ground cuts the ellipsoid.
         let beside = 1.5 * radii.max();
         let ground = terrain.height_below_rocks_m(centre.x + beside, centre.y);
         let deep = (ground.unwrap_or(0.0) - centre.z).max(0.0) / radii.z;

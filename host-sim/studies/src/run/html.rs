@@ -28,8 +28,8 @@ struct Line {
     text: String,
 }
 
-/// Events as lines of a table. What happens to several boards at the same time becomes one line
-/// that names them all.
+/// Events as lines of a table. The same change of several boards at the same time becomes one line that names
+/// them all.
 fn grouped<'a>(events: impl Iterator<Item = &'a Row<Event>>) -> Vec<Line> {
     let mut lines: Vec<Line> = Vec::new();
     // Changes of boards at one time, each with its boards and the place of its line.
@@ -57,7 +57,7 @@ fn grouped<'a>(events: impl Iterator<Item = &'a Row<Event>>) -> Vec<Line> {
     lines
 }
 
-/// What each board heard on the bus, as it told last; without those that never told.
+/// What each board heard on the bus, by its last report; without boards that never reported.
 fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
     let last = NODE_NAMES.iter().zip(links);
     let last = last.filter_map(|(name, rows)| Some((name, rows.last()?)));
@@ -74,12 +74,12 @@ fn links(links: &[Vec<Row<LinkSample>>; 8]) -> Vec<Value> {
     .collect()
 }
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     summary: &'a Summary,
     verdict: String,
-    /// What went wrong first.
+    /// First failure.
     cause: Option<String>,
     remedy: Option<String>,
     wrong: Vec<Wrong>,
@@ -91,17 +91,17 @@ struct Page<'a> {
     required: usize,
     met: usize,
     shift_s: Option<f64>,
-    /// What is left of b5 and b6 beside the shifted model, mm.
+    /// Residual of b5 and b6 against the shifted model, mm.
     residual_mm: Option<[f64; 2]>,
     messages: u64,
     /// Period of the rows of fast channels in the figures, ms.
     period_ms: u64,
-    /// Events that are in the log alone.
+    /// Events that only the log has.
     left_out: u64,
     start_s: f64,
     missed: Vec<Judged<'a>>,
     targets: Vec<Judged<'a>>,
-    /// What the robot of the page plays, as JSON.
+    /// Data of the page's robot animation, as JSON.
     motion: Option<String>,
     figures: Vec<Picture<'a>>,
     delays: &'a [StartDelay],
@@ -111,7 +111,7 @@ struct Page<'a> {
     parameters: Vec<Parameter<'a>>,
 }
 
-/// A target as the page shows it.
+/// A target for the page.
 #[derive(Serialize)]
 struct Judged<'a> {
     id: &'a str,
@@ -119,10 +119,10 @@ struct Judged<'a> {
     value: String,
     unit: &'a str,
     band: String,
-    /// Value, and what was asked, with their unit.
+    /// Value and requirement, with their unit.
     measured: String,
     asked: String,
-    /// None of a run that was cut short.
+    /// None for a run that was cut short.
     judgement: Option<Judgement>,
     required: bool,
 }
@@ -143,7 +143,7 @@ impl<'a> Judged<'a> {
     }
 }
 
-/// A parameter of the robot as the page shows it.
+/// A parameter of the robot for the page.
 #[derive(Serialize)]
 struct Parameter<'a> {
     path: &'a str,
@@ -191,8 +191,8 @@ fn verdict(summary: &Summary, cause: &mut Option<String>) -> String {
     }
 }
 
-/// Renders the page, which links to nothing else. Its script draws figures and robot from the
-/// data in it; without scripts verdicts, tables and pictures are all there.
+/// Renders the page, which links to nothing else. Its script draws figures and robot from the data in it;
+/// without scripts, verdicts, tables and pictures are still there.
 pub(super) fn render(
     source: &Source<'_>,
     summary: &Summary,
@@ -204,7 +204,7 @@ pub(super) fn render(
         .iter()
         .filter(|t| summary.complete && t.judgement() == Judgement::Missed);
     let motion = motion(source);
-    // The start-up is a story of its own, told at time zero.
+    // The start-up is listed on its own, at time zero.
     let all = &source.recording.events;
     let start_up: Vec<String> = all
         .iter()
@@ -213,7 +213,7 @@ pub(super) fn render(
             Some(format!("{at}: {}", r.v.cause))
         })
         .collect();
-    // What the boards logged themselves stands in the log and its tables.
+    // The boards' own log messages are in the log and its tables.
     let later = all
         .iter()
         .filter(|r| r.v.start_up_us.is_none() && r.v.cause.kind() != EventKind::Log);

@@ -1,4 +1,4 @@
-//! One run from names to files.
+//! One run, from names to files.
 
 mod boards;
 mod figures;
@@ -30,7 +30,7 @@ use wheeleg_sim::faults;
 use wheeleg_sim::{Boards, DownTimes, Session, SimError};
 use wheeleg_telemetry::{Keep, LogFile, Recorder, Tables};
 
-/// What to run.
+/// Options of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Built-in scenario or path.
@@ -43,13 +43,13 @@ pub struct Options {
     pub seed: Option<u64>,
     /// Where each node runs.
     pub nodes: Nodes,
-    /// Faults beside the scenario's own.
+    /// Faults in addition to the scenario's own.
     pub faults: Vec<FaultSpec>,
     /// Folder for the results instead of `runs/<scenario>-seed<N>`.
     pub out: Option<PathBuf>,
     /// Figures as PNG, too.
     pub png: bool,
-    /// The run is to equal one with all nodes in this program ([`repeat_natively`]).
+    /// The run is to be compared with one with all nodes in this program ([`repeat_natively`]).
     pub compared: bool,
 }
 
@@ -58,7 +58,7 @@ pub struct Options {
 pub struct Run {
     /// Contents of `summary.json`.
     pub summary: Summary,
-    /// What ended the run before its end; everything until then is recorded and judged.
+    /// Why the run ended early; everything until then is recorded and judged.
     pub failure: Option<SimError>,
     /// When boards outside were down.
     pub down_times: DownTimes,
@@ -66,15 +66,15 @@ pub struct Run {
 
 /// Samples per second in the CSV files; 500 per second are in the MCAP log.
 const CSV_RATE_HZ: u32 = 100;
-/// Measured on the built-in scenario with the most, `rocks-20`, and rounded up: log, bytes per
-/// simulated second.
+/// Measured on the built-in scenario that writes most, `rocks-20`, and rounded up: log, bytes per simulated
+/// second.
 const LOG_BYTES_PER_S: f64 = 400e3;
-/// The same of the tables.
+/// The same for the tables.
 const TABLE_BYTES_PER_S: f64 = 130e3;
-/// From this duration on the program says how much disk a run takes, s.
+/// From this duration on the program announces the disk space of a run, s.
 const LONG_S: f64 = 60.0;
-/// Room that is held for the summary while log and tables fill the disk, bytes: the first of
-/// these that there is.
+/// Room reserved for the summary while log and tables fill the disk, bytes: the first of these that is
+/// available.
 const RESERVES_BYTES: [usize; 3] = [256 * 1024, 64 * 1024, 32 * 1024];
 
 /// Runs a scenario: log, tables, figures, summary, report. `stop` ends it at
@@ -83,17 +83,15 @@ const RESERVES_BYTES: [usize; 3] = [256 * 1024, 64 * 1024, 32 * 1024];
 /// `previous-2`, …
 ///
 /// # Errors
-/// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be
-/// written once the run has begun is no error: the run is judged all the same, and
-/// [`Finished::unwritten`] names the file. A simulation that fails on its way is none, either:
-/// [`Run::failure`] says what ended it.
+/// Any [`StudyError`]. A log that was begun is closed and stays readable. A file that cannot be written once
+/// the run has begun is not an error: the run is still judged, and [`Finished::unwritten`] names the file.
+/// Nor is a simulation that fails on its way: [`Run::failure`] says why.
 pub fn run(options: &Options, stop: &Stop) -> Result<Finished<Run>, StudyError> {
     run_on(options, stop, None)
 }
 
-/// Runs a scenario once more with all nodes in this program. Boards that a fault affects
-/// are down when those of the run before were: how long a processor takes to start is no
-/// part of what is compared.
+/// Runs a scenario again with all nodes in this program. Boards that a fault affects are down at the same
+/// times as in the run before: the comparison leaves out how long a processor takes to start.
 ///
 /// # Errors
 /// As [`run`].
@@ -135,7 +133,7 @@ fn run_on(
         .out
         .clone()
         .unwrap_or_else(|| default_out(&scenario.name, seed));
-    // A board that does not answer must not cost the results of the run before.
+    // A board that does not answer must not cost the results of an earlier run.
     let boards = match kept {
         Some(kept) => Boards::native_with(kept.clone()),
         None => Boards::connect(&options.nodes, &robot)?,
@@ -148,7 +146,7 @@ fn run_on(
     run_with((&scenario, &robot, seed), boards, &settings)
 }
 
-/// Runs a scenario on a robot that are read already: all nodes in this program; else as [`run`].
+/// Runs a scenario on a robot, both read already: all nodes in this program; otherwise as [`run`].
 ///
 /// # Errors
 /// As [`run`].
@@ -167,7 +165,7 @@ fn run_with(
     boards: Boards,
     settings: &Settings,
 ) -> Result<Finished<Run>, StudyError> {
-    // What is refused costs no earlier results, and leaves no folder.
+    // A refused run costs no earlier results, and leaves no folder.
     let scene = Scene::new(robot, scenario)?;
     if boards.are_here() {
         ensure_possible(scenario, robot, seed)?;
@@ -181,7 +179,7 @@ fn run_with(
     announce(scenario.duration_s);
     let reserve = reserve(job.folder());
     let log = job.folder().join(LOG);
-    // Where it has no room nothing else is made.
+    // If there is no room for the log, nothing else is created.
     let log_file = LogFile::create(&log)?.with(scene)?;
     let tables = job.subfolder(CSV)?;
     let recorder = Recorder::new(keep(scenario))
@@ -211,7 +209,7 @@ fn run_with(
     for error in failed {
         job.keep::<()>(Err(error.into()));
     }
-    // What is written to a file that was removed goes nowhere, and no error tells of it.
+    // Writes to a removed file vanish without an error.
     for gone in [&log, &tables].into_iter().filter(|path| !path.exists()) {
         let removed = std::io::Error::other("somebody has removed it during the run");
         job.keep::<()>(Err(StudyError::output("find again", gone, removed)));
@@ -248,8 +246,8 @@ fn run_with(
     Ok(report::write(job, &source, run, stopped))
 }
 
-/// Builds the robot for once. A simulated robot is large: this one is gone from the stack before
-/// the one that runs.
+/// Builds the robot as a trial. A simulated robot is large: this one is gone from the stack before the one
+/// that runs.
 #[inline(never)]
 fn ensure_possible(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Result<(), SimError> {
     Session::new(Boards::default(), scenario, robot, seed).map(drop)
@@ -258,19 +256,19 @@ fn ensure_possible(scenario: &Scenario, robot: &RobotConfig, seed: u64) -> Resul
 /// Longest run whose phases the page shows, s.
 const PHASES_S: f64 = 600.0;
 
-/// What figures and page are made from: the analysis sees every sample as it comes.
+/// Samples to keep for figures and page: the analysis sees every sample as it comes.
 fn keep(scenario: &Scenario) -> Keep {
     let mut events = scenario.events.iter();
     let shown = events.find(|e| !matches!(e.action, EventAction::Command(_)));
     let near_s: Vec<f64> = shown.iter().map(|e| e.at_s).collect();
     let all = Keep::bounded(scenario.duration_s, &near_s).without(&["/bus"]);
-    // The phases of a gait, for the page: of a long run they are too many to be seen.
+    // The phases of a gait, for the page: a long run has too many to see.
     let all = if scenario.duration_s > PHASES_S {
         all.without(&["/master"])
     } else {
         all
     };
-    // Slip is drawn of walks, rims around an event.
+    // Slip is drawn for walks, rims around an event.
     match shown {
         Some(_) => all,
         None if matches!(scenario.motion, Motion::Walk(_)) => all,
@@ -278,19 +276,19 @@ fn keep(scenario: &Scenario) -> Keep {
     }
 }
 
-/// About how large the log of a run of so many seconds is, bytes.
+/// Approximate size of the log of a run of this many seconds, bytes.
 #[must_use]
 pub fn log_bytes(duration_s: f64) -> f64 {
     LOG_BYTES_PER_S * duration_s
 }
 
-/// The same of its tables.
+/// The same for its tables.
 #[must_use]
 pub fn table_bytes(duration_s: f64) -> f64 {
     TABLE_BYTES_PER_S * duration_s
 }
 
-/// Tells of the disk that a long run takes.
+/// Announces the disk space of a long run.
 fn announce(duration_s: f64) {
     if duration_s >= LONG_S {
         let log = log_bytes(duration_s) * 1e-9;
@@ -303,7 +301,7 @@ fn announce(duration_s: f64) {
     }
 }
 
-/// Room on the disk for the summary, given back when it is dropped; `None` where there is none.
+/// Room on the disk for the summary, released when dropped; `None` if there is none.
 fn reserve(folder: &Path) -> Option<File> {
     RESERVES_BYTES.into_iter().find_map(|bytes| {
         let mut file = tempfile::tempfile_in(folder).ok()?;
@@ -312,7 +310,7 @@ fn reserve(folder: &Path) -> Option<File> {
     })
 }
 
-/// Folder of a run's results where none is given.
+/// Default folder of a run's results.
 fn default_out(scenario: &str, seed: u64) -> PathBuf {
     Path::new("runs").join(format!("{scenario}-seed{seed}"))
 }

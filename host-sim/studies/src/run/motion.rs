@@ -1,4 +1,4 @@
-//! What the robot of a run's page plays.
+//! The robot animation of a run's page.
 
 use super::figures::Source;
 use super::ground::picture;
@@ -8,7 +8,7 @@ use wheeleg_config::Drawing;
 use wheeleg_protocol::Fault;
 use wheeleg_telemetry::Row;
 
-/// Instants of the motion, at most; a short run has one every 20 ms.
+/// Most instants of the motion; a short run has one every 20 ms.
 const INSTANTS: usize = 1_500;
 const PERIOD_NS: u64 = 20_000_000;
 
@@ -104,7 +104,7 @@ fn phases(source: &Source<'_>, end: f64) -> Vec<Phase> {
     phases
 }
 
-/// What went wrong, the first at each instant: sixteen alike are one mark.
+/// Failures, the first at each instant: sixteen of the same kind are one mark.
 fn marks(source: &Source<'_>) -> Vec<Mark> {
     let (start, end) = source.x_range();
     let faults = source.recording.events.iter().filter(|row| {

@@ -1,4 +1,4 @@
-//! What a run leaves behind beside log and tables: summary, one HTML page, figures.
+//! Files of a run besides log and tables: summary, one HTML page, figures.
 
 use super::figures::{self, Source};
 use super::{Run, html};
@@ -56,7 +56,7 @@ mod tests {
         assert!(unwritten.is_empty(), "{unwritten:?}");
     }
 
-    /// Every file of a run, from a recording made of the reference model.
+    /// Every file of a run, from a recording of the reference model.
     fn report(scenario: &str) -> (tempfile::TempDir, Summary) {
         let folder = tempfile::tempdir().expect("temporary folder");
         let robot = builtin::robot("wheeleg-2003").expect("built in");

@@ -1,5 +1,4 @@
-//! One run from a scenario to its judgement: what every way to run a case has in common, with
-//! files or without.
+//! One run from a scenario to its judgement: common to all ways of running a case, with files or without.
 
 use std::ops::ControlFlow;
 
@@ -14,20 +13,20 @@ use crate::analysis::{Analyser, Analysis};
 pub struct Simulated {
     /// How it ended.
     pub outcome: RunOutcome,
-    /// Its hash, and what the recorder was told to keep.
+    /// Its hash, and the data that the recorder was set to keep.
     pub recording: Recording,
-    /// Targets and what else was found.
+    /// Targets and other findings.
     pub analysis: Analysis,
     /// The first error of each sink that had one.
     pub failed: Vec<LogError>,
 }
 
-/// Simulates a scenario and judges it while it lasts. `progress` is told the scenario time in s
-/// at every bus cycle, negative before it begins, and can end the run. The hash does not depend
-/// on what the recorder keeps or writes.
+/// Simulates a scenario and judges it while it lasts. `progress` gets the scenario time in s at every bus
+/// cycle, negative before the scenario begins, and can end the run. The hash does not depend on what the
+/// recorder keeps or writes.
 ///
 /// # Errors
-/// [`SimError`] when a part refuses its parameters; a run that fails on its way is none
+/// [`SimError`] when a part refuses its parameters; not for a run that fails on its way
 /// ([`RunOutcome::failure`]).
 pub fn simulate(
     boards: Boards,

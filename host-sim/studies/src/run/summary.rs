@@ -21,7 +21,7 @@ use wheeleg_telemetry::{Cause, Recording};
 pub struct RunInfo {
     /// Seed used.
     pub seed: u64,
-    /// What ended the run before its end.
+    /// Why the run ended early.
     pub failure: Option<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: f64,
@@ -31,7 +31,7 @@ pub struct RunInfo {
     pub wall_s: f64,
     /// False when the run was stopped before its end.
     pub complete: bool,
-    /// What boards outside of this process did, if there were any.
+    /// Summary of the boards outside of this process, if there were any.
     pub pil: Option<PilSummary>,
 }
 
@@ -47,25 +47,24 @@ pub struct Summary {
     pub robot_hash: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Seed used, a whole number as text: a number of JSON is exact up to 2^53 alone.
+    /// Seed used, a whole number as text: JSON numbers are exact only up to 2^53.
     pub seed: String,
-    /// Faults injected, of the scenario and of the command line.
+    /// Injected faults, from the scenario and from the command line.
     pub faults: Vec<String>,
-    /// What went wrong and what to do about it, and commands that were not carried out, in order
-    /// of time; equal ones of these are one message that tells how many.
+    /// Failures with their remedies, and commands that were not carried out, in order of time; equal ones of
+    /// these are one message with their number.
     pub messages: Vec<String>,
-    /// What went wrong first, and below it what to do about it; empty if nothing did.
+    /// The first failure, and below it the remedy; empty if there was none.
     #[serde(skip)]
     pub cause: Vec<String>,
     /// Determinism hash of the telemetry (BLAKE3, hexadecimal).
     pub hash: String,
     /// Messages that could not be written to the log file.
     pub dropped_messages: u64,
-    /// Log and tables that could not be written to their end, and why; not there if all were.
+    /// Log and tables that could not be completed, and why; absent if all were.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unwritten: Vec<String>,
-    /// What ended the run before its end, such as a robot that does not get ready; not there if
-    /// nothing did.
+    /// Why the run ended early, such as a robot that does not get ready; absent if it did not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
     /// Simulated time, start-up included, s.
@@ -82,7 +81,7 @@ pub struct Summary {
     pub passed: bool,
     /// Targets with values and verdicts.
     pub targets: Vec<Target>,
-    /// How often each behaviour of a walk has acted; not there if the robot did not walk.
+    /// How often each behaviour of a walk has acted; absent if the robot did not walk.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub behaviours: Option<BTreeMap<&'static str, u32>>,
     /// Boards outside of this process and their comparison, if there were any.
@@ -90,8 +89,7 @@ pub struct Summary {
     pub pil: Option<PilSummary>,
 }
 
-/// A refusal without the number of its request, so that a user who asks for the same again and
-/// again is refused the same.
+/// A refusal without the number of its request, so that repeated requests of a user give equal refusals.
 fn refusal(cause: &Cause) -> Option<Cause> {
     match cause {
         Cause::Master(MasterEvent::Refused { ticket, reason }) => {
@@ -107,7 +105,7 @@ fn refusal(cause: &Cause) -> Option<Cause> {
     }
 }
 
-/// What several boards may tell alike, without the board.
+/// A report that several boards may share, without the board.
 fn alike(cause: &Cause) -> Option<Cause> {
     match cause {
         Cause::Board { change, .. } => Some(Cause::Board {
@@ -119,12 +117,12 @@ fn alike(cause: &Cause) -> Option<Cause> {
     }
 }
 
-/// Faults, findings and refusals that are listed one by one.
+/// Most faults, findings and refusals that are listed one by one.
 const LISTED: usize = 20;
-/// What several boards tell alike within this time is one line \[ns\].
+/// Equal reports of several boards within this time are one line \[ns\].
 const ALIKE_NS: u64 = 50_000_000;
 
-/// The first cause of what went wrong, a sentence a line.
+/// The first cause of a failure, one sentence per line.
 fn cause(recording: &Recording) -> Vec<String> {
     let wrong = recording.events.iter();
     let wrong = wrong.filter_map(|row| FaultEvent::of(row.t_ns, &row.v));
@@ -134,14 +132,13 @@ fn cause(recording: &Recording) -> Vec<String> {
     sentence.into_iter().chain(remedy).collect()
 }
 
-/// Faults, findings and refusals as the user reads them, with their time: the first twenty, and how
-/// many more there are. A user who asks for the same again and again gets one line, at the time of
-/// the first refusal.
+/// Faults, findings and refusals as the user reads them, with their time: the first twenty, and the number of
+/// the others. A user who repeats a request gets one line, at the time of the first refusal.
 fn messages(recording: &Recording) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // Each refusal that is told, with the place of its line, and how often it came.
+    // Each reported refusal, with the place of its line, and how often it came.
     let mut refusals: Vec<(Cause, usize, u32)> = Vec::new();
-    // What boards told, with its time, the place of its line, and the boards.
+    // Reports of boards: time, place of the line, and the boards.
     let mut shared: Vec<(Cause, u64, usize, Vec<Address>)> = Vec::new();
     let mut more = 0_u64;
     for event in &recording.events {
@@ -301,7 +298,7 @@ mod tests {
             refused(6),
             refused(7),
             Cause::Master(MasterEvent::Homed),
-            // What is over has not gone wrong.
+            // A cleared fault is not a failure.
             Cause::Board {
                 board: Address::joint(1).expect("a joint"),
                 change: BoardChange::FaultsCleared,
@@ -333,7 +330,7 @@ mod tests {
         }
     }
 
-    /// However many there are, the first twenty are told, and how many more; a refusal that is told
+    /// However many there are, the first twenty are listed, with the number of the others; a listed refusal
     /// is counted to the end.
     #[test]
     fn of_very_many_faults_twenty_are_told_and_their_number() {
@@ -365,7 +362,7 @@ mod tests {
         );
     }
 
-    /// What the run failed of is told first, whether a board has a fault or not.
+    /// The failure of the run comes first, whether a board has a fault or not.
     #[test]
     fn a_robot_that_gives_up_is_told_as_the_cause_and_as_a_message() {
         let mut recording = Recording::default();
@@ -387,7 +384,7 @@ mod tests {
         );
     }
 
-    /// Boards that tell the same within 50 ms share a line; the same board later has one of its own.
+    /// Boards with equal reports within 50 ms share a line; the same board later has its own.
     #[test]
     fn boards_that_tell_the_same_at_a_time_share_a_line() {
         let mut recording = Recording::default();

@@ -1,10 +1,10 @@
-//! What all studies do in the same way: progress, stopping, the folder of the results, the
-//! summary as JSON, figures and report.
+//! Common parts of all studies: progress, stopping, the folder of the results, the summary as JSON, figures
+//! and report.
 //!
-//! A study begins a [`Job`], which holds the output folder; works through [`Progress`], which
-//! says when to stop; and ends with [`Job::finish`]. One that is stopped writes what it has,
-//! and says so in summary, report and exit code ([`Stopped`]). What a full disk does not take is
-//! named, and costs neither the result nor the files beside it ([`Finished::unwritten`]).
+//! A study begins a [`Job`], which holds the output folder; works through [`Progress`], which says when to
+//! stop; and ends with [`Job::finish`]. A stopped study writes what it has, and says so in summary, report
+//! and exit code ([`Stopped`]). Files that a full disk does not take are named, and cost neither the result
+//! nor the other files ([`Finished::unwritten`]).
 
 mod progress;
 pub mod schema;
@@ -34,19 +34,19 @@ pub use suspend::Suspend;
 
 use crate::StudyError;
 
-/// Where a study's results go, and what ends it early.
+/// Folder of a study's results, and its stop signal.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Folder for the results.
     pub out: PathBuf,
-    /// Figures as PNG, too; SVG they are always.
+    /// Figures as PNG in addition to SVG.
     pub png: bool,
-    /// Asks to stop.
+    /// The stop signal.
     pub stop: Stop,
 }
 
 impl Settings {
-    /// Results without PNG in a folder, and no signal that ends it.
+    /// Results in a folder, without PNG and without a stop signal.
     #[must_use]
     pub fn new(out: impl Into<PathBuf>) -> Self {
         Self {
@@ -57,16 +57,16 @@ impl Settings {
     }
 }
 
-/// What stopped a study before its end, and how far it was.
+/// Why a study stopped early, and how far it got.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Stopped {
     /// The signal.
     pub signal: Signal,
-    /// Parts that were done.
+    /// Finished parts.
     pub done: u64,
     /// Parts of the whole study.
     pub of: u64,
-    /// What the parts are.
+    /// Kind of the parts.
     pub unit: &'static str,
 }
 
@@ -85,15 +85,15 @@ impl fmt::Display for Stopped {
 /// A study with its files written.
 #[derive(Debug)]
 pub struct Finished<T> {
-    /// What came of it.
+    /// The result.
     pub result: T,
     /// Contents of `summary.json`.
     pub summary: String,
     /// The page.
     pub report: PathBuf,
-    /// What stopped it before its end.
+    /// Why it stopped before its end.
     pub stopped: Option<Stopped>,
-    /// What could not be written, in order; everything else is there.
+    /// Errors of files that could not be written, in order; everything else is there.
     pub unwritten: Vec<StudyError>,
 }
 
@@ -125,24 +125,24 @@ pub type Drawn = (Figure, String);
 pub struct Job {
     folder: Folder,
     png: bool,
-    /// What could not be written so far.
+    /// Errors of files that could not be written so far.
     unwritten: Mutex<Vec<StudyError>>,
-    /// How far it is.
+    /// Its progress.
     pub progress: Progress,
 }
 
 impl Job {
-    /// Takes the folder; results of an earlier run in it are set aside in its folders
-    /// `previous`, `previous-2`, … The files that the study `reads` stay where they are.
+    /// Takes the folder; earlier results in it are set aside in its folders `previous`, `previous-2`, … The
+    /// files that the study `reads` stay where they are.
     ///
     /// # Errors
-    /// [`StudyError::Report`] if the folder is in use or cannot be written, if a result has the place of
-    /// a file that is read, or if PNG is asked for of a program without it.
+    /// [`StudyError::Report`] if the folder is in use or cannot be written, if a result would overwrite an
+    /// input file, or if a program without PNG is asked for it.
     pub fn begin(name: &str, settings: &Settings, reads: &[&Path]) -> Result<Self, StudyError> {
         Self::begin_with(name, settings, reads, &[])
     }
 
-    /// The same for a study that writes files beside those of every study.
+    /// The same for a study that writes further files.
     ///
     /// # Errors
     /// As [`Job::begin`].
@@ -178,7 +178,7 @@ impl Job {
         Ok(subfolder(self.folder(), name)?)
     }
 
-    /// Writes a text file; returns its path. A folder that somebody has removed is made anew.
+    /// Writes a text file; returns its path. Recreates a folder that was removed.
     ///
     /// # Errors
     /// [`StudyError::Report`] if it cannot be written.
@@ -196,19 +196,18 @@ impl Job {
         Ok(path)
     }
 
-    /// What was written; none, and its error is kept for [`Finished::unwritten`], if it was not.
+    /// The written file; otherwise none, and its error is kept for [`Finished::unwritten`].
     pub fn keep<T>(&self, written: Result<T, StudyError>) -> Option<T> {
         written.map_err(|e| self.unwritten().push(e)).ok()
     }
 
-    /// What could not be written so far. A panic while an error was kept spoils none of the others.
+    /// Errors of unwritten files so far. A panic while one was added spoils none of the others.
     pub(crate) fn unwritten(&self) -> MutexGuard<'_, Vec<StudyError>> {
         let list = self.unwritten.lock();
         list.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes a figure into the folder `figures`, which must exist: its SVG text, and a PNG where
-    /// that was asked for.
+    /// Writes a figure into the folder `figures`, which must exist: its SVG text, and a PNG if requested.
     fn save_figure(&self, figure: &Figure, svg: &str) -> Result<(), StudyError> {
         if self.png {
             let path = self.folder().join(format!("{FIGURES}/{}.png", figure.id));
@@ -220,7 +219,7 @@ impl Job {
         Ok(())
     }
 
-    /// Draws figures as SVG; gives them back with their text.
+    /// Draws figures as SVG; returns them with their text.
     #[must_use]
     pub fn draw(&self, figures: Vec<Figure>) -> Vec<Drawn> {
         self.progress.begin("drawing", figures.len() as u64);
@@ -234,7 +233,7 @@ impl Job {
         })
     }
 
-    /// Writes figures into the folder `figures`, as PNG, too, where that was asked for.
+    /// Writes figures into the folder `figures`, also as PNG if requested.
     ///
     /// # Errors
     /// [`StudyError`]: one for all that are missing.
@@ -260,8 +259,8 @@ impl Job {
         }
     }
 
-    /// The report of a study that was stopped before its page could be made: `how` it was, the parts, and
-    /// which of them are done.
+    /// The report of a study that was stopped before its page could be made: `how`, the parts, and which of
+    /// them are done.
     ///
     /// # Errors
     /// [`StudyError::Report`] if the page cannot be made.
@@ -283,10 +282,10 @@ impl Job {
         Ok(page(include_str!("stopped.html"), values)?)
     }
 
-    /// Writes what came of a study and lets go of the folder. What is worth most goes first where
-    /// room is short: the summary, then what `rest` writes, then the page that it gives, then the
-    /// figures. What cannot be written is named in [`Finished::unwritten`], leaves no part of it
-    /// behind, and takes nothing with it.
+    /// Writes the results of a study and releases the folder. The most valuable files go first in case room
+    /// is short: the summary, then those of `rest`, then the page that it returns, then the figures. A file
+    /// that cannot be written is named in [`Finished::unwritten`], leaves no part of itself behind, and does
+    /// not affect the others.
     pub fn finish<T>(
         self,
         result: T,
@@ -300,14 +299,14 @@ impl Job {
         if !drawn.is_empty() {
             self.keep(self.save_figures(&drawn));
         }
-        // It is gone if somebody has removed the folder meanwhile; no report is without it.
+        // It is missing if the folder was removed meanwhile; there is no report without it.
         if saved.is_some_and(|path| !path.exists()) {
             self.keep(self.save(SUMMARY, &summary));
         }
         self.end(result, summary, stopped)
     }
 
-    /// Lets go of the folder.
+    /// Releases the folder.
     pub fn end<T>(self, result: T, summary: String, stopped: Option<Stopped>) -> Finished<T> {
         self.progress.clear();
         let unwritten = std::mem::take(&mut *self.unwritten());

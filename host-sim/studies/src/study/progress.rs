@@ -1,4 +1,4 @@
-//! How far a study is, and whether it is to stop.
+//! Progress of a study, and whether it should stop.
 
 use std::sync::LazyLock;
 
@@ -9,12 +9,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::{Stop, Stopped};
 use crate::StudyError;
 
-/// Stack of a worker: a simulated robot is built on it in one piece, 2 MB in builds for tests.
+/// Stack of a worker: it must hold a simulated robot while it is built, 2 MB in builds for tests.
 pub const STACK: usize = 8 << 20;
 
-/// Works with the workers that all studies share, which have room for a simulated robot; on a worker
-/// already, with those of its own pool. Not rayon's global pool: whoever in the process uses that
-/// first gives its workers their stack.
+/// Works with the workers that all studies share, which have room for a simulated robot; if called on a
+/// worker, with those of its own pool. Not rayon's global pool: its first user in the process sets the stack
+/// size of its workers.
 pub(super) fn on_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     static WORKERS: LazyLock<Option<ThreadPool>> = LazyLock::new(|| {
         let workers = ThreadPoolBuilder::new().stack_size(STACK);
@@ -26,8 +26,8 @@ pub(super) fn on_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     }
 }
 
-/// Shows how far a study is, on standard error and only if that is a terminal, and knows
-/// whether it is to stop.
+/// Shows the progress of a study, on standard error and only if that is a terminal, and knows whether it
+/// should stop.
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
@@ -39,7 +39,7 @@ pub struct Progress {
 pub enum Ended {
     /// The study was asked to stop.
     Stopped,
-    /// It cannot be made.
+    /// It is impossible.
     Failed(Box<StudyError>),
 }
 
@@ -47,7 +47,7 @@ impl Ended {
     /// The result of a part, or none if the study was stopped in it.
     ///
     /// # Errors
-    /// What made the part fail.
+    /// The error of the part.
     pub fn kept<T>(result: Result<T, Self>) -> Result<Option<T>, StudyError> {
         match result {
             Ok(value) => Ok(Some(value)),
@@ -84,29 +84,29 @@ impl Progress {
         }
     }
 
-    /// A phase of so many steps begins.
+    /// Begins a phase of `steps` steps.
     pub fn begin(&self, what: impl Into<String>, steps: u64) {
         self.bar.set_message(what.into());
         self.bar.set_length(steps);
         self.bar.set_position(0);
     }
 
-    /// Another message beside the bar.
+    /// Shows another message beside the bar.
     pub fn say(&self, what: String) {
         self.bar.set_message(what);
     }
 
-    /// So many steps of the phase are done.
+    /// Sets the number of finished steps of the phase.
     pub fn at(&self, steps: u64) {
         self.bar.set_position(steps);
     }
 
-    /// One more step of the phase is done.
+    /// Counts one more finished step of the phase.
     pub fn step(&self) {
         self.bar.inc(1);
     }
 
-    /// Takes the bar off the terminal.
+    /// Removes the bar from the terminal.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
@@ -117,8 +117,8 @@ impl Progress {
         self.stop.is_asked()
     }
 
-    /// What to tell of a study that was stopped with `done` of its parts; none if it was
-    /// not, or had nothing left to do.
+    /// Record of a study that was stopped with `done` of its parts; none if it was not, or had nothing left
+    /// to do.
     #[must_use]
     pub fn stopped(&self, done: u64, of: u64, unit: &'static str) -> Option<Stopped> {
         let signal = self.stop.signal().filter(|_| done < of)?;
@@ -130,11 +130,11 @@ impl Progress {
         })
     }
 
-    /// Works on items in parallel; results are in the order of the items. An item that was not
-    /// begun before the study was asked to stop has none.
+    /// Works on items in parallel; results are in the order of the items. An item that was not begun before
+    /// the study was stopped has none.
     ///
     /// # Errors
-    /// That of an item; no further one is begun then.
+    /// The error of an item; no further one is begun then.
     pub fn map<T: Sync, R: Send, E: Send>(
         &self,
         items: &[T],
@@ -151,7 +151,7 @@ impl Progress {
         })
     }
 
-    /// The same as a phase, with a step for each item.
+    /// The same as a phase with a step for each item.
     ///
     /// # Errors
     /// As [`Progress::map`].
@@ -169,7 +169,7 @@ impl Progress {
         })
     }
 
-    /// The same where all results are needed.
+    /// The same if all results are needed.
     ///
     /// # Errors
     /// As [`Progress::map`], or that the study was asked to stop.
@@ -190,8 +190,8 @@ mod tests {
     use super::*;
     use crate::study::Signal;
 
-    /// A simulated robot is built on the stack, in more than the 2 MB that a thread has by default;
-    /// also where another library has begun rayon's own workers before.
+    /// A simulated robot is built on the stack, in more than a thread's default of 2 MB; also if another
+    /// library has started rayon's own workers before.
     #[test]
     fn workers_have_room_for_a_simulated_robot() {
         assert!(rayon::current_num_threads() > 0);

@@ -1,5 +1,5 @@
-//! The form of each study's `summary.json`, and of other JSON that the program writes, published as
-//! JSON schemas.
+//! The form of each study's `summary.json`, and of other JSON output of the program, published as JSON
+//! schemas.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde::{Serialize, Serializer};
@@ -7,25 +7,25 @@ use serde_json::Value;
 
 use super::Stopped;
 
-/// What a study writes into `summary.json` and prints with `--json`.
+/// Data that a study writes into `summary.json` and prints with `--json`.
 pub trait Summary: Serialize + JsonSchema {
-    /// Name and version of the form, as `wheeleg.run/1`. A change that a reader of the version
-    /// before would trip over gets a new number.
+    /// Name and version of the form, as `wheeleg.run/1`. A change that breaks readers of the earlier version
+    /// gets a new number.
     const SCHEMA: &'static str;
 }
 
-/// A summary with what is the same in all of them.
+/// A summary with the parts common to all.
 #[derive(Serialize, JsonSchema)]
 struct Document<'a, T> {
     /// Name and version of this form.
     schema: &'static str,
-    /// What stopped the study before its end; null if nothing did.
+    /// Why the study stopped early; null if it did not.
     stopped: Option<&'a Stopped>,
     #[serde(flatten)]
     body: &'a T,
 }
 
-/// Writes a seed as text: browsers and other readers of JSON hold no whole number above 2^53.
+/// Writes a seed as text: browsers and other JSON readers cannot hold whole numbers above 2^53.
 ///
 /// # Errors
 /// None of its own.
@@ -62,7 +62,7 @@ struct Printed<'a, T> {
     body: &'a T,
 }
 
-/// What a command prints, as a line of JSON.
+/// The output of a command, as a line of JSON.
 #[must_use]
 pub fn line<T: Form>(body: &T) -> String {
     let schema = T::SCHEMA;
@@ -86,13 +86,13 @@ pub fn schema<T: Summary + 'static>() -> (&'static str, Value) {
     named(of_file::<Document<'static, T>>(T::SCHEMA))
 }
 
-/// The schema of what a command prints, with its name.
+/// The schema of a command's output, with its name.
 #[must_use]
 pub fn of_form<T: Form + 'static>() -> (&'static str, Value) {
     named(of_file::<Printed<'static, T>>(T::SCHEMA))
 }
 
-/// The schema of a file that does not hold the name of its form.
+/// The schema of a file that does not contain the name of its form.
 #[must_use]
 pub fn of_file<T: JsonSchema>(name: &'static str) -> (&'static str, Value) {
     let generator = SchemaSettings::draft2020_12()

@@ -20,7 +20,7 @@ pub enum Signal {
     /// Ctrl-C.
     #[serde(rename = "SIGINT")]
     Interrupt,
-    /// What `kill` and a machine that shuts down send.
+    /// Sent by `kill` and by a machine that shuts down.
     #[serde(rename = "SIGTERM")]
     Terminate,
     /// The terminal or the connection is gone.
@@ -56,18 +56,18 @@ impl Signal {
     }
 }
 
-/// From here on a file that has reached the limit on its size (`ulimit -f`, a batch system) is an error
-/// of the write, as a full disk is. Its signal would end the program without a message.
+/// From here on, reaching the limit on a file's size (`ulimit -f`, a batch system) is an error of the write,
+/// like a full disk. Its signal would end the program without a message.
 ///
 /// # Errors
-/// What the operating system says if a handler cannot be set.
+/// The operating system's error if a handler cannot be set.
 pub fn outlive_file_limit() -> std::io::Result<()> {
     #[cfg(unix)]
     flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
     Ok(())
 }
 
-/// Whether a study is to stop. Copies of it are one.
+/// Whether a study should stop. Copies share their state.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
     /// Number of the signal; 0: none.
@@ -77,13 +77,13 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// One that the program's signals set. Until [`begin`](Self::begin) they end the program at
-    /// once: there is nothing to finish, and a pipe that is read may never end. From then on the
-    /// first asks; a second Ctrl-C or TERM ends the program. A hang-up that whoever started the program has it ignore (`nohup`)
-    /// stays ignored.
+    /// One that the program's signals set. Until [`begin`](Self::begin) they end the program at once: there
+    /// is nothing to finish, and a pipe that is read may never end. From then on the first asks; a second
+    /// Ctrl-C or TERM ends the program. A hang-up that the program was started to ignore (`nohup`) stays
+    /// ignored.
     ///
     /// # Errors
-    /// What the operating system says if a handler cannot be set.
+    /// The operating system's error if a handler cannot be set.
     pub fn on_signals() -> std::io::Result<Self> {
         let stop = Self {
             idle: Arc::new(AtomicBool::new(true)),
@@ -97,7 +97,7 @@ impl Stop {
                     continue;
                 }
             } else {
-                // A terminal that closes may hang up twice, so only these.
+                // A closing terminal may hang up twice, so only these.
                 flag::register_conditional_default(number, Arc::clone(&asked))?;
             }
             flag::register_conditional_default(number, Arc::clone(&stop.idle))?;
@@ -133,7 +133,7 @@ impl Stop {
     }
 }
 
-/// Whether this process was started to ignore a signal, as far as the system tells it.
+/// Whether this process was started to ignore a signal, as far as the system says.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mut lines = status.lines();

@@ -1,4 +1,4 @@
-//! What an axis must have before any controller can hold it.
+//! Requirements on an axis before any controller can hold it.
 
 use wheeleg_config::AxisConfig;
 use wheeleg_config::axis::Unfit;
@@ -7,10 +7,10 @@ use crate::StudyError;
 use crate::axis_sim::suite::force_left_n;
 use crate::compare::MARGIN;
 
-/// Refuses an axis that cannot do what its own file asks.
+/// Refuses an axis that cannot do what its own file asks for.
 ///
 /// # Errors
-/// [`StudyError::Config`] names file, line, fields, values and what is allowed of all that is wrong.
+/// [`StudyError::Config`] names file, line, fields, values and allowed values of all errors.
 pub(super) fn check(config: &AxisConfig) -> Result<(), StudyError> {
     let wrong = wrong(config);
     if wrong.is_empty() {
@@ -19,7 +19,7 @@ pub(super) fn check(config: &AxisConfig) -> Result<(), StudyError> {
     Err(config.unfit("no controller can hold it", &wrong).into())
 }
 
-/// All that is wrong.
+/// All errors.
 fn wrong(config: &AxisConfig) -> Vec<Unfit> {
     let p = &config.axis;
     let mut wrong = Vec::new();
@@ -40,7 +40,7 @@ fn wrong(config: &AxisConfig) -> Vec<Unfit> {
         });
     }
     let most_n = left_n / MARGIN;
-    // Without force left there is none for a load.
+    // Without spare force there is none for a load.
     if left_n > 0.0 && p.load_n.abs() > most_n * (1.0 + 1e-9) {
         wrong.push(Unfit {
             fields: vec![
@@ -70,7 +70,7 @@ mod tests {
 
     const BENCH: &str = include_str!("../../../axes/bench-vq110u.toml");
 
-    /// What is said of the bench axis with another load, break-away force and bore.
+    /// The errors of the bench axis with another load, break-away force and bore.
     fn said(load: &str, friction: &str) -> String {
         let text = BENCH
             .replace("load = { value = 0.0", &format!("load = {{ value = {load}"))

@@ -1,6 +1,6 @@
-//! Whether tuning made a board better: after is held against before, move by move.
+//! Whether tuning made a board better: compares after with before, move by move.
 //!
-//! Of every move each of these must be as good as before, or good enough:
+//! In every move each of these must be as good as before, or good enough:
 //!
 //! | figure | good enough |
 //! |---|---|
@@ -13,7 +13,7 @@
 //! | it settles at all | yes |
 //! | settling time, of a board that settles and rests | 0.25 s |
 //!
-//! A tuning that made any of them worse is refused: its parameters are not written. So is one with which the
+//! A tuning that made any of them worse is refused: its parameters are not written. So is one under which the
 //! supervision still stops every move.
 
 use schemars::JsonSchema;
@@ -28,14 +28,14 @@ const ERROR_MM: f64 = 0.5;
 const CONTACT_MM: f64 = 2.0;
 /// Overshoot that is good enough, mm.
 const OVERSHOOT_MM: f64 = 3.0;
-/// Largest error on the way of a reference that moves that is good enough, mm.
+/// Largest error while following a moving reference that is good enough, mm.
 const TRACKING_MM: f64 = 5.0;
 /// Settling time that is good enough, s.
 const SETTLE_S: f64 = 0.25;
-/// What a figure may grow by within its own scatter.
+/// Factor by which a figure may grow within its own scatter.
 const SCATTER: f64 = 1.1;
 
-/// What became worse.
+/// A figure that became worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Figure {
@@ -49,7 +49,7 @@ pub enum Figure {
     ContactError,
     /// Overshoot \[mm\].
     Overshoot,
-    /// Largest error on the way of an S-curve or a sine \[mm\].
+    /// Largest error while following an S-curve or a sine \[mm\].
     TrackingError,
     /// It does not settle: 1.
     NeverSettles,
@@ -102,7 +102,7 @@ pub(super) fn all_stopped(tests: &[Test]) -> bool {
     !tests.is_empty() && tests.iter().all(|test| test.after.stopped == Some(true))
 }
 
-/// Everything that is worse after than before, or as bad as can be.
+/// Every figure that is worse than before, or as bad as possible.
 pub(super) fn worse(tests: &[Test]) -> Vec<Worse> {
     let all_stopped = all_stopped(tests);
     tests
@@ -125,16 +125,16 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     let flag = |set: Option<bool>| f64::from(u8::from(set == Some(true)));
     let size = |value: Option<f64>| value.map_or(0.0, f64::abs);
     let never = |f: &Figures| flag(Some(f.settle_s.is_none()));
-    // A board that was stopped on the way did not even try.
+    // A board that was stopped before the end did not even try.
     let tried = before.stopped != Some(true);
     let step = matches!(motion, Move::Step20 | Move::Step100);
     let rests = step || motion == Move::Hold;
-    // Whoever lets go of a load jumps; what counts then is where the piston comes to rest.
+    // A piston that loses its load jumps; what counts then is where it comes to rest.
     let judged = |figure: Figure| match figure {
         Figure::LimitCycle => rests,
         Figure::Overshoot => !motion.loses_contact() && tried,
         Figure::TrackingError => matches!(motion, Move::SCurve | Move::Sine) && tried,
-        // Whoever never settles, or goes on about the target, has no time to compare with.
+        // A law that never settles, or keeps cycling about the target, has no time to compare with.
         Figure::SettlingTime => {
             tried && step && before.settle_s.is_some() && before.limit_cycle != Some(true)
         }
@@ -187,7 +187,7 @@ fn worse_of(motion: Move, before: &Figures, after: &Figures) -> Vec<Worse> {
     ];
     rows.into_iter()
         .filter(|(figure, before, after, enough)| {
-            // What is no number is worse than any.
+            // Not a number is worse than any number.
             judged(*figure) && (!after.is_finite() || *after > enough.max(SCATTER * before))
         })
         .map(|(figure, before, after, _)| Worse {
@@ -275,7 +275,7 @@ mod tests {
             assert_eq!(names(motion, 9.0, 9.5), [], "its own scatter");
             assert_eq!(names(motion, 1.0, 4.9), [], "good enough");
         }
-        // Of a step it is the step itself.
+        // For a step, the step itself counts.
         assert_eq!(names(Move::Step100, 4.0, 99.0), []);
     }
 }

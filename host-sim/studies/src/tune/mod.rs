@@ -1,9 +1,8 @@
-//! One cylinder with a user's own parameters: `wheeleg tune`.
+//! Tunes one cylinder with a user's own parameters: `wheeleg tune`.
 //!
-//! The axis file describes the cylinder on the bench. Its valves' delays are looked
-//! for as a board does at start-up, the gains are derived, and step tests are played
-//! with the board as it comes (defaults, calibrated to the sensor) and as it is
-//! tuned. The tuned parameters are written as a section for a robot file.
+//! The axis file describes the cylinder on the bench. Its valves' delays are searched for like on a board at
+//! start-up, the gains are derived, and step tests are played with the untuned board (defaults, calibrated to
+//! the sensor) and with the tuned one. The tuned parameters are written as a section for a robot file.
 
 mod feasible;
 mod judge;
@@ -59,7 +58,7 @@ impl Section {
         }
     }
 
-    /// The joints that it is for.
+    /// Its joints.
     #[must_use]
     pub const fn doc(self) -> &'static str {
         match self {
@@ -81,7 +80,7 @@ pub struct Test {
     pub before: Figures,
     /// Tuned.
     pub after: Figures,
-    /// What happened: before, after.
+    /// Recordings: before, after.
     #[serde(skip)]
     pub played: [Played; 2],
 }
@@ -95,7 +94,7 @@ pub struct Parameter {
     pub before: f64,
     /// Tuned value.
     pub after: f64,
-    /// The same as it travels on the wire.
+    /// The same as sent on the wire.
     pub raw: i32,
     /// Unit.
     pub unit: &'static str,
@@ -104,7 +103,7 @@ pub struct Parameter {
     pub text: &'static str,
 }
 
-/// What tuning found.
+/// Results of tuning.
 #[derive(Debug, Clone)]
 pub struct Tuned {
     /// The axis.
@@ -113,19 +112,19 @@ pub struct Tuned {
     pub seed: u64,
     /// Force left over the load, at most 1000.
     pub margin: f64,
-    /// How fine its valves are.
+    /// Resolution of its valves.
     pub valve_resolution: ValveResolution,
     /// Delays found; `None` if the piston did not answer.
     pub delays: Option<Delays>,
     /// All tests.
     pub tests: Vec<Test>,
-    /// What became worse; if anything did, the parameters are refused.
+    /// Figures that became worse; if there are any, the parameters are refused.
     pub worse: Vec<Worse>,
     /// All parameters that are set.
     pub parameters: Vec<Parameter>,
     /// Section for a robot file.
     pub toml: String,
-    /// What stopped it before all tests were played.
+    /// Why it stopped before all tests were played.
     pub stopped: Option<Stopped>,
 }
 
@@ -134,16 +133,15 @@ pub struct Tuned {
 pub struct Summary<'a> {
     /// Name of the axis.
     axis: &'a str,
-    /// Seed of the ADC noise, a whole number as text: a number of JSON is exact up to 2^53
-    /// alone.
+    /// Seed of the ADC noise, a whole number as text: JSON numbers are exact only up to 2^53.
     seed: String,
     /// Force left over the load, at most 1000 for no load.
     static_margin: f64,
-    /// Least margin of an axis that can be tuned.
+    /// Smallest margin of an axis that can be tuned.
     least_margin: f64,
-    /// How fine its valves are.
+    /// Resolution of its valves.
     valve_resolution: ValveResolution,
-    /// What would make the valves finer, where they are coarse.
+    /// Remedy for valves that are too coarse.
     advice: Option<String>,
     /// Opening delay of the data sheet \[ms\].
     sheet_t_on_ms: f64,
@@ -155,9 +153,9 @@ pub struct Summary<'a> {
     found_t_off_ms: Option<f64>,
     /// Whether the parameters are written: no figure of any test became worse.
     accepted: bool,
-    /// What became worse.
+    /// Figures that became worse.
     worse: &'a [Worse],
-    /// The tests that were played before and after.
+    /// The tests played before and after.
     tests: &'a [Test],
     /// All parameters that are set.
     parameters: &'a [Parameter],
@@ -167,12 +165,12 @@ impl study::Summary for Summary<'_> {
     const SCHEMA: &'static str = "wheeleg.tune/2";
 }
 
-/// Tunes an axis and writes report, figures, `summary.json` and [`BOARD_PARAMETERS`] into the folder
-/// of the settings that `settings` makes of the axis's name.
+/// Tunes an axis and writes report, figures, `summary.json` and [`BOARD_PARAMETERS`] into the folder that
+/// `settings` derives from the axis's name.
 ///
 /// # Errors
-/// [`StudyError`] if the file is wrong, the axis cannot do what is asked, or something cannot
-/// be drawn or written.
+/// [`StudyError`] if the file is wrong, the axis cannot do what is asked for, or a result cannot be drawn or
+/// written.
 pub fn tune(
     file: &str,
     seed: u64,
@@ -181,7 +179,7 @@ pub fn tune(
 ) -> Result<Finished<Tuned>, StudyError> {
     let config = load(file)?;
     let settings = settings(&config.name);
-    // An axis that is refused costs no earlier results.
+    // A refused axis costs no earlier results.
     let delays = delays(file, &config, seed)?;
     let job = Job::begin("tune", &settings, &[Path::new(file)])?;
     let tuned = Tuned::play(file, config, delays, (seed, section), &job.progress)?;
@@ -195,14 +193,13 @@ fn load(file: &str) -> Result<AxisConfig, StudyError> {
     Ok(config)
 }
 
-/// The delays of its valves, as a board looks for them at start-up.
+/// The delays of its valves, searched for like on a board at start-up.
 fn delays(file: &str, config: &AxisConfig, seed: u64) -> Result<Option<Delays>, StudyError> {
     let plant = &config.axis;
     identify(plant, plant, seed).map_err(|e| axis_error(file, &e))
 }
 
-/// A board as it comes, told no more than where its piston is and how long its
-/// stroke.
+/// A board with default settings, except for the piston's position sensor and its stroke.
 fn defaults(tuned: &Design) -> Design {
     let supervision = JointParam::SlewRate.info().default;
     Design {
@@ -221,7 +218,7 @@ fn defaults(tuned: &Design) -> Design {
 }
 
 impl Tuned {
-    /// Plays the tests, as far as it is not stopped.
+    /// Plays the tests, until it is stopped.
     fn play(
         file: &str,
         config: AxisConfig,
@@ -245,7 +242,7 @@ impl Tuned {
             let played = motion.play(&mut rig, plant, loaded.load_n);
             played.map_err(failed)
         })?;
-        // A test that was played with one of the two boards alone says nothing.
+        // A test that was played with only one of the two boards shows nothing.
         let mut played = played.into_iter();
         let tests = Move::ALL.into_iter().filter_map(|motion| {
             let (before, after) = (played.next()?, played.next()?);
@@ -300,7 +297,7 @@ impl Tuned {
         self.worse.is_empty() && self.stopped.is_none()
     }
 
-    /// Moves that the board's supervision stopped, by name, of either column.
+    /// Moves that the board's supervision stopped, by name, in either column.
     #[must_use]
     pub fn stopped(&self, figures: fn(&Test) -> &Figures) -> Vec<&'static str> {
         let stopped = self
@@ -310,7 +307,7 @@ impl Tuned {
         stopped.map(|test| test.motion.name()).collect()
     }
 
-    /// What `summary.json` holds.
+    /// Contents of `summary.json`.
     #[must_use]
     pub fn summary(&self) -> Summary<'_> {
         let valve = &self.config.axis.cylinder.fill_valve;

@@ -89,7 +89,7 @@ fn any(_: Move) -> bool {
     true
 }
 
-/// A move that is to settle at its target.
+/// Whether a move should settle at its target.
 fn settles(motion: Move) -> bool {
     matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact()
 }
@@ -134,17 +134,17 @@ const LINES: [(&str, Of, usize, Cell); 12] = [
     ),
 ];
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
-    /// What stopped the tuning.
+    /// Why the tuning stopped.
     stopped: Option<String>,
     version: &'static str,
     verdict: String,
     name: &'a str,
     description: &'a str,
     seed: u64,
-    /// Force of the shortest opening over what friction holds, if it does, and what is coarse.
+    /// Force of the shortest opening over the range that friction holds, if any, and the limit for coarse.
     valve_resolution: Option<f64>,
     coarse: f64,
     advice: Option<String>,
@@ -155,7 +155,7 @@ struct Page<'a> {
     sheet_on_s: f64,
     sheet_off_s: f64,
     found: Option<Delays>,
-    /// What is worse than before.
+    /// Figures that are worse than before.
     worse: Vec<String>,
     tests: Vec<Shown>,
     parameters: Vec<Described<'a>>,

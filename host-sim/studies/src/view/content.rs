@@ -1,4 +1,4 @@
-//! What is kept of one log: thinned signals, the robot at some instants, phases and events.
+//! The parts of one log kept for a page: thinned signals, the robot at some instants, phases and events.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -15,19 +15,19 @@ use crate::StudyError;
 use crate::cause::{self, Cause, FaultEvent};
 use crate::motion::{Mark, Motion, Phase, Readings, phase_name, rounded};
 
-/// Most instants of the robot that plays; a short log has one every 20 ms.
+/// Most instants of the robot animation; a short log has one every 20 ms.
 const INSTANTS: usize = 3_000;
 const PERIOD_NS: u64 = 20_000_000;
-/// Most phases that are shown on the time line.
+/// Most phases shown on the time line.
 const PHASES: usize = 400;
-/// Most events that are listed; of those that went wrong twice as many.
+/// Most events listed; of failures twice as many.
 const EVENTS: usize = 2_000;
-/// Most lines of what went into a run.
+/// Most lines about the inputs of a run.
 const HEAD: usize = 2_000;
-/// Longest text that is shown, characters.
+/// Longest text shown, characters.
 const TEXT: usize = 400;
 
-/// The time of a log that is looked at, ns.
+/// The part of a log to view, ns.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Span {
     pub(super) from_ns: u64,
@@ -38,17 +38,17 @@ pub(super) struct Span {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoggedEvent {
     pub(super) t_ns: u64,
-    /// None of a later version.
+    /// `None` for a kind of a later version.
     pub(super) kind: Option<EventKind>,
-    /// None of a later version.
+    /// `None` for a code of a later version.
     code: Option<EventCode>,
     detail: String,
     fault: Option<Fault>,
-    /// Boards to which it happens.
+    /// Boards concerned.
     boards: Vec<Address>,
-    /// The mode that the first of them was in before, as far as the log says.
+    /// The earlier mode of the first of them, as far as the log says.
     mode: Option<String>,
-    /// That of the first board.
+    /// Text of the first board.
     text: String,
 }
 
@@ -58,7 +58,7 @@ impl LoggedEvent {
         cause::goes_wrong(self.kind, self.code)
     }
 
-    /// Its name, as logged; none of a later version.
+    /// Its name, as logged; `None` for one of a later version.
     pub(super) fn name(&self) -> &'static str {
         self.code.map_or("", EventCode::name)
     }
@@ -79,7 +79,7 @@ impl LoggedEvent {
         }
     }
 
-    /// Whether several boards may do the same at one time.
+    /// Whether several boards may change like this at one time.
     fn is_change_of_board(&self) -> bool {
         matches!(
             self.code,
@@ -107,16 +107,16 @@ impl LoggedEvent {
 pub(super) struct Content {
     pub(super) signals: BTreeMap<Signal, Thin>,
     pub(super) events: Vec<LoggedEvent>,
-    /// What happened before the record, from power-up on.
+    /// Events before the record, from power-up on.
     pub(super) start_up: Vec<String>,
     /// Events beyond those listed.
     pub(super) more_events: u64,
-    /// What went into the run, by kind.
+    /// Inputs of the run, by kind.
     pub(super) head: Vec<(String, String)>,
-    /// Time of the first and the last sample in the part that is looked at, ns.
+    /// Time of the first and the last sample in the viewed part, ns.
     pub(super) first_ns: Option<u64>,
     pub(super) last_ns: u64,
-    /// The same of the whole log.
+    /// The same for the whole log.
     pub(super) whole_ns: Option<(u64, u64)>,
     pub(super) end: Read,
     /// Every stroke, for a comparison.
@@ -128,7 +128,7 @@ pub(super) struct Content {
     modes: BTreeMap<Address, String>,
 }
 
-/// The robot at instants of equal distance.
+/// The robot at equidistant instants.
 #[derive(Default)]
 struct Instants {
     period_ns: u64,
@@ -173,7 +173,7 @@ fn drawn() -> Vec<Signal> {
     signals
 }
 
-/// A text of a log as it can be shown, also on a terminal: at most as long as a line.
+/// A text of a log, safe to show, also on a terminal: at most as long as a line.
 fn cut(text: &str) -> String {
     let mut text = plain(text);
     if let Some((end, _)) = text.char_indices().nth(TEXT) {
@@ -184,8 +184,8 @@ fn cut(text: &str) -> String {
 }
 
 impl Content {
-    /// Reads a log; `keep_strokes`: all of them, for a comparison. `look` is told the time in ms
-    /// and ends the reading.
+    /// Reads a log; `keep_strokes`: all of them, for a comparison. `look` gets the time in ms, and can end
+    /// the reading.
     pub(super) fn read(
         path: &Path,
         span: Span,
@@ -257,7 +257,7 @@ impl Content {
                 };
                 latest.insert(signal, value);
                 let sensed = signal.channel < 6 && signal.field == "sensed_mm";
-                // What a board says is no reading leaves a gap.
+                // A value that the board reports as no reading leaves a gap.
                 let is_read = !sensed || !content.readings.is_missing(signal.channel);
                 content
                     .signals
@@ -275,7 +275,7 @@ impl Content {
                 content.phase(logged.t_ns, phase_name(phase, step));
             }
             if Some(logged.channel) == last_joint {
-                // Before everything was measured once, there is nothing to show: no zeros.
+                // Until everything was measured once, there is nothing to show: no zeros.
                 let row = drawn.iter().map(|s| latest.get(s).copied()).collect();
                 if let Some(row) = row {
                     content.robot.push(logged.t_ns, row);
@@ -330,14 +330,14 @@ impl Content {
             mode,
             text,
         };
-        // What happens to several boards at one time is one line that names them all.
+        // The same change of several boards at one time is one line that names them all.
         let now = self.events.iter_mut().rev();
         let mut now = now.take_while(|other| other.t_ns == event.t_ns);
         if let Some(same) = now.find(|other| event.is_alike(other)) {
             same.boards.extend(event.boards);
         } else if self.events.len() < EVENTS || event.goes_wrong() && self.events.len() < 2 * EVENTS
         {
-            // What went wrong late in a long log is listed as well.
+            // Late failures in a long log are listed as well.
             self.events.push(event);
         } else {
             self.more_events += 1;
@@ -357,18 +357,18 @@ impl Content {
         (first as f64 * 1e-9, self.last_ns as f64 * 1e-9)
     }
 
-    /// The line of what went into the run of this kind, if there is one.
+    /// The line about an input of this kind, if there is one.
     pub(super) fn about(&self, kind: &str) -> Option<&str> {
         let found = self.head.iter().find(|(known, _)| known == kind);
         found.map(|(_, text)| text.as_str())
     }
 
-    /// What went wrong.
+    /// The failures.
     pub(super) fn faults(&self) -> impl Iterator<Item = &LoggedEvent> {
         self.events.iter().filter(|event| event.goes_wrong())
     }
 
-    /// The causes of it.
+    /// Their causes.
     pub(super) fn causes(&self) -> Vec<Cause> {
         cause::causes(self.faults().map(LoggedEvent::fault))
     }
@@ -407,7 +407,7 @@ impl Content {
             z_mm: column(20),
             yaw_deg: column(21),
             blind: self.readings.blind(end),
-            // It is no signal of the log.
+            // It is not a signal of the log.
             ground: None,
             phases: self.shown_phases(end),
             marks,

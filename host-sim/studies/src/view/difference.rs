@@ -1,9 +1,9 @@
-//! In what the strokes of two logs differ, at the times that both have.
+//! Differences between the strokes of two logs, at the times that both have.
 
 use super::content::Content;
 use super::signals::JOINTS;
 
-/// From here on two strokes are apart, mm: more than the noise of a potentiometer.
+/// Difference from which two strokes count as apart, mm: more than the noise of a potentiometer.
 const APART_MM: f32 = 1.0;
 
 /// One joint of two logs.

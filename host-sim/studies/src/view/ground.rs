@@ -1,4 +1,4 @@
-//! The ground of a log, out of the picture of it that the log has for viewers in space.
+//! The ground of a log, from its 3D scene.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -9,11 +9,11 @@ use wheeleg_telemetry::{Derived, read_derived};
 use crate::StudyError;
 use crate::motion::{GroundPicture, MOST_ROCKS, Strip, mm};
 
-/// Name of the ground among the things of the picture.
+/// Name of the ground among the entities of the scene.
 const GROUND: &str = "ground";
-/// Most triangles that are looked at; the finest map of this program has half as many.
+/// Most triangles that are read; the finest map of this program has half as many.
 const TRIANGLES: usize = 120_000;
-/// Corners of a block in the picture: those of its top are the last four.
+/// Corners of a block in the scene: those of its top are the last four.
 const BLOCK_CORNERS: usize = 8;
 
 #[derive(Deserialize)]
@@ -47,7 +47,7 @@ struct Pose {
     orientation: Turn,
 }
 
-/// About z alone.
+/// Only about z.
 #[derive(Deserialize)]
 struct Turn {
     z: f64,
@@ -72,13 +72,13 @@ impl Entity {
         all.take(TRIANGLES)
     }
 
-    /// Height of the triangles below a place; `None` beside all of them.
+    /// Height of the triangles at a place; `None` outside all of them.
     fn height(&self, x: f64, y: f64) -> Option<f64> {
         let heights = self.triangles().filter_map(|three| height(&three, x, y));
         heights.reduce(f64::max)
     }
 
-    /// Heights along a line ahead; 0 where the picture has none.
+    /// Heights along a line ahead; 0 where the scene has none.
     fn along(&self, strip: &Strip, y: f64) -> Vec<f64> {
         let mut heights = vec![f64::NEG_INFINITY; strip.count];
         let mut raise = |[low, high]: [f64; 2], height: &dyn Fn(f64) -> Option<f64>| {
@@ -108,7 +108,7 @@ impl Entity {
         heights.into_iter().map(known).collect()
     }
 
-    /// What is seen of the rocks from above.
+    /// The visible part of the rocks from above.
     fn rocks(&self, strip: &Strip) -> Vec<[f64; 5]> {
         let near = self.spheres.iter().filter(|rock| {
             let at = rock.pose.position;
@@ -119,7 +119,7 @@ impl Entity {
                 rock.pose.position,
                 [rock.size.x, rock.size.y, rock.size.z].map(|d| 0.5 * d),
             );
-            // The ground that it lies on, seen beside it, cuts the ellipsoid.
+            // The surrounding ground cuts the ellipsoid.
             let beside = self.height(at.x + 1.5 * radii[0].max(radii[1]), at.y);
             let deep = (beside.unwrap_or(0.0) - at.z).max(0.0) / radii[2];
             let share = (1.0 - deep * deep).max(0.0).sqrt();
@@ -132,7 +132,7 @@ impl Entity {
                 heading,
             ]
         });
-        // A log may be anybody's.
+        // A log may come from anyone.
         seen.filter(|rock| rock.iter().all(|v| v.is_finite()))
             .collect()
     }
@@ -146,7 +146,7 @@ impl Entity {
                 [mm(corner.x), mm(corner.y)]
             })
         });
-        // A log may be anybody's.
+        // A log may come from anyone.
         let sound = |top: &[[f64; 2]; 4]| top.as_flattened().iter().all(|v| v.is_finite());
         tops.filter(sound).take(MOST_ROCKS).collect()
     }
@@ -157,7 +157,7 @@ impl Ellipsoid {
         2.0 * self.pose.orientation.z.atan2(self.pose.orientation.w)
     }
 
-    /// Height of its upper side over a place; `None` beside it.
+    /// Height of its upper side at a place; `None` outside it.
     fn height(&self, x: f64, y: f64) -> Option<f64> {
         let at = self.pose.position;
         let (sin, cos) = self.heading_rad().sin_cos();
@@ -169,18 +169,18 @@ impl Ellipsoid {
     }
 }
 
-/// Height of a triangle at a place; `None` beside it, and of one that stands upright.
+/// Height of a triangle at a place; `None` outside it, and for a vertical one.
 fn height([a, b, c]: &[Point; 3], x: f64, y: f64) -> Option<f64> {
     let twice = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
     let share = |p: &Point, q: &Point| ((p.x - x) * (q.y - y) - (q.x - x) * (p.y - y)) / twice;
     let shares = [share(b, c), share(c, a), share(a, b)];
-    // Not a number for what has no area, which is not inside.
+    // Not a number for a triangle without area, which is not inside.
     let inside = shares.iter().all(|s| *s >= -1e-9);
     inside.then(|| shares[0] * a.z + shares[1] * b.z + shares[2] * c.z)
 }
 
-/// The ground of a log, below a robot with this track that was at these places ahead \[m\]. `None`:
-/// a level floor, or a log without a picture of its ground.
+/// The ground of a log, below a robot with this track at these places ahead \[m\]. `None`: a level floor, or
+/// a log without a scene of its ground.
 ///
 /// # Errors
 /// [`StudyError`] if the log cannot be read.
@@ -246,7 +246,7 @@ mod tests {
                     slope(9.0, 9.0),
                     slope(-9.0, 9.0),
                 ],
-                // The last two lead nowhere and stand upright.
+                // The last two are out of range and vertical.
                 indices: vec![0, 1, 2, 0, 2, 3, 0, 1, 99, 0, 1, 1],
             }],
             spheres: vec![rock],
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!((seen.len(), seen[0][4]), (1, 90.0));
     }
 
-    /// A log may be anybody's: what has no place is no part of the picture.
+    /// A log may come from anybody: an entity without a place is not drawn.
     #[test]
     fn blocks_and_rocks_without_a_place_are_left_out() {
         let block = |x: f64| Triangles {

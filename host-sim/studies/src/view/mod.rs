@@ -1,8 +1,8 @@
-//! Opens the log of a run, or of a live session, as one page: the robot plays it, its signals are
-//! drawn over one clock, its events can be gone to. Two logs are laid over each other and compared.
+//! Opens the log of a run, or of a live session, as one page: the robot is animated, its signals are drawn
+//! over one clock, its events can be jumped to. Two logs are overlaid and compared.
 //!
-//! A log may be anybody's, may break off, and may be long: memory does not grow with it, but for
-//! the strokes of two that are compared.
+//! A log may come from anybody, may break off, and may be long: memory does not grow with it, except for the
+//! strokes of two that are compared.
 
 mod content;
 mod difference;
@@ -25,33 +25,33 @@ use crate::export::write_new;
 use crate::study::Progress;
 use wheeleg_report::output::ensure_no_input;
 
-/// What to look at.
+/// Options of a view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// One log, or two that are compared.
+    /// One log, or two to compare.
     pub logs: Vec<PathBuf>,
-    /// Robot after which it is drawn, instead of the log's: built in, or a file.
+    /// Robot to draw instead of the log's: built in, or a file.
     pub robot: Option<String>,
-    /// Begin of the part that is looked at, s.
+    /// Start of the viewed part, s.
     pub from_s: f64,
     /// Its end, s.
     pub to_s: f64,
     /// Further signals, `/joint/3.force_net_n`.
     pub signals: Vec<String>,
-    /// The page; beside the first log unless given.
+    /// The page; beside the first log by default.
     pub out: Option<PathBuf>,
 }
 
-/// A page that was made.
+/// A finished page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Viewed {
-    /// Where it is.
+    /// Its path.
     pub page: PathBuf,
-    /// What it says first.
+    /// Its first sentence.
     pub verdict: String,
     /// Logs that break off.
     pub broken_off: Vec<PathBuf>,
-    /// Logs that end before the part that was asked for does, and when, s.
+    /// Logs that end before the requested part does, and when, s.
     pub ended: Vec<(PathBuf, f64)>,
 }
 
@@ -61,14 +61,14 @@ struct Named {
     content: Content,
 }
 
-/// A log that lacks less of the part that was asked for has its last sample a little earlier, s.
+/// If less than this is missing, the log's last sample is only a little early, s.
 const SAMPLES_S: f64 = 0.05;
 
-/// Makes the page; `None` if it was stopped before: no page is written then.
+/// Makes the page; `None` if it was stopped before: then no page is written.
 ///
 /// # Errors
-/// [`StudyError`] if a log cannot be read or is none of this program's, a signal or the robot does
-/// not exist, nothing is in the part that is looked at, or the page cannot be written.
+/// [`StudyError`] if a log cannot be read or is not this program's, a signal or the robot does not exist, the
+/// viewed part is empty, or the page cannot be written.
 pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, StudyError> {
     let mut groups = signals::groups();
     if let Some(asked) = signals::asked(&options.signals)? {
@@ -114,7 +114,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
         .chain(options.robot.as_deref().map(Path::new))
         .collect();
     ensure_no_input(&page, &reads)?;
-    // The page of a log is made anew; somebody's own file is kept.
+    // A log's own page is remade; a user's file is kept.
     if options.out.is_none() && page::is_ours(&page) {
         let _ = std::fs::remove_file(&page);
     }
@@ -136,7 +136,7 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
     }))
 }
 
-/// A part without a sample, and which parts have some.
+/// The error for a part without a sample, with the parts that have some.
 fn empty(path: &Path, content: &Content) -> StudyError {
     let path = path.display();
     let Some((first, last)) = content.whole_ns else {
@@ -150,7 +150,7 @@ fn empty(path: &Path, content: &Content) -> StudyError {
     )
 }
 
-/// The part that is looked at.
+/// The viewed part.
 fn span(options: &Options) -> Result<Span, StudyError> {
     let Options { from_s, to_s, .. } = *options;
     if !(from_s >= 0.0 && to_s > from_s) {
@@ -163,20 +163,20 @@ fn span(options: &Options) -> Result<Span, StudyError> {
             "give --from from 0 on, and --to after it",
         ));
     }
-    // The casts saturate: the end of no log is as late.
+    // The casts saturate: no log ends that late.
     Ok(Span {
         from_ns: (from_s * 1e9) as u64,
         to_ns: (to_s * 1e9) as u64,
     })
 }
 
-/// Sizes by which the robot is drawn, and whose they are.
+/// Sizes for drawing the robot, and their source.
 fn geometry(options: &Options, log: &Content) -> Result<(Drawing, Option<String>), StudyError> {
     if let Some(name) = &options.robot {
         let robot = builtin::robot(name)?;
         return Ok((Drawing::of(&robot), Some(robot.name)));
     }
-    // A name in a log opens no file.
+    // A name in a log must not open a file.
     let known = |name: &str| {
         builtin::ROBOTS
             .iter()
@@ -207,8 +207,8 @@ mod tests {
         BodySample, Cause, FootSample, JointSample, MasterSample, Recorder, SupplySample,
     };
 
-    /// A log of one second, of a robot that its maker calls `robot`. At 0.6 s its joints measure another
-    /// stroke, and board 3 may report a fault.
+    /// A log of one second, of a robot named `robot`. At 0.6 s its joints measure another stroke, and board 3
+    /// may report a fault.
     fn log(path: &Path, robot: &str, stroke_mm: f64, fault: Option<Fault>) {
         let board = Address::new(3).expect("a board");
         match fault {
@@ -311,7 +311,7 @@ mod tests {
             "{}",
             same.verdict
         );
-        // Another robot is no other run of the same.
+        // A log of another robot is not another run of the same.
         let third = folder.path().join("third.mcap");
         log(&third, "wheeleg", 90.0, None);
         let unlike = viewed(&options(&[&one, &third])).expect("a page").verdict;
@@ -319,7 +319,7 @@ mod tests {
         assert!(unlike.starts_with(begin), "{unlike}");
     }
 
-    /// A robot that gives up has no fault, but that is what its log is opened for.
+    /// A robot that gives up has no fault, but its log is opened for that.
     #[test]
     fn where_the_robot_gave_up_is_said_first_marked_and_found_by_its_name() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -22,12 +22,12 @@ const MARKS: usize = 20;
 /// Share of an axis that stays free above and below.
 const MARGIN: f64 = 0.05;
 
-/// By this a page of a log is known, near its start.
+/// Mark of a log's page, near its start.
 const OURS: &str = "<meta name=\"generator\" content=\"wheeleg view\">";
 
-/// Whether a file is such a page, which is made anew.
+/// Whether a file is such a page, which may be remade.
 pub(super) fn is_ours(page: &Path) -> bool {
-    // A pipe has nothing to say, and would be waited for.
+    // Reading a pipe would block.
     if !page.symlink_metadata().is_ok_and(|page| page.is_file()) {
         return false;
     }
@@ -41,15 +41,15 @@ pub(super) fn is_ours(page: &Path) -> bool {
 struct Line {
     t: f64,
     kind: &'static str,
-    /// Whether something went wrong.
+    /// Whether it is a failure.
     fault: bool,
-    /// As the log has it, which does not change.
+    /// Stable name, as in the log.
     name: &'static str,
     text: String,
     log: usize,
 }
 
-/// What is said of a log.
+/// Facts about a log.
 #[derive(Serialize)]
 struct About {
     name: String,
@@ -79,11 +79,11 @@ struct DifferenceLine {
     times: u64,
 }
 
-/// What the template shows.
+/// Values of the template.
 #[derive(Serialize)]
 struct Page<'a> {
     verdict: String,
-    /// What to do about what the verdict says.
+    /// Remedy for the verdict.
     remedy: Option<String>,
     logs: Vec<About>,
     motion: Option<String>,
@@ -139,7 +139,7 @@ fn panel(plot: &Plot, logs: &[Named]) -> Panel {
     panel
 }
 
-/// What the legend says: of two logs, also which.
+/// Text of the legend: for two logs, also which one.
 fn label(curve: &Curve, log: usize, logs: &[Named]) -> String {
     let which = match (logs.len(), log) {
         (1, _) => "",
@@ -177,7 +177,7 @@ fn about(log: &Named) -> About {
     }
 }
 
-/// What went wrong in the two logs: which has what first.
+/// Failures in the two logs: which one fails first, and how.
 fn faults(logs: &[Named]) -> String {
     let both = ["First", "Second"].into_iter().zip(logs);
     let told = both.filter_map(|(which, log)| {
@@ -215,7 +215,7 @@ pub(super) fn verdict(logs: &[Named], differences: &[Difference]) -> String {
     format!("{}{told}{}", unlike(logs), longer(logs))
 }
 
-/// In what two logs cannot be alike.
+/// Reasons why two logs cannot be alike.
 fn unlike(logs: &[Named]) -> String {
     let [one, other] = logs else {
         return String::new();
@@ -231,10 +231,10 @@ fn unlike(logs: &[Named]) -> String {
     }
 }
 
-/// Shorter logs than others by less than this differ in their last samples alone, s.
+/// Logs whose lengths differ by less than this differ only in their last samples, s.
 const AS_LONG_S: f64 = 0.05;
 
-/// What one of two logs has beyond the end of the other.
+/// The part of one of two logs beyond the end of the other.
 fn longer(logs: &[Named]) -> String {
     let [one, other] = logs else {
         return String::new();
@@ -247,7 +247,7 @@ fn longer(logs: &[Named]) -> String {
     }
 }
 
-/// Where the logs part first.
+/// Where the logs first differ.
 fn parting(differences: &[Difference]) -> String {
     let apart = differences
         .iter()

@@ -1,4 +1,4 @@
-//! Which signals of a log are shown, and in which panels.
+//! Signals of a log that are shown, and their panels.
 
 use wheeleg_report::plot::Colour;
 use wheeleg_report::plot::colour::{COMMAND, DELAYED, MODEL, RAW, ROBOT, SECOND};
@@ -20,7 +20,7 @@ pub(super) struct Curve {
     pub(super) signal: Signal,
     pub(super) label: String,
     pub(super) colour: Colour,
-    /// The same of a log that is compared.
+    /// The same for a compared log.
     pub(super) other: Colour,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Plot {
     pub(super) title: String,
     pub(super) unit: &'static str,
     pub(super) curves: Vec<Curve>,
-    /// What its axis shows in any case.
+    /// Smallest range of its axis.
     pub(super) least: (f64, f64),
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Group {
     pub(super) plots: Vec<Plot>,
 }
 
-/// Joints 1 to 6 by their names in events, and where they are.
+/// Joints 1 to 6 by their names in events, and their places.
 pub(super) const JOINTS: [&str; 6] = [
     "Joint 1 (left yaw)",
     "Joint 2 (left horizontal)",
@@ -52,7 +52,7 @@ pub(super) const JOINTS: [&str; 6] = [
 ];
 const SIDES: [&str; 2] = ["Left", "Right"];
 
-/// A channel by its topic; all that are named here exist.
+/// A channel by its topic; all topics named here exist.
 fn channel(topic: &str) -> usize {
     let place = channels().iter().position(|c| c.topic == topic);
     place.unwrap_or_default()
@@ -74,7 +74,7 @@ pub(super) fn foot(side: usize, field: &'static str) -> Signal {
     signal(["/foot/left", "/foot/right"][side], field)
 }
 
-/// What the robot's picture needs beside the panels.
+/// Signals of the robot's picture in addition to those of the panels.
 pub(super) fn pictured() -> Vec<Signal> {
     let feet = (0..2).map(|side| foot(side, "switches"));
     let master = ["phase", "step"].map(|field| signal("/master", field));
@@ -104,7 +104,7 @@ fn one(title: &str, unit: &'static str, least: (f64, f64), signal: Signal) -> Pl
     plot(title.to_owned(), unit, least, curves)
 }
 
-/// What is shown of every log.
+/// Panels of every log.
 pub(super) fn groups() -> Vec<Group> {
     let strokes = JOINTS.iter().enumerate().map(|(i, name)| {
         let asked = curve(joint(i, "commanded_mm"), "asked", COMMAND, DELAYED);
@@ -168,7 +168,7 @@ pub(super) fn groups() -> Vec<Group> {
     ]
 }
 
-/// Panels of signals that are asked for by name, `/joint/3.force_net_n`.
+/// Panels of signals requested by name, `/joint/3.force_net_n`.
 ///
 /// # Errors
 /// [`StudyError::Refused`] if there is no such channel or field, or it has no numbers.

@@ -1,6 +1,6 @@
-//! A signal of any length in little room: time is cut into stretches, and each keeps its smallest
-//! and its largest value, so that no peak is lost. When the stretches become too many, two
-//! neighbours become one.
+//! A signal of any length in limited memory: time is divided into stretches, and each keeps its smallest and
+//! its largest value, so that no peak is lost. When there are too many stretches, every two neighbours are
+//! merged.
 
 /// Most stretches.
 const MOST: usize = 1_000;
@@ -9,7 +9,7 @@ const SHORTEST_NS: u64 = 1_000_000;
 
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
-    /// Which of its length, from time 0.
+    /// Number of the stretch at its length, from time 0.
     number: u64,
     low: (u64, f64),
     high: (u64, f64),
@@ -45,7 +45,7 @@ impl Default for Thin {
 }
 
 impl Thin {
-    /// Takes a value. Time does not go back: a value of the past is none.
+    /// Takes a value. Time does not go back: a value from the past is ignored.
     pub(super) fn push(&mut self, t_ns: u64, value: f64) {
         if t_ns < self.newest_ns {
             return;
@@ -78,7 +78,7 @@ impl Thin {
         self.stretches = joined;
     }
 
-    /// The points that stand for it, in time; times in s.
+    /// The points that represent it, in order of time; times in s.
     pub(super) fn points(&self) -> Vec<(f64, f64)> {
         let mut points = Vec::with_capacity(2 * self.stretches.len());
         for Stretch { low, high, .. } in &self.stretches {

@@ -56,7 +56,7 @@ impl EventKind {
 
 macro_rules! codes {
     ($($(#[$default:meta])? $code:ident = $name:literal,)*) => {
-        /// What happened, by a name that stays the same from version to version.
+        /// What happened, by a name that is stable across versions.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         pub enum EventCode {$(
             #[doc = concat!("`", $name, "`")]

@@ -1,24 +1,24 @@
-//! Why all axes hold, as a person reads it: events, reports, the console's page and the command line
-//! have their words from here.
+//! Why all axes hold, in words for people: events, reports, the console's page and the command line take
+//! their words from here.
 
 use wheeleg_master::event::HoldReason;
 use wheeleg_master::finding::Finding;
 
 use super::names::hold_name;
 
-/// What is said of a reason to hold.
+/// The words for a reason to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HoldWords {
-    /// What happened; of a board, what happened to it. A sentence without its end.
+    /// What happened; of a board, what happened to it. A sentence without its full stop.
     pub cause: &'static str,
-    /// What comes of it, where that is more than that all axes hold; without an end.
+    /// The consequence, if it is more than that all axes hold; without a full stop.
     pub consequence: Option<&'static str>,
     /// What to do before the fault is cleared.
     pub remedy: Option<&'static str>,
 }
 
 impl HoldWords {
-    /// What to do until the robot can go on.
+    /// What to do until the robot can continue.
     #[must_use]
     pub fn way_on(&self) -> String {
         match self.remedy {
@@ -28,7 +28,7 @@ impl HoldWords {
     }
 }
 
-/// Every reason; the boards in them are of no account.
+/// Every reason; the boards in them do not matter.
 const ALL: [HoldReason; 8] = [
     HoldReason::NodeLost(0),
     HoldReason::NodeFault { node: 0, faults: 0 },
@@ -109,7 +109,7 @@ mod tests {
     use crate::Cause;
     use crate::messages::within;
 
-    /// Whoever reads an event reads the words of the table.
+    /// The text of an event uses the words of the table.
     #[test]
     fn every_reason_has_words_of_its_own_and_its_event_has_them() {
         let causes: BTreeSet<&str> = holds().map(|(_, words)| words.cause).collect();
@@ -124,7 +124,7 @@ mod tests {
                 "{words:?}"
             );
             let text = Cause::Master(MasterEvent::Hold(reason)).to_string();
-            // Where a board reports a fault, that is told.
+            // If a board reports a fault, that is given instead.
             if !matches!(reason, HoldReason::NodeFault { .. }) {
                 assert!(text.contains(&within(words.cause)), "{text}");
                 assert!(text.ends_with(&words.way_on()), "{text}");

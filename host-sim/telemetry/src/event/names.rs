@@ -1,4 +1,4 @@
-//! Names and kinds of events as the log has them. They stay the same from version to version.
+//! Names and kinds of events as they are logged. They are stable across versions.
 
 use wheeleg_master::behaviour::Act as Behaves;
 use wheeleg_master::contact::Side;
@@ -113,12 +113,12 @@ pub(super) fn master_detail(event: &MasterEvent) -> String {
     }
 }
 
-/// The name of a finding in the log, which stays the same.
+/// The stable name of a finding in the log.
 fn finding_name(finding: Finding) -> String {
     snake_case(&format!("{finding:?}"))
 }
 
-/// The finding that has a name in the log.
+/// The finding with this name in the log.
 #[must_use]
 pub fn finding_of_name(name: &str) -> Option<Finding> {
     let mut all = Finding::ALL.iter().copied();
@@ -176,7 +176,7 @@ const fn refusing_board(reason: &Refusal) -> Option<u8> {
     }
 }
 
-/// Name of a reason to hold that stays the same, in snake case.
+/// Stable name of a reason to hold, in snake case.
 #[must_use]
 pub const fn hold_name(reason: &HoldReason) -> &'static str {
     match reason {
@@ -191,7 +191,7 @@ pub const fn hold_name(reason: &HoldReason) -> &'static str {
     }
 }
 
-/// Name of a refusal at the door that stays the same, in snake case.
+/// Stable name of a refusal at the door, in snake case.
 #[must_use]
 pub const fn reject_name(reason: &Reject) -> &'static str {
     match reason {
@@ -244,7 +244,7 @@ pub(super) const fn side_name(side: Side) -> &'static str {
     }
 }
 
-/// Name of a board's parameter; its number where the table has none.
+/// Name of a board's parameter; its number if the table has none.
 pub(crate) fn parameter_name(node: u8, id: u16) -> String {
     let row = params_at(node).iter().find(|row| row.id == id);
     row.map_or_else(|| format!("0x{id:04X}"), |row| row.name.to_owned())

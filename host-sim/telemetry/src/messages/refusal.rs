@@ -1,4 +1,4 @@
-//! Why a command is not carried out, with what to do about it.
+//! Why a command is not carried out, and what to do about it.
 
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject};
 use wheeleg_master::finding::Finding;
@@ -59,7 +59,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
             "{} was reset meanwhile: do it again, and read back what it holds",
             board(node)
         ),
-        // A board keeps a fault whose cause is there: to clear it first would be no way out.
+        // A board keeps a fault while its cause lasts: to clear it first would not help.
         Refusal::NodeRefused {
             node,
             reason: NackReason::FaultLatched,
@@ -92,7 +92,7 @@ pub(super) fn refusal(reason: &Refusal) -> String {
     }
 }
 
-/// Why a command was refused at the door, with what to do about it.
+/// Why a command was refused at the door, and what to do about it.
 #[must_use]
 pub fn reject(reason: &Reject) -> String {
     match *reason {

@@ -1,4 +1,4 @@
-//! What can happen to a board: frames of a master on a bad line, time, sensors.
+//! Events that a board meets: frames of a master on a bad line, time, sensors.
 
 use arbitrary::{Arbitrary, Unstructured};
 use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
@@ -27,7 +27,7 @@ pub(crate) type Slot = [u8; 10];
 /// One thing that happens.
 #[derive(Clone, Debug)]
 pub(crate) enum Action {
-    /// Bytes of nobody.
+    /// Random bytes.
     Noise(Vec<u8>),
     /// SYNC: step of the counter, flags, slot of the board under test.
     Sync {
@@ -44,7 +44,7 @@ pub(crate) enum Action {
     Ticks(u8),
     /// Reading of the sensor.
     Reading(u16),
-    /// The sensor or what it measures is broken.
+    /// The sensor or the measured part is broken.
     Broken,
     /// Time jumps, µs: a tick that comes late.
     Jump(u16),
@@ -184,7 +184,7 @@ pub(crate) fn sync_bytes(cycle: u16, flags: u8, address: Address, slot: &Slot) -
     if let Some(index) = address.slot() {
         let mut slot = *slot;
         if address.is_wheel() && slot[9] & 1 != 0 {
-            // What only a joint can use would make the whole SYNC unsound.
+            // A field for joints only would make the whole SYNC unsound.
             slot[6..9].fill(0);
             slot[9] &= 0b1001;
             slot[3] = if slot[2] & 0x80 == 0 { 0 } else { 0xFF };

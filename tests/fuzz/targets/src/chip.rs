@@ -13,11 +13,11 @@ enum Word {
     Steady(u64),
     /// Two wrong bits: the hardware refuses to read it.
     Unreadable,
-    /// Reads as one of three things, at random.
+    /// Reads as one of three values, at random.
     Unsteady(u64, u64),
 }
 
-/// What is left of the operation that a power cut or an error hits.
+/// What remains of the operation that a power cut or an error hits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Arbitrary)]
 pub(crate) enum Torn {
     /// It has not begun.
@@ -32,8 +32,8 @@ pub(crate) enum Torn {
     Unsteady(u32),
 }
 
-/// When the power goes, or an error comes: operations before it, what is left of
-/// the one it hits, and whether the power is gone afterwards.
+/// When a power cut or an error comes: the number of operations before it, what remains of the one it hits,
+/// and whether the power stays off.
 #[derive(Clone, Copy, Debug, Arbitrary)]
 pub(crate) struct Mishap {
     pub(crate) after: u8,
@@ -48,7 +48,7 @@ pub(crate) struct Chip {
     mishap: Option<Mishap>,
     dead: bool,
     dice: Cell<u32>,
-    /// Operations so far, refused ones among them.
+    /// Operations so far, including refused ones.
     pub(crate) operations: usize,
     /// Erasures of each page that have begun.
     pub(crate) erased: [u32; PAGES],
@@ -58,7 +58,7 @@ pub(crate) struct Chip {
     pub(crate) voided: [u32; PAGES],
 }
 
-/// A generator of its own: what is drawn does not depend on anything else.
+/// A separate generator, independent of everything else.
 pub(crate) const fn draw(state: u32) -> u32 {
     // Numerical Recipes' constants; the high bits are the good ones.
     let next = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -92,13 +92,13 @@ impl Chip {
         }
     }
 
-    /// The power is there, until what is given happens.
+    /// Power is on until the given mishap.
     pub(crate) fn power(&mut self, mishap: Option<Mishap>) {
         self.mishap = mishap;
         self.dead = false;
     }
 
-    /// Whether what was given has happened.
+    /// Whether the given mishap has happened.
     pub(crate) const fn mishap_over(&self) -> bool {
         self.mishap.is_none()
     }
@@ -121,7 +121,7 @@ impl Chip {
         };
     }
 
-    /// Whether the operation is done; otherwise what is left of it.
+    /// Whether the operation completes; otherwise what remains of it.
     fn begins(&mut self) -> Result<(), Torn> {
         self.operations += 1;
         if self.dead {

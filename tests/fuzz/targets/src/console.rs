@@ -31,7 +31,7 @@ fn frame(json: &[u8]) {
             ..
         } => {
             assert!((1_000..=5_000_000).contains(&valid_us), "{valid_us}");
-            // What a recording keeps is what was given.
+            // A recording keeps the input unchanged.
             let kept = serde_json::to_string(&spoken).expect("JSON");
             let again: wheeleg_access::request::Spoken =
                 serde_json::from_str(&kept).expect("the same");

@@ -6,7 +6,7 @@ use wheeleg_protocol::{Decoder, Frame, FrameError};
 
 use crate::reference::{self, Reason, Sound};
 
-/// What the decoder under test said, in the words of the reference.
+/// The result of the decoder under test, in the types of the reference.
 pub(crate) fn said(result: Result<Frame<'_>, FrameError>) -> Result<Sound, Reason> {
     match result {
         Ok(frame) => Ok(Sound {
@@ -32,7 +32,7 @@ pub(crate) fn said(result: Result<Frame<'_>, FrameError>) -> Result<Sound, Reaso
     }
 }
 
-/// A stream through a decoder in chunks, whose sizes come from `sizes`.
+/// Passes a stream through a decoder in chunks, with sizes from `sizes`.
 pub(crate) fn in_chunks(stream: &[u8], sizes: &[u8]) -> (Vec<Result<Sound, Reason>>, Decoder) {
     let mut decoder = Decoder::new();
     let mut found = Vec::new();
@@ -64,7 +64,7 @@ pub(crate) fn check(stream: &[u8], sizes: &[u8]) -> Vec<Result<Sound, Reason>> {
     assert_eq!(frames as usize, sound);
     assert_eq!(errors as usize, expected.len() - sound);
 
-    // P3: whatever came before, one delimiter later a whole frame arrives.
+    // P3: after any input, a delimiter and a whole frame deliver that frame.
     let next = Sound {
         version: 1,
         message_type: 0x12,

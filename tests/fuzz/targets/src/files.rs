@@ -98,7 +98,7 @@ fn axis(text: &str) {
     }
 }
 
-/// What a user sees: the places are in the text, or this panics.
+/// The message that a user sees: rendering it panics if a span lies outside the text.
 fn explained(error: impl miette::Diagnostic + Send + Sync + 'static) {
     assert!(error.to_string().len() > 10);
     let shown = format!("{:?}", miette::Report::new(error));

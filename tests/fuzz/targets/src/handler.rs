@@ -29,9 +29,9 @@ pub(crate) trait Board {
     fn jump(&mut self, micros: u32);
     /// Bytes that end now.
     fn receive(&mut self, bytes: &[u8]);
-    /// What it wants to send.
+    /// The frame it wants to send.
     fn take(&mut self) -> Option<Transmission>;
-    /// One tick, with the checks of its outputs; gives its period.
+    /// Runs one tick, checks the outputs and returns the period.
     fn tick(&mut self) -> u32;
     /// Mode.
     fn mode(&self) -> Mode;
@@ -45,7 +45,7 @@ pub(crate) trait Board {
     fn hold_time_us(&self) -> u32;
     /// A new reading.
     fn reading(&mut self, raw: u16);
-    /// What is measured breaks.
+    /// Breaks the measured part.
     fn broken(&mut self);
     /// Levels of the switches.
     fn switches(&mut self, levels: u8);
@@ -76,7 +76,7 @@ const fn is_stopped(mode: Mode) -> bool {
     matches!(mode, Mode::Hold | Mode::Exhaust | Mode::Fault)
 }
 
-/// Bits of `before` that are gone.
+/// Bits of `before` that `after` lacks.
 fn vanished(before: FaultBits, after: FaultBits) -> bool {
     before.raw() & !after.raw() != 0
 }
@@ -225,7 +225,7 @@ impl<B: Board> Play<'_, B> {
                     bytes[second / 8] ^= 1 << (second % 8);
                 }
                 let before = state(self.board);
-                // Whatever was unfinished before ends here, one way or another.
+                // Any unfinished frame ends here, one way or another.
                 self.deliver(&bytes);
                 let answers = self.deliver(&[0]);
                 assert!(answers.is_empty(), "{answers:?} to a damaged frame");
@@ -243,7 +243,7 @@ impl<B: Board> Play<'_, B> {
         }
     }
 
-    /// The same request again: the same answer, and nothing is done again.
+    /// A repeated request gets the same answer and acts no second time.
     fn repeated(&self, between: &State<B::Parameters>, first: &[Message], second: &[Message]) {
         let busy = |message: &Message| {
             matches!(
@@ -335,7 +335,7 @@ impl<B: Board> Play<'_, B> {
         answers
     }
 
-    /// What a request has done at once.
+    /// What a request has done immediately.
     fn carried_out(&self, message: &Message, done: bool, after: &State<B::Parameters>) {
         let ends = matches!(message, Message::Disarm(_) | Message::EmergencyBrake(_));
         // A repetition is answered and not carried out again, but nothing can

@@ -102,7 +102,7 @@ fn check_valves(mode: Mode, [fill_a, vent_a, fill_b, vent_b]: [u16; 4], faults: 
     }
 }
 
-/// The first byte says where the run starts, the rest are actions.
+/// The first byte selects the start of the run; the rest are actions.
 pub fn run(data: &[u8]) {
     play(&mut JointRig::new(), &mut Unstructured::new(data));
 }

@@ -1,5 +1,5 @@
-//! What the fuzzers run. Each target is a function from bytes to nothing that
-//! panics when a property of the protocol or of the firmware is broken:
+//! The fuzz targets. Each is a function from bytes to nothing that panics when a property of the protocol or
+//! of the firmware is broken:
 //!
 //! | | property |
 //! |---|---|

@@ -30,7 +30,7 @@ const QUIET: u32 = 50;
 /// Requests per cycle that fit the line: none is shorter than 0.35 ms with its answer.
 const REQUESTS_MAX: u32 = 20;
 
-/// What a node does with what it would say.
+/// What a node does with its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Arbitrary)]
 enum Line {
     Whole,
@@ -43,7 +43,7 @@ enum Line {
 
 #[derive(Clone, Debug, Arbitrary)]
 enum Action {
-    /// Cycles in which every node does what it last was told to do.
+    /// Cycles in which every node obeys its last command.
     Cycles(u8),
     /// One cycle in which a node's reply and the answers suffer.
     BadLine(u8, Line, Line),
@@ -62,13 +62,13 @@ enum Action {
     Schema(u8, bool),
     /// A node refuses to arm.
     RefuseArm(u8, bool),
-    /// A sound frame of any kind, from anybody.
+    /// A sound frame of any kind, from any sender.
     Frame(AnyFrame),
-    /// Bytes of nobody.
+    /// Random bytes.
     Noise(Vec<u8>),
     /// A command.
     Command(AnyCommand),
-    /// Layer 1 stops or goes on.
+    /// Layer 1 stops or continues.
     Layer1(bool),
 }
 
@@ -209,7 +209,7 @@ struct Play {
     bad_line: Option<(usize, Line, Line)>,
     /// Bytes that come in the next cycle.
     late: Vec<Vec<u8>>,
-    /// What came behind the last delimiter.
+    /// Bytes after the last delimiter.
     unfinished: Vec<u8>,
     /// Replies to the newest SYNC.
     heard: [Option<SlotReply>; NODES],
@@ -229,13 +229,13 @@ struct Play {
     /// Admitted commands without an outcome.
     open: Vec<Ticket>,
     last_sync: Option<Sync>,
-    /// The newest SYNC was made in a stop.
+    /// The newest SYNC was built during a stop.
     last_held: bool,
     cycles: u32,
     next_id: u32,
 }
 
-/// The first byte says where the run starts, the rest are actions.
+/// The first byte selects the start of the run; the rest are actions.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let start = u.arbitrary::<u8>().unwrap_or_default() % 4;
@@ -337,7 +337,7 @@ impl Play {
         }
     }
 
-    /// Bytes to the master; what the reference finds in them is noted.
+    /// Passes bytes to the master and notes what the reference finds in them.
     fn hear(&mut self, bytes: &[u8], at: u64) {
         self.unfinished.extend_from_slice(bytes);
         let end = self.unfinished.iter().rposition(|byte| *byte == 0);
@@ -405,7 +405,7 @@ impl Play {
             );
         }
         let sync = sync_of(&bytes);
-        // An E-stop is taken between two SYNCs: the one before it knew nothing of it.
+        // An E-stop arrives between two SYNCs: the earlier one was built before it.
         self.check_sync(&sync, start, self.last_held && held && holds);
         self.last_sync = Some(sync);
         self.last_held = holds;
@@ -416,8 +416,7 @@ impl Play {
         self.rig.now_us += CYCLE_US;
     }
 
-    /// Whether what the nodes said, or did not say, in the cycle that ends must
-    /// stop all axes of an armed robot.
+    /// Whether the replies, or missing replies, of the cycle that ends must stop all axes of an armed robot.
     fn must_hold(&mut self) -> bool {
         let mut must = false;
         for (unheard, heard) in self.unheard.iter_mut().zip(self.heard) {

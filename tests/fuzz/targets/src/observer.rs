@@ -1,5 +1,5 @@
-//! What a board must have heard: a second view of the line, from the reference
-//! decoder and from the text of `SPEC.md` §4, to hold the board against.
+//! What a board must have heard: a second view of the line, from the reference decoder and the text of
+//! `SPEC.md` §4, to compare the board with.
 
 use wheeleg_protocol::{
     Address, Envelope, Frame, Header, LinkLossAction, Message, SCHEMA_HASH, Sync,
@@ -157,7 +157,7 @@ pub(crate) fn parse(sound: &Sound) -> Option<Message> {
     Message::parse(&Frame { header, payload }).ok()
 }
 
-/// The one message in what a board sends.
+/// The one message in the bytes that a board sends.
 pub(crate) fn sent(bytes: &[u8], own: Address) -> (Envelope, Message) {
     let found = reference::decode(bytes);
     let [Ok(sound)] = found.as_slice() else {

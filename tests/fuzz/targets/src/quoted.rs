@@ -59,7 +59,7 @@ fn in_a_page(text: &str) {
     let (attribute, element) = inside
         .and_then(|inside| inside.split_once("\">"))
         .expect("no mark of the text ends the attribute");
-    // What would act on a reader is taken out.
+    // Characters that act on a reader are removed.
     let taken_out = |c: char| acts(c) && !matches!(c, '\n' | '\t');
     let shown = text.replace(taken_out, "\u{fffd}");
     for part in [attribute, element] {

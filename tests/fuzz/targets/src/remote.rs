@@ -76,7 +76,7 @@ pub fn run(data: &[u8]) {
             stream.push(0);
         }
     }
-    // Behind whatever came before, a delimiter and a whole frame.
+    // After any input, a delimiter and a whole frame.
     stream.push(0);
     let mut buffer = [0; MAX_FRAME];
     let last = encode(9, &Request::Bye, &mut buffer).expect("it fits");

@@ -1,5 +1,5 @@
-//! Scenario and robot files of any content: no panic; what is accepted lies in
-//! its range, and what is refused is explained.
+//! Scenario and robot files with any content: no panic; accepted values are in range, and refusals are
+//! explained.
 
 use wheeleg_config::{ConfigError, RobotConfig, Scenario};
 
@@ -12,7 +12,7 @@ fn explained(error: &ConfigError, text: &str) {
     for problem in error.problems() {
         assert!(!problem.summary().is_empty());
     }
-    // What a user sees: the places are in the text, or this panics.
+    // The message that a user sees: rendering it panics if a span lies outside the text.
     let shown = format!("{:?}", miette::Report::new(error.clone()));
     assert!(shown.len() > 20 || text.is_empty());
 }

@@ -34,14 +34,14 @@ enum Action {
     Fade(bool, u8, Option<u8>),
 }
 
-/// What a page may hold.
+/// Possible contents of a page.
 #[derive(Debug, Default)]
 struct Page {
     /// Sets that may still be read from it.
     possible: Vec<Set>,
     /// The set that it holds without any damage.
     sound: Option<Set>,
-    /// Some of it may read differently each time.
+    /// Parts of it may read differently each time.
     unsteady: bool,
 }
 
@@ -53,7 +53,7 @@ struct Play {
     saves: u32,
 }
 
-/// The first bytes say what the flash holds at first, the rest are actions.
+/// The first bytes give the initial flash content; the rest are actions.
 pub fn run(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let Ok(content) = u.arbitrary() else {
@@ -180,13 +180,13 @@ impl Play {
                 assert_eq!(writes, 0, "written and not erased");
                 continue;
             }
-            // What reads differently each time may look newer than it is.
+            // A page that reads differently each time may look newer than it is.
             assert!(
                 unsteady || self.newest != Some(page),
                 "the newest set is erased before the next one stands"
             );
             self.damaged(page);
-            // An erasure that was torn may have left what was there.
+            // A torn erasure may have left the old content.
             if writes > 0 {
                 self.pages[page] = Page::default();
             }
@@ -219,7 +219,7 @@ impl Play {
         loaded.map(|((count, set), _)| set[..count].to_vec())
     }
 
-    /// What the reader gives, and whether it may.
+    /// Loads a set and checks that the reader may return it.
     fn load(&mut self) {
         self.chip.power(None);
         let loaded = self.loaded();

@@ -1,5 +1,5 @@
-//! Tables of a campaign, as Parquet: names, texts and what a file says of itself come back as they were,
-//! and of bytes that were changed the reader makes an error, or a table, and never a panic.
+//! Parquet tables of a campaign: names, texts and metadata survive a round trip; for changed bytes the reader
+//! returns an error or a table and never panics.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ fn table(text: &str) -> Table {
     Table { columns, data }
 }
 
-/// First the number of changes, then each as a place and a byte; what is left is the text.
+/// First the number of changes, then a place and a byte for each; the rest is the text.
 pub fn run(data: &[u8]) {
     let count = data
         .first()
@@ -71,7 +71,7 @@ pub fn run(data: &[u8]) {
 
     let mut bytes = fs::read(&path).expect("a file");
     for change in changes.chunks_exact(3) {
-        // The footer, which has most of what can be claimed, is at the end.
+        // The footer, which holds most of the claims, is at the end.
         let place = usize::from(u16::from_le_bytes([change[0], change[1]]));
         let at = bytes.len() - 1 - place % bytes.len();
         bytes[at] = change[2];

@@ -117,7 +117,7 @@ impl Board for Wheel {
     }
 }
 
-/// The first byte says where the run starts, the rest are actions.
+/// The first byte selects the start of the run; the rest are actions.
 pub fn run(data: &[u8]) {
     let mut wheel = Wheel {
         rig: WheelRig::new(),

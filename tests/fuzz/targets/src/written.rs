@@ -84,7 +84,7 @@ pub fn run(data: &[u8]) {
                     arrived(factor, value, &resolved.robot.parameters);
                 }
             }
-            // Values that do not go together; but what was written is TOML.
+            // Values that do not fit together; but the file was TOML.
             Err(error) => {
                 let said = explained(error);
                 assert!(!said.contains("not valid TOML"), "{said}");
@@ -93,7 +93,7 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// A value without a unit of its own stands in the robot as it is.
+/// A value without a unit of its own reaches the robot unchanged.
 fn arrived(factor: &Factor, value: &Value, parameters: &[wheeleg_config::ParameterInfo]) {
     let (Sets::Fields { robot, .. }, Value::Number(number)) = (&factor.sets, value) else {
         return;
@@ -115,7 +115,7 @@ fn explained(error: ConfigError) -> String {
         .iter()
         .map(wheeleg_config::Problem::summary);
     let said = problems.collect::<Vec<_>>().join("\n");
-    // What a user sees: the places are in the text, or this panics.
+    // The message that a user sees: rendering it panics if a span lies outside the text.
     assert!(format!("{:?}", miette::Report::new(error)).len() > 20);
     said
 }

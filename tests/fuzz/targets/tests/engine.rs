@@ -1,8 +1,7 @@
-//! The second engine: bolero draws the inputs, under plain `cargo test`. The
-//! number of inputs is small here; `BOLERO_RANDOM_ITERATIONS` and
-//! `BOLERO_RANDOM_TEST_TIME_MS` change it, as `cargo xtask deep engine` does.
-//! What it finds it shrinks, and names the `BOLERO_RANDOM_SEED` that repeats it.
-//! What must hold is asserted by the targets.
+//! The second engine: bolero draws the inputs, under plain `cargo test`. The number of inputs is small here;
+//! `BOLERO_RANDOM_ITERATIONS` and `BOLERO_RANDOM_TEST_TIME_MS` change it, as `cargo xtask deep engine` does.
+//! It shrinks each failing input and prints the `BOLERO_RANDOM_SEED` that repeats it. The targets assert the
+//! properties.
 
 fn iterations(default: usize) -> usize {
     let wanted = std::env::var("BOLERO_RANDOM_ITERATIONS").ok();

@@ -1,5 +1,5 @@
-//! Every input of the corpus and every regression through its target, as a
-//! plain test. The regressions' names say what was once wrong.
+//! Runs every input of the corpus and every regression through its target, as a plain test. The names of the
+//! regressions say what was once wrong.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ fn inputs(kind: &str, target: &str) -> Vec<(PathBuf, Vec<u8>)> {
         .collect()
 }
 
-/// Runs inputs; says which one failed before the panic goes on.
+/// Runs inputs; names the failing one before the panic continues.
 fn replay(kind: &str, at_least: usize) {
     for target in TARGETS {
         let inputs = inputs(kind, target.name);

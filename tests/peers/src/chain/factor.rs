@@ -94,7 +94,7 @@ impl<R: Ancestors> Ancestors for Path<R> {
         self.subtract(j, l, i, system);
         let x = system.x[i];
         system.x[j] -= l * x;
-        // Row i is not needed at j any more: what follows lies above j.
+        // Row i is no longer needed at j: the following rows lie above j.
         system.h[i][j] = l;
         above.reduce(i, system);
     }

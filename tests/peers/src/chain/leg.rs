@@ -31,7 +31,7 @@ pub struct ChainLeg {
     viscous_n_s_m: [f64; 3],
 }
 
-/// What the leg's frames are in the tree's: source index and sign of x, y and z.
+/// The leg's frames in the tree's: source index and sign of x, y and z.
 type Axes = [(usize, f64); 3];
 
 impl ChainLeg {

@@ -1,4 +1,4 @@
-//! A joint with the body behind it, and what hangs on that.
+//! A joint with its body and its child links.
 
 use super::num::Num;
 use super::spatial::{Mass, Sym3, Vec3};
@@ -9,7 +9,7 @@ const ORIGIN: [u16; 3] = [1, 2, 4];
 const COM: [u16; 3] = [8, 16, 32];
 const PRODUCTS: [u16; 3] = [64, 128, 256];
 
-/// Pattern of a link about which nothing is known.
+/// Pattern of a link without known zeros.
 pub const DENSE: u16 = 0x1FF;
 
 /// A rigid body and the joint that carries it. Plain SI data.

@@ -10,7 +10,7 @@
 //! B = \[ω̇ ×\] + \[ω ×\]²: force ma + Bh, moment h × a + axial(BS). The second moments S = ∫ρρᵀ dm move
 //! from frame to frame with less arithmetic than the inertia tr(S) 1 − S.
 //!
-//! [`Fixed`] stands on an unmoved base, [`Floating`] on a free body.
+//! [`Fixed`] has an unmoved base, [`Floating`] a free body.
 //!
 //! ```
 //! use wheeleg_peers::chain::{End, Fixed, LinkParams, Pz, Ry};

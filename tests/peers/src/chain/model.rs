@@ -11,8 +11,8 @@ use wheeleg_plant::dynamics::DynamicsError;
 /// Largest deviation of |quaternion|² from 1 that is accepted.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// Sum that is not finite if one of the values is not. It may also overflow; who sees it not
-/// finite looks closer.
+/// Sum that is not finite if one of the values is not. It may also overflow; the caller then checks each
+/// value.
 #[inline(always)]
 fn sum<const N: usize>(values: &[f64; N]) -> f64 {
     // The recursions' way to unroll would be a type more; N is small and the optimiser unrolls.
@@ -180,7 +180,7 @@ pub(super) fn floats<const N: usize>(numbers: &[Num; N]) -> [f64; N] {
     floats
 }
 
-/// Where a floating base is turned to, how its joints stand, and all rates.
+/// Orientation of a floating base, joint positions, and all rates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FloatingState<const J: usize, const N: usize> {
     /// Unit quaternion x, y, z, w that turns base axes into world axes.

@@ -131,7 +131,7 @@ mod tests {
         assert_eq!((a - o).get(), 3.0);
         assert_eq!(b.recip().get(), -2.0);
         assert_eq!(a.twice().get(), 6.0);
-        // A zero stays a zero, whatever it meets: that is what plain floats may not do.
+        // A zero stays a zero with any other operand: plain floats may not do that.
         assert!(!(o * Num::any(f64::NAN)).live);
         assert!(!(o + o).live && !(o - o).live && !(-o).live);
         assert!((a * b).live && (a - o).live && (-a).live);

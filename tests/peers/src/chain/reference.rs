@@ -100,7 +100,7 @@ type Dense3 = Px<DENSE>;
 type Dense2 = Pz<DENSE, Dense3>;
 type Dense1 = Rz<DENSE, Dense2>;
 
-/// The RPP leg with values that are known at run time only and no zero taken for granted.
+/// The RPP leg with values known only at run time and without assumed zeros.
 ///
 /// # Errors
 /// None for these parameters.

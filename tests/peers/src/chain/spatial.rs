@@ -104,7 +104,7 @@ impl Add for Vec3 {
 /// Where a child frame is in its parent: turned about the joint's axis, then displaced by r.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose {
-    /// Cosine and sine; used by revolute joints alone.
+    /// Cosine and sine; only for revolute joints.
     pub cos: Num,
     pub sin: Num,
     /// Origin of the child in the parent's frame.
@@ -258,7 +258,7 @@ impl Wrench {
         force: Vec3::ZERO,
     };
 
-    /// What a joint about (TURNS) or along axis A feels of it.
+    /// Its component at a joint about (TURNS) or along axis A.
     #[inline(always)]
     pub fn at<const A: usize, const TURNS: bool>(&self) -> Num {
         if TURNS {

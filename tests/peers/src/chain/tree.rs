@@ -54,7 +54,7 @@ impl<const J: usize> Positions for [f64; J] {
     }
 }
 
-/// For who has the directions already: (sine, cosine) of a revolute joint, (displacement, any) of a
+/// For callers that have the directions already: (sine, cosine) of a revolute joint, (displacement, any) of a
 /// prismatic one.
 impl<const J: usize> Positions for [(f64, f64); J] {
     #[inline(always)]
@@ -116,7 +116,7 @@ pub trait Tree: Recursion {}
 
 impl<T: Recursion> Tree for T {}
 
-/// What every kind of tree can do; not for use outside.
+/// Operations of every kind of tree; not for use outside.
 pub trait Recursion: Copy {
     /// Number of joints.
     const JOINTS: usize;

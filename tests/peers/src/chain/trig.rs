@@ -11,7 +11,7 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
 
-/// Beyond this angle (rad) the three parts are too short and the crate `libm` is asked.
+/// Beyond this angle (rad) the three parts are too short, and the crate `libm` is used.
 const LIMIT_RAD: f64 = 1.0e5;
 
 /// Adding this rounds to an integer and leaves it in the low bits.
@@ -67,7 +67,7 @@ fn near(r: f64) -> (f64, f64) {
     let tail = zz * ((C1 + z * C2) + zz * ((C3 + z * C4) + zz * (C5 + z * C6)));
     let half = 0.5 * z;
     let high = 1.0 - half;
-    // 1 - z/2 rounds; what it lost is put back.
+    // 1 - z/2 rounds; this adds the lost part back.
     let cos = high + (((1.0 - high) - half) + tail);
     (sin, cos)
 }

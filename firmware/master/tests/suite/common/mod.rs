@@ -297,7 +297,7 @@ impl TestRig {
         &mut self.nodes[usize::from(address) - 1]
     }
 
-    /// One bus cycle; gives the SYNC of it.
+    /// Runs one bus cycle; returns its SYNC.
     pub(crate) fn cycle(&mut self) -> Sync {
         let start = self.now_us;
         let bytes = self.master.cycle(start);

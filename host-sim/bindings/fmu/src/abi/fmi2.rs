@@ -42,7 +42,7 @@ extern "C" fn fmi2GetVersion() -> *const c_char {
 fn folder(uri: &str) -> PathBuf {
     let path = uri.strip_prefix("file:").unwrap_or(uri);
     let path = match path.strip_prefix("//") {
-        // A host may stand there, as `localhost`.
+        // There may be a host, as `localhost`.
         Some(rest) => rest.find('/').map_or(rest, |at| &rest[at..]),
         None => path,
     };
@@ -100,7 +100,7 @@ extern "C" fn fmi2SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Errors alone are told, and always.
+    // Only errors are logged, and always.
     OK
 }
 
@@ -161,7 +161,7 @@ accessors! {
         |v| Boolean::from(v.number() != 0.0), |v: Boolean| Value::Boolean(v != 0);
 }
 
-/// There are no texts; of none of them nothing is wrong.
+/// There are no text variables; an access to none of them is right.
 unsafe fn no_texts(instance: Handle, number: usize) -> Status {
     // SAFETY: an instance of ours or null.
     unsafe { call(instance, |_| count(number, 0)) }

@@ -78,7 +78,7 @@ extern "C" fn fmi3SetDebugLogging(
     _count: usize,
     _categories: *const *const c_char,
 ) -> Status {
-    // Errors alone are told, and always.
+    // Only errors are logged, and always.
     OK
 }
 
@@ -141,7 +141,7 @@ accessors! {
         |v| u8::from(v.number() != 0.0), |v: u8| Value::Boolean(v != 0);
 }
 
-/// Types that no variable has: to read or set none of them is allowed.
+/// Types without a variable: reading or setting none of them is allowed.
 macro_rules! no_variables {
     ($($name:ident)*) => {$(
         #[unsafe(no_mangle)]

@@ -1,5 +1,5 @@
-//! The C interface. What FMI calls goes to [`Unit`]; what it answers goes back as a status, and
-//! its reason to the importer's logger. No panic crosses.
+//! The C interface. FMI's calls go to [`Unit`]; its answers go back as a status, with the reason to the
+//! importer's logger. No panic crosses it.
 //!
 //! The only folder of this crate with `unsafe`: pointers come from the importer.
 
@@ -138,7 +138,7 @@ const OK: Status = 0;
 const ERROR: Status = 3;
 const FATAL: Status = 4;
 
-/// An instance, or a state of one, as the importer holds it.
+/// An instance, or a state of one, as held by the importer.
 type Handle = *mut c_void;
 
 /// The importer's logger; FMI 2's is variadic, as `printf`.
@@ -224,7 +224,7 @@ const PANICKED: &str = "the unit's own program failed; please report it with the
 /// Calls an instance.
 ///
 /// # Safety
-/// `instance` is null or what [`instantiate`] gave, and not freed.
+/// `instance` is null or a result of [`instantiate`], and not freed.
 unsafe fn call(instance: Handle, work: impl FnOnce(&mut Unit) -> Result<(), FmuError>) -> Status {
     // SAFETY: see above; FMI has one call at a time for an instance.
     let Some(instance) = (unsafe { instance.cast::<Instance>().as_mut() }) else {
@@ -270,7 +270,7 @@ unsafe fn get_state(instance: Handle, state: *mut Handle) -> Status {
     }
 }
 
-/// Puts a state into the importer's place for a handle; what is there is not looked at.
+/// Puts a state into the importer's place for a handle, without reading the old value.
 fn put(place: *mut Handle, state: State) -> Result<(), FmuError> {
     if place.is_null() {
         return Err(FmuError::State("there is no place for it".to_owned()));
@@ -311,7 +311,7 @@ unsafe fn with_state(
     }
 }
 
-/// Values of the importer; none of a null pointer.
+/// Values of the importer; empty for a null pointer.
 ///
 /// # Safety
 /// `values` is null or points to `count` values.
@@ -327,7 +327,7 @@ unsafe fn values<'a, T>(values: *const T, count: usize) -> &'a [T] {
 /// The importer's place for values.
 ///
 /// # Safety
-/// As [`values`], and nothing else refers to them.
+/// As [`values`], and with no other references to them.
 unsafe fn places<'a, T>(values: *mut T, count: usize) -> &'a mut [T] {
     if values.is_null() || count == 0 {
         &mut []
@@ -392,7 +392,7 @@ unsafe fn write<T: Copy>(
     }
 }
 
-/// Copies what fits the importer's place.
+/// Copies as many values as fit into the importer's place.
 fn copy<T: Copy>(from: &[T], to: &mut [T]) -> Result<(), FmuError> {
     crate::unit::count(to.len(), from.len())?;
     to.copy_from_slice(from);

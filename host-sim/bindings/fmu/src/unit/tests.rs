@@ -85,7 +85,7 @@ fn a_controlled_unit_goes_as_the_bench_of_the_studies() {
     for _ in 0..800 {
         bench.tick(0.1, 0.0).expect("sound");
     }
-    // One step of many ticks is the same as many of one.
+    // One step of many ticks equals many of one.
     unit.step(0.0, 0.8).expect("it goes on");
     let seen = bench.axis().outputs(&bench.state);
     assert_eq!(get(&unit, "stroke_m").to_bits(), seen.stroke_m.to_bits());
@@ -104,7 +104,7 @@ fn parameters_are_the_axis_files_and_are_checked_as_its() {
         set(&mut unit, "cylinder.timing_spread[2]", Value::Real(1.3)).expect("in range");
         set(&mut unit, "chamber.thermal", Value::Boolean(true)).expect("in range");
         unit.enter_initialization().expect("in turn");
-        // What is seen before the start are the values at the start.
+        // Before the start, the values at the start are visible.
         assert_eq!(get(&unit, "stroke_m"), 0.04);
         unit.exit_initialization().expect("sound");
         set(&mut unit, "fill_a_us", Value::Real(1000.0)).expect("in range");

@@ -15,7 +15,7 @@ use super::seen::{Happened, Seen, SeenSink, Sight};
 
 const MS: u64 = 1_000_000;
 
-/// A command that was given.
+/// A command given.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Given {
     /// Time since the scenario began, ms.
@@ -24,7 +24,7 @@ struct Given {
     command: String,
 }
 
-/// What makes a state.
+/// Data of a saved state.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Saved {
@@ -35,7 +35,7 @@ pub(super) struct Saved {
     hash: String,
 }
 
-/// Session, record and what was given.
+/// Session, record and the commands given.
 pub(super) struct Live {
     session: Session,
     recorder: Recorder<'static>,
@@ -76,7 +76,7 @@ impl Live {
         })
     }
 
-    /// Simulates, and gives what is seen at every `every_ms`.
+    /// Simulates, and returns the observable values at every `every_ms`.
     ///
     /// # Errors
     /// [`SimError`] if the plant leaves its range.
@@ -91,7 +91,7 @@ impl Live {
         Ok(sights)
     }
 
-    /// What is seen now.
+    /// The current observable values.
     pub(super) fn sight(&self) -> Sight {
         self.seen.borrow().sight(self.time_s())
     }
@@ -105,10 +105,10 @@ impl Live {
         self.session.is_over()
     }
 
-    /// Gives a command; `text` says the same.
+    /// Gives a command; `text` is the same as text.
     ///
     /// # Errors
-    /// What the master says against it.
+    /// The master's refusal.
     pub(super) fn command(&mut self, text: String, command: Command) -> Result<(), String> {
         let at_ms = self.now_ms - self.start_ms;
         self.given.push(Given {
@@ -133,7 +133,7 @@ impl Live {
         self.recorder.hash()
     }
 
-    /// What makes this state.
+    /// Data of this state.
     pub(super) fn saved(&self) -> Saved {
         Saved {
             at_ms: self.now_ms - self.start_ms,

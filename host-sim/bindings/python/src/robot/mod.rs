@@ -56,7 +56,7 @@ impl Robot {
             .ok_or_else(|| error::value("the robot's thread has ended: please report this"))
     }
 
-    /// Simulates, and gives what is seen at every `every_ms`.
+    /// Simulates, and returns the observable values at every `every_ms`.
     fn simulate(&self, py: Python<'_>, ms: u64, every_ms: u64) -> PyResult<Vec<Sight>> {
         let mut seen = Vec::new();
         let mut left = ms;
@@ -99,11 +99,11 @@ fn command_text(name: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<S
         } else if value.is_instance_of::<PyInt>() {
             match value.extract::<i64>() {
                 Ok(number) => number.to_string(),
-                // Longer than a number of TOML: in quotes, and told with what is allowed.
+                // Longer than a TOML number: quoted, and reported with the allowed range.
                 Err(_) => toml_text(&value.str()?.to_string()),
             }
         } else if value.is_instance_of::<PyFloat>() {
-            // TOML writes what is no number in small letters.
+            // TOML writes "not a number" and infinity in small letters.
             format!("{:?}", value.extract::<f64>()?).to_lowercase()
         } else {
             toml_text(&value.extract::<String>()?)

@@ -1,4 +1,4 @@
-//! What is seen of a robot: the newest sample of each part, SI.
+//! Observable values of a robot: the newest sample of each part, SI.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -6,7 +6,7 @@ use std::rc::Rc;
 use wheeleg_telemetry::samples::{BodySample, FootSample, JointSample, SupplySample, WheelSample};
 use wheeleg_telemetry::{EventCode, EventKind, SampleRef, Sink, Taken};
 
-/// Most events that wait to be taken; then the oldest goes.
+/// Most events that wait to be taken; then the oldest is dropped.
 const EVENTS: usize = 10_000;
 
 const MM: f64 = 1e-3;
@@ -30,7 +30,7 @@ pub(super) const WIDTHS: [(&str, usize); 14] = [
     ("air_m3", 1),
 ];
 
-/// What is seen at a time.
+/// Observable values at a time.
 #[derive(Debug, Clone)]
 pub(super) struct Sight {
     /// Time of the scenario, s.

@@ -50,8 +50,7 @@ impl Worker {
         Ok(Self(Mutex::new(jobs)))
     }
 
-    /// Does something on the thread and waits for what comes of it; `None` if the thread has
-    /// ended.
+    /// Runs a job on the thread and waits for its result; `None` if the thread has ended.
     pub(super) fn ask<R: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Live) -> R + Send + 'static,
@@ -75,7 +74,7 @@ impl Worker {
     }
 }
 
-/// Until nobody can ask any more.
+/// Works until nobody can ask any more.
 fn work(mut live: Live, to_do: &Receiver<Job>) {
     while let Ok(job) = to_do.recv() {
         job(&mut live);

@@ -1,8 +1,7 @@
-//! Ground that stands inside the chassis.
+//! Ground inside the chassis.
 //!
-//! The chassis touches the ground with its corners and edges alone, so a block between them would
-//! not be felt. What may move into it is outside of it first and meets an edge; only a start can
-//! have it inside.
+//! The chassis touches the ground only with its corners and edges, so it would not feel a block between them.
+//! A block that enters it later meets an edge first; only a start can place one inside.
 
 use nalgebra::Vector3;
 
@@ -10,9 +9,9 @@ use super::Touching;
 use crate::dynamics::floating::FloatingState;
 use crate::terrain::Surface as _;
 
-/// Distance of the places of the belly that are looked at, at most \[m\].
+/// Largest distance between the sampled places of the belly \[m\].
 const LOOK_M: f64 = 0.02;
-/// What the chassis lies on may stand so far into it: its contacts give way \[m\].
+/// Allowed depth of the ground that the chassis lies on: its contacts yield \[m\].
 const GIVES_WAY_M: f64 = 0.01;
 
 impl Touching {

@@ -21,7 +21,7 @@ pub struct Momentum {
     pub angular_kg_m2_s: Vector3<f64>,
 }
 
-/// Everything that depends on position and velocity alone.
+/// Everything that depends only on position and velocity.
 #[derive(Debug, Clone, Copy)]
 pub struct FloatingKin {
     pub(super) rotation: Matrix3<f64>,
@@ -59,7 +59,7 @@ impl FloatingKin {
         let right = eliminate(r, self.leg_masses, net(1), &mut block_r, &mut side_r)?;
         add_mirrored(&mut block, &block_r);
         self.add_base(&mut block);
-        // Wheels: both couple with the pitch rate alone.
+        // Wheels: both couple only with the pitch rate.
         if self.axle <= 0.0 {
             return Err(DynamicsError::Singular { pivot: self.axle });
         }

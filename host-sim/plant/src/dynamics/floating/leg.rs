@@ -10,7 +10,7 @@ use wheeleg_kinematics::LegPosture;
 use super::group::{AXES, GroupBody, Motion, Sym3, Yaw};
 use crate::dynamics::params::RobotDynamicsParams;
 
-/// What does not move.
+/// The constant data.
 #[derive(Debug, Clone)]
 pub(super) struct LegModel {
     barrel: (Vector3<f64>, Sym3),
@@ -115,7 +115,7 @@ impl LegModel {
             prime * b2_dot,
             leg.theta1_second * b2_dot * b2_dot,
         );
-        // Ω × a, the direction of the Coriolis acceleration of what slides along a.
+        // Ω × a, the direction of the Coriolis acceleration of a body sliding along a.
         let e = Vector3::new(0.0, motion.omega.z, -motion.omega.y);
         let coriolis = 2.0 * b2_dot;
         let rod_force =

@@ -1,4 +1,4 @@
-//! What the floating robot needs beyond the robot in eight coordinates.
+//! Parameters of the floating robot beyond those of the robot in eight coordinates.
 
 use serde::{Deserialize, Serialize};
 

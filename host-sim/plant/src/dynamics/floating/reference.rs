@@ -97,7 +97,7 @@ impl Base {
         )
     }
 
-    /// A body fixed to the chassis but for columns of its own.
+    /// A body fixed to the chassis, with additional columns of its own.
     fn body(
         &self,
         velocity: &Velocity,
@@ -111,7 +111,7 @@ impl Base {
         for (column, value, rate) in own {
             t.set_column(*column, &self.carried(value, rate).0);
         }
-        // ρ̇ = ċ − ṙ_B, and ṙ_B is what the linear columns give.
+        // ρ̇ = ċ − ṙ_B, and the linear columns give ṙ_B.
         let moving = t * velocity;
         let (omega, c_dot) = halves(&moving);
         let base: Vector3<f64> = self.rotation * velocity.fixed_rows::<3>(3);

@@ -35,7 +35,7 @@ pub struct FloatingRobot {
 }
 
 impl FloatingRobot {
-    /// Checks the parameters and precomputes what does not move.
+    /// Checks the parameters and precomputes the constant data.
     ///
     /// # Errors
     /// [`DynamicsError::Parameter`], [`DynamicsError::Leg`].
@@ -70,7 +70,7 @@ impl FloatingRobot {
             p.chassis_mass_kg * Vector3::new(cx, 0.0, cz),
             chassis.plus(&wheels),
         );
-        // Both legs: what is odd in Y cancels.
+        // Both legs: terms odd in Y cancel.
         let (leg_mass, h, j) = leg.fixed();
         let both = Sym3 {
             xx: 2.0 * j.xx,

@@ -70,8 +70,8 @@ pub struct System<const B: usize, const N: usize> {
 }
 
 impl<const B: usize, const N: usize> System<B, N> {
-    /// Passes a system whose blocks are finite; finite states so large that they overflowed are
-    /// refused with the number of the body.
+    /// Passes a system whose blocks are finite; refuses finite states that overflowed, with the number of the
+    /// body.
     pub(super) fn finite(self) -> Result<Self, DynamicsError> {
         for (index, b) in self.bodies.iter().enumerate() {
             let parts = [
@@ -184,8 +184,8 @@ impl<const B: usize, const N: usize> System<B, N> {
     }
 }
 
-/// The first pivot of an elimination that is not positive, NaN included; the last one if rounding
-/// alone made the difference.
+/// The first pivot of an elimination that is not positive, NaN included; the last one if only rounding made
+/// the difference.
 fn bad_pivot<const N: usize>(mut m: SMatrix<f64, N, N>) -> f64 {
     let mut pivot = 0.0;
     for k in 0..N {

@@ -67,7 +67,7 @@ pub(crate) struct ContactParams {
     pub(crate) bristle_damping_n_s_m: f64,
 }
 
-/// What a contact carries from step to step.
+/// State of a contact from step to step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct ContactState {
     /// Bristle stretch along the two tangents (m): sole ahead of its bristle's root.

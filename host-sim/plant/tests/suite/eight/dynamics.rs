@@ -61,7 +61,7 @@ pub(crate) struct RobotDynamics {
 }
 
 impl RobotDynamics {
-    /// Checks the parameters and precomputes what does not move.
+    /// Checks the parameters and precomputes the constant data.
     ///
     /// # Errors
     /// [`DynamicsError::Parameter`], or [`DynamicsError::Leg`] for impossible leg dimensions.
@@ -111,13 +111,13 @@ impl RobotDynamics {
         force[1] += torque_n_m;
     }
 
-    /// Angle of a wheel against the chassis (rad), what its encoder sees.
+    /// Angle of a wheel relative to the chassis (rad), as its encoder sees it.
     #[must_use]
     pub(crate) fn wheel_angle_rad(&self, q: &[f64; 8]) -> f64 {
         q[0] / self.params.wheel_radius_m + q[1]
     }
 
-    /// Everything that depends on position and velocity alone: feet, mass matrix, bias, gravity.
+    /// Everything that depends only on position and velocity: feet, mass matrix, bias, gravity.
     ///
     /// # Errors
     /// [`DynamicsError::NonFinite`], [`DynamicsError::Leg`].

@@ -24,7 +24,7 @@ pub(crate) struct RobotKin {
 }
 
 impl RobotKin {
-    /// Refuses what finite positions and rates overflowed to.
+    /// Refuses values to which finite positions and rates overflowed.
     pub(super) fn overflow(&self) -> Result<(), DynamicsError> {
         finite(
             "mass matrix and bias of the chassis",

@@ -5,7 +5,7 @@ use wheeleg_kinematics::LegPosture;
 use super::dynamics::RobotDynamics;
 use wheeleg_plant::dynamics::BodyParams;
 
-/// What slides a body along its yaw frame's forward axis.
+/// The joint that slides a body along its yaw frame's forward axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Slide {
     None,

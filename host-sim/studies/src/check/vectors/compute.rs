@@ -1,4 +1,4 @@
-//! The same quantities by this implementation.
+//! Computes the same quantities with this implementation.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -31,7 +31,7 @@ pub(super) enum Refused {
     Dynamics(#[from] DynamicsError),
 }
 
-/// Constants that follow from the parameters.
+/// Constants derived from the parameters.
 pub(super) fn derived(p: &Params) -> [(&'static str, f64); 7] {
     let [x, y] = p.p4_m;
     let beta = y.atan2(x);

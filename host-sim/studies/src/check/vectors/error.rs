@@ -1,4 +1,4 @@
-//! What is wrong with a file of vectors.
+//! Errors in a file of vectors.
 
 use std::fmt;
 
@@ -8,14 +8,14 @@ use thiserror::Error;
 /// Most problems that one message lists.
 const LISTED: usize = 12;
 
-/// One thing that is wrong at one place of a file.
+/// One error at one place of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// Path of the key, such as `cases[3].leg.q[1]`.
     pub path: String,
-    /// What stands there, shortened.
+    /// The value found, shortened.
     pub value: String,
-    /// What should.
+    /// The expected value.
     pub expected: String,
 }
 
@@ -41,7 +41,7 @@ pub enum VectorsError {
     Read {
         /// The file.
         file: String,
-        /// What the operating system said.
+        /// The operating system's reason.
         reason: std::io::Error,
     },
     /// The file is not JSON.
@@ -64,7 +64,7 @@ pub enum VectorsError {
     Malformed {
         /// The file.
         file: String,
-        /// All that is wrong, in the order of the file.
+        /// All errors, in the order of the file.
         problems: Vec<Problem>,
     },
 }

@@ -1,5 +1,5 @@
-//! Reference vectors: a file of states with the kinematics and dynamics that somebody else
-//! computed for them, compared number by number with this implementation.
+//! Reference vectors: a file of states with kinematics and dynamics computed by somebody else, compared
+//! number by number with this implementation.
 //!
 //! The schema is `wheeleg-reference-vectors/1` (MODEL.md section 13). Dimensions and masses are
 //! taken from the file, so that users can check a robot of their own. Every number of every key is
@@ -51,13 +51,13 @@ pub struct Quantity {
 pub struct Comparison {
     /// The file.
     pub file: String,
-    /// Seed that the file names.
+    /// Seed named in the file.
     pub seed: u64,
     /// Number of cases, at least one.
     pub cases: usize,
     /// Every quantity, in the order of the schema.
     pub quantities: Vec<Quantity>,
-    /// Parameters that the file holds but no quantity depends on.
+    /// Parameters in the file on which no quantity depends.
     pub unused_parameters: Vec<String>,
     /// Whether every quantity is within its tolerance.
     pub passed: bool,
@@ -81,7 +81,7 @@ impl Quantity {
     fn add(&mut self, case: Option<u64>, expected: &[f64], computed: &[f64]) {
         for (index, (&e, &c)) in expected.iter().zip(computed).enumerate() {
             let error = (e - c).abs();
-            // The first number always stands in the table; NaN is the worst of all.
+            // The first number is always in the table; NaN is the worst of all.
             if self.values == 0 || error > self.worst_error || error.is_nan() {
                 self.worst_error = if error.is_nan() { f64::INFINITY } else { error };
                 self.case = case;
@@ -98,8 +98,8 @@ impl Quantity {
 /// Reads a file and compares it.
 ///
 /// # Errors
-/// [`VectorsError`] for a file that cannot be read or does not follow the schema (with key path,
-/// value and what was expected), or with a state that no leg can take.
+/// [`VectorsError`] for a file that cannot be read or does not follow the schema (with key path, value and
+/// expected value), or with a state that no leg can take.
 pub fn check(path: &Path) -> Result<Comparison, VectorsError> {
     let text = wheeleg_config::builtin::text_of(path).map_err(|reason| VectorsError::Read {
         file: path.display().to_string(),
@@ -150,7 +150,7 @@ pub fn check_text(file: &str, text: &str) -> Result<Comparison, VectorsError> {
                 let got = computed.iter().find(|(name, _)| *name == key.name);
                 let got = got.map_or(&[][..], |(_, numbers)| numbers);
                 if let Some(quantity) = sheet.next() {
-                    // A number too few would go unnoticed in a zip.
+                    // A zip would hide a missing number.
                     let mut padded = got.to_vec();
                     padded.resize(key.len(), f64::NAN);
                     quantity.add(Some(case.id), numbers.get(key.name), &padded);

@@ -1,4 +1,4 @@
-//! A JSON value with its path, which notes what is wrong instead of stopping at the first thing.
+//! A JSON value with its path, which collects errors instead of stopping at the first.
 
 use std::cell::RefCell;
 
@@ -49,7 +49,7 @@ impl<'a> Node<'a> {
         });
     }
 
-    /// Notes that this value is not what it should be.
+    /// Notes that this value is not the expected one.
     pub(super) fn refuse(&self, expected: impl Into<String>) {
         let mut shown = self.value.to_string();
         if shown.chars().count() > SHOWN {
@@ -81,7 +81,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The value of a key; nothing if it is missing, which [`Node::keys`] has noted.
+    /// The value of a key; nothing if it is missing, as noted by [`Node::keys`].
     pub(super) fn get(&self, key: &str) -> Option<Node<'a>> {
         let value = self.value.as_object()?.get(key)?;
         Some(self.child(value, self.at(key)))
@@ -126,7 +126,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// A number in a range, said in words.
+    /// A number in a range, which is given in words.
     pub(super) fn number_that(&self, words: &str, fits: impl Fn(f64) -> bool) -> f64 {
         let number = self.number();
         if self.value.is_number() && !fits(number) {

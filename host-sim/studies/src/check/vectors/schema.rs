@@ -1,4 +1,4 @@
-//! The schema `wheeleg-reference-vectors/1` as a table, and the file read by it.
+//! The schema `wheeleg-reference-vectors/1` as a table, and reading a file by it.
 
 use std::cell::RefCell;
 
@@ -11,14 +11,14 @@ use super::{Problem, VectorsError};
 const SCHEMA: &str = "wheeleg-reference-vectors/1";
 const UNITS: &str = "SI, rad";
 
-/// What a key is for.
+/// Use of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
     /// State or load: read, not compared.
     Input,
-    /// Compared to the kinematic tolerance.
+    /// Compared with the kinematic tolerance.
     Kinematics,
-    /// Compared to the tolerance of forces.
+    /// Compared with the tolerance of forces.
     Force,
 }
 
@@ -165,7 +165,7 @@ const REQUIRED: [&str; 12] = [
     "wheel_viscous",
     "bodies",
 ];
-/// Constants that a file may repeat; compared with what the others give.
+/// Constants that a file may repeat; compared with those computed from the others.
 pub(super) const DERIVED: [&str; 7] = [
     "R",
     "beta",
@@ -205,7 +205,7 @@ pub(super) struct Params {
     pub(super) bodies: LegBodies,
     /// Derived constants that the file states.
     pub(super) derived: Vec<(&'static str, f64)>,
-    /// Parameters in the file that no quantity depends on.
+    /// Parameters in the file on which no quantity depends.
     pub(super) unused: Vec<String>,
 }
 
@@ -222,7 +222,7 @@ impl Numbers {
         found.map_or(&[], |i| &self.values[i])
     }
 
-    /// The same, as an array; zeros where the section has no such key.
+    /// The same, as an array; zeros if the section has no such key.
     pub(super) fn array<const N: usize>(&self, name: &str) -> [f64; N] {
         let values = self.get(name);
         std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0))
@@ -243,7 +243,7 @@ pub(super) struct VectorFile {
     pub(super) cases: Vec<Case>,
 }
 
-/// Reads the file by the schema.
+/// Reads a file by the schema.
 pub(super) fn read(file: &str, value: &Value) -> Result<VectorFile, VectorsError> {
     let problems = RefCell::new(Vec::<Problem>::new());
     let root = Node::root(value, &problems);

@@ -31,7 +31,7 @@ fn failing(file: &Value) -> Vec<String> {
     failing
 }
 
-/// The refusal's text; it must hold everything in `said`.
+/// Checks that the refusal's text holds everything in `said`.
 fn refused(file: &Value, said: &[&str]) {
     let error = match compare(file) {
         Err(error) => error.to_string(),
@@ -72,7 +72,7 @@ fn the_reference_vectors_agree() {
         assert!(q.values >= per_case && q.values % per_case == 0, "{q:?}");
         assert!(q.worst_error.is_finite(), "{q:?}");
     }
-    // Independent arithmetic rounds differently somewhere: the comparison is of two things.
+    // Independent arithmetic rounds differently somewhere: two implementations are compared.
     assert!(comparison.quantities.iter().any(|q| q.worst_error > 0.0));
 }
 
@@ -121,7 +121,7 @@ fn a_wrong_constant_is_found_and_named() {
     }
 }
 
-/// Inputs and parameters are used: a change of any shows somewhere.
+/// Every input and parameter is used: a change of any of them has an effect.
 #[test]
 fn no_input_is_ignored() {
     for section in &SECTIONS {
@@ -176,7 +176,7 @@ fn no_input_is_ignored() {
             add(&mut bad["params"]["bodies"][body][key], 0, 1e-6);
             assert!(!failing(&bad).is_empty(), "{key} of body {body}");
         }
-        // Of the inertias only the one about the vertical acts: legs do not tilt.
+        // Only the inertia about the vertical acts: legs do not tilt.
         let acts = |index: usize| {
             let mut bad = short();
             add(

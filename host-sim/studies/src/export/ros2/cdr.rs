@@ -1,11 +1,11 @@
 //! Common Data Representation, version 1, little-endian: the wire form of ROS 2 messages.
 //!
-//! Every number stands at a multiple of its size, counted behind the four bytes of the head.
+//! Every number is aligned to a multiple of its size, counted after the four header bytes.
 
 /// Bytes before the payload: little-endian CDR, no options.
 const HEAD: [u8; 4] = [0, 1, 0, 0];
 
-/// A message that is being written.
+/// A message being written.
 pub(super) struct Cdr(Vec<u8>);
 
 impl Cdr {

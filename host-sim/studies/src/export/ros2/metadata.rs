@@ -1,10 +1,10 @@
-//! `metadata.yaml` of a bag, in version 5: what Humble and all later versions read.
+//! `metadata.yaml` of a bag, in version 5, which Humble and all later versions read.
 
 use super::types::TOPICS;
 
 const FOREVER: &str = "sec: 9223372036\n    nsec: 854775807";
 
-/// Quality of service of a topic, YAML in a text, as rosbag2 has it.
+/// Quality of service of a topic, as YAML in a text, like in rosbag2.
 pub(super) fn profiles(latched: bool) -> String {
     // Reliable; transient local or volatile.
     let durability = if latched { 1 } else { 2 };

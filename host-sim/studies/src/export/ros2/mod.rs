@@ -1,7 +1,7 @@
 //! A log as a bag of ROS 2: joint states, frames, robot and clock, in CDR.
 //!
-//! The bag is a folder with `metadata.yaml` and one MCAP file of the profile `ros2`, as
-//! `ros2 bag play` takes it. Times are those of the simulation: play it with `use_sim_time`.
+//! The bag is a folder with `metadata.yaml` and one MCAP file of the profile `ros2`, for `ros2 bag play`.
+//! Times are simulated: play it with `use_sim_time`.
 
 mod cdr;
 mod metadata;
@@ -31,7 +31,7 @@ const CHUNK_BYTES: u64 = 1 << 20;
 /// Name of the bag's file without its ending.
 const FILE: &str = "bag_0.mcap";
 
-/// What was written.
+/// Summary of the bag.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bag {
     /// Messages of each topic.
@@ -94,7 +94,7 @@ pub fn export(log: &Path, folder: &Path, progress: &Progress) -> Result<Option<B
     let filling = Filling::begin(folder)?;
     let files = attachments(log)?;
     let Some(urdf) = files.into_iter().find(|file| file.name == "robot.urdf") else {
-        // Of a log that breaks off at once, that is what is told.
+        // If the log breaks off at once, report that instead.
         wheeleg_telemetry::read(log, &mut |_| ControlFlow::Break(()))?;
         return Err(without(log, "the robot's URDF"));
     };
@@ -218,7 +218,7 @@ impl Writer {
     fn take(&mut self, channel: Derived, t_ns: u64, payload: &[u8]) -> Result<(), StudyError> {
         match channel {
             Derived::Tf => {
-                // What is not of the form is nobody's message of ours.
+                // A message of another form is not one of ours.
                 let Ok(all) = serde_json::from_slice::<Transforms>(payload) else {
                     return Ok(());
                 };
@@ -264,7 +264,7 @@ fn joints(t_ns: u64, list: &[JointState]) -> Cdr {
         Cdr::new().time(t_ns).text("").count(list.len()),
         |cdr, j| cdr.text(&j.name),
     );
-    // Never an empty list: not every reader takes one for "unknown".
+    // Never an empty list: not every reader interprets that as "unknown".
     named
         .count(list.len())
         .numbers(list.iter().map(|j| j.position))

@@ -22,7 +22,7 @@ pub(super) enum Kind {
 pub(super) struct TopicDef {
     pub(super) name: &'static str,
     pub(super) kind: Kind,
-    /// Whoever comes late gets the last message: durability "transient local".
+    /// A late subscriber gets the last message: durability "transient local".
     pub(super) latched: bool,
 }
 
@@ -45,7 +45,7 @@ pub(super) static TOPICS: [TopicDef; 5] = [
 const TIME: &str = "int32 sec\nuint32 nanosec\n";
 const HEADER: &str = "builtin_interfaces/Time stamp\nstring frame_id\n";
 
-/// Types within a type, in the order in which they are first met.
+/// Types within a type, in the order of their first use.
 const fn within(kind: Kind) -> &'static [(&'static str, &'static str)] {
     match kind {
         Kind::JointState => &[
@@ -85,7 +85,7 @@ impl Kind {
         }
     }
 
-    /// Definition with those of all types within, as the encoding `ros2msg` has them.
+    /// Definition with those of all types within, as in the encoding `ros2msg`.
     pub(super) fn definition(self) -> String {
         let own = match self {
             Self::JointState => {

@@ -1,5 +1,5 @@
-//! Equations as the paper prints them beside the corrected ones (MODEL.md §10), evaluated over the
-//! workspace: how far they are apart, where, and whether any figure of the paper can tell.
+//! Equations as printed in the paper beside the corrected ones (MODEL.md §10), evaluated over the workspace:
+//! how far apart they are, where, and whether any figure of the paper can show it.
 
 mod r2p;
 mod rpr;
@@ -19,13 +19,13 @@ const ACCELERATION_M_S2: f64 = 10.0;
 /// Differences up to this are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What is the matter with an equation. MODEL.md §10.
+/// Kind of error of an equation. MODEL.md §10.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Wrong as printed.
     Wrong,
-    /// Right at the home pose only.
+    /// Right only at the home pose.
     Home,
     /// Can be read in a way that is wrong.
     Ambiguous,
@@ -33,7 +33,7 @@ pub enum Status {
     Singular,
 }
 
-/// One number of an equation, both ways.
+/// One number of an equation, in both forms.
 #[derive(Debug, Clone, Copy)]
 struct Component {
     label: &'static str,
@@ -51,7 +51,7 @@ struct Equation {
     evaluate: fn(&State<'_>) -> Vec<Component>,
 }
 
-/// A state of the closed leg with all that the equations need.
+/// A state of the closed leg with everything that the equations need.
 struct State<'a> {
     model: &'a Model,
     leg: LegPosture<f64>,
@@ -76,19 +76,19 @@ struct Model {
 pub struct Misprint {
     /// Number in the paper.
     pub equation: &'static str,
-    /// What is the matter.
+    /// Kind of error.
     pub status: Status,
     /// As printed.
     pub printed: &'static str,
-    /// What is right.
+    /// Corrected.
     pub corrected: &'static str,
     /// The component with the largest difference.
     pub component: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Largest difference over the workspace; none where the printed form is not finite.
+    /// Largest difference over the workspace; none if the printed form is not finite.
     pub worst: Option<f64>,
-    /// Printed form's value there; none where it is not finite.
+    /// Printed form's value there; none if it is not finite.
     pub printed_value: Option<f64>,
     /// Corrected form's value there.
     pub corrected_value: f64,
@@ -102,8 +102,8 @@ pub struct Misprint {
     pub differing_share: f64,
     /// Share of the states in which the printed form is not finite.
     pub not_finite_share: f64,
-    /// Largest difference at the home pose b2 = 0.40, b5 = b6 = 0.01 m, same rates; none where the
-    /// printed form is not finite.
+    /// Largest difference at the home pose b2 = 0.40, b5 = b6 = 0.01 m, same rates; none if the printed form
+    /// is not finite.
     pub at_home: Option<f64>,
     /// Largest difference in motions like those of the figures: no yaw; none as above.
     pub in_figures: Option<f64>,
@@ -272,7 +272,7 @@ fn line(equation: &Equation, unit: &'static str, states: &[Vec<State<'_>>; 3]) -
     }
 }
 
-/// The table, one line for each equation and unit. `progress` is told the share that is done.
+/// The table, one line for each equation and unit. `progress` gets the share that is done.
 ///
 /// # Errors
 /// [`DynamicsError`]; not inside the strokes.

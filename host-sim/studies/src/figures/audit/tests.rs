@@ -47,7 +47,7 @@ fn equation_16_has_the_numbers_of_the_audit() {
     let s = model.state([0.40, 0.19, 0.1], motion).expect("reachable");
     near(component("16", "ṗx", &s), (0.50, 0.31), 1e-12);
     near(component("16", "ṗy", &s), (0.40, 0.78), 1e-12);
-    // (13) misses b5 θ̇4 sideways and has the sign of the turn wrong.
+    // (13) lacks b5 θ̇4 sideways and has the wrong sign of the turn.
     near(component("13", "ṗy", &s), (0.0, 0.19), 1e-12);
     near(component("13", "ωz", &s), (-1.0, 1.0), 1e-12);
 }
@@ -122,7 +122,7 @@ fn every_misprint_of_the_audit_is_shown_to_be_one() {
     for number in home {
         for m in table.iter().filter(|m| m.equation == number) {
             assert_eq!(m.status, Status::Home);
-            // (16) misses b5 θ̈4, right for b5 → 0 only; home has b5 = 0.01 m, ℓ = 0.29 m.
+            // (16) lacks b5 θ̈4, so it is right only for b5 → 0; home has b5 = 0.01 m, ℓ = 0.29 m.
             let allowed = if number == "16" {
                 1.05 * 0.01 * ACCELERATION_M_S2 / 0.29
             } else {
@@ -134,7 +134,7 @@ fn every_misprint_of_the_audit_is_shown_to_be_one() {
         let worst = lines.filter_map(|m| m.worst).fold(0.0, f64::max);
         assert!(worst > 1e-2, "({number}): {worst}");
     }
-    // What is not finite is counted, never averaged away: (7) at yp = 0, (25) and (33) at home.
+    // Values that are not finite are counted, never averaged away: (7) at yp = 0, (25) and (33) at home.
     for number in ["7", "25", "33"] {
         let m = table
             .iter()

@@ -1,13 +1,12 @@
-//! What every axis did around an event, on commanded, sensed and physical
-//! signals.
+//! Every axis around an event, on commanded, sensed and physical signals.
 
 use super::{JOINTS, Points, Source, fitted, valves};
 use wheeleg_config::EventAction;
 use wheeleg_report::plot::{Content, Figure, Panel, Series, colour, line};
 use wheeleg_telemetry::{JointSample, Row, WheelSample};
 
-/// Shown before and after the event, s: the reaction, the stop of the wheels
-/// and the begin of a staged exhaust.
+/// Time shown before and after the event, s: the reaction, the stop of the wheels and the start of a staged
+/// exhaust.
 const BEFORE_S: f64 = 0.15;
 const AFTER_S: f64 = 0.85;
 
@@ -36,7 +35,7 @@ fn speed(points: &[(f64, f64)]) -> Points {
         .collect()
 }
 
-/// Range of what lies in the window, at least ±`span`.
+/// Range of the data in the window, at least ±`span`.
 fn near(window: (f64, f64), series: &[Series], span: f64) -> (f64, f64) {
     let inside: Vec<Series> = series
         .iter()
@@ -89,7 +88,7 @@ fn rims(s: &Source<'_>) -> [Vec<Series>; 3] {
     ]
 }
 
-/// Supply pressure, and the dump valve as commanded and as it is.
+/// Supply pressure, and the dump valve as commanded and in truth.
 fn supply(s: &Source<'_>, window: (f64, f64)) -> [Panel; 2] {
     let rows = &s.recording.supply;
     let of = |value: &dyn Fn(&wheeleg_telemetry::SupplySample) -> f64| -> Points {

@@ -6,11 +6,11 @@ use wheeleg_config::LegChoice;
 use wheeleg_report::number::fixed;
 use wheeleg_report::plot::{Content, Figure, colour, line};
 
-/// After the begin of a push the foot that has just landed settles for so long, s.
+/// Time after the start of a push in which the landed foot settles, s.
 const SETTLED_S: f64 = 0.2;
-/// A foot with less load does not stand, N.
+/// A foot with less load than this does not stand, N.
 const STANDS_N: f64 = 1.0;
-/// What the balance of the forces may leave, N: the foot's friction and its bearings.
+/// Allowed residual of the balance of forces, N: the foot's friction and its bearings.
 const BALANCED_N: f64 = 1.5;
 
 /// Means over all pushes, N.
@@ -26,12 +26,12 @@ struct Push {
     stepping_n: f64,
     /// Load of the other foot.
     other_n: f64,
-    /// Weight of what b6 moves.
+    /// Weight of the parts that b6 moves.
     weight_n: f64,
 }
 
 impl Push {
-    /// `None` where there is no reference model, or no whole push in the record.
+    /// `None` if there is no reference model, or no whole push in the record.
     fn of(s: &Source<'_>, b6: usize) -> Option<Self> {
         let model = s.analysis.reference.as_ref()?;
         let (gait, start_s) = (&s.robot.gait, s.analysis.start_s);
@@ -62,8 +62,8 @@ impl Push {
         })
     }
 
-    /// What explains the difference, if these numbers do: both feet stand, and F6 is what the
-    /// foot's load leaves of the weight.
+    /// The explanation of the difference, if these numbers support it: both feet stand, and F6 is the foot's
+    /// load less the weight.
     fn explained(&self) -> Option<String> {
         let rest_n = self.stepping_n - self.weight_n;
         let balanced = (self.simulated_n - rest_n).abs() < BALANCED_N;
@@ -137,8 +137,8 @@ mod tests {
     use crate::analysis::{analyse, testing};
     use wheeleg_config::builtin;
 
-    /// Two feet that stand share the load; the sentence says so with their numbers, and only where
-    /// they bear it.
+    /// Two standing feet share the load; the sentence says so with their numbers, but only if they support
+    /// it.
     #[test]
     fn the_other_foot_explains_the_gap_where_it_stands() {
         let robot = builtin::robot("wheeleg-2003").expect("built in");

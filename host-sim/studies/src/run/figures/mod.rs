@@ -11,7 +11,7 @@ use wheeleg_telemetry::{JointSample, Recording, Row};
 
 type Points = Vec<(f64, f64)>;
 
-/// Everything that figures are made from.
+/// Inputs of the figures.
 pub(super) struct Source<'a> {
     pub(super) scenario: &'a Scenario,
     pub(super) robot: &'a RobotConfig,
@@ -32,7 +32,7 @@ const JOINTS: [&str; 6] = [
 /// Most points of a curve of the reference model: two minutes at its 2 ms.
 const MODEL_POINTS: f64 = 60_000.0;
 
-/// The figures count as the paper's do; tables and messages are in scenario time.
+/// The figures count time like the paper's; tables and messages are in scenario time.
 const MOTION_TIME: &str = "time since the start of the motion [s]";
 
 impl Source<'_> {
@@ -45,7 +45,7 @@ impl Source<'_> {
         let rows = &self.recording.joints[0];
         let first = rows.first().map_or(0.0, Row::t_s);
         let last = rows.last().map_or(1.0, |r| r.t_s() + 1e-3);
-        // Whole steps where the record is that long, so that axes match the paper's.
+        // Whole steps if the record is that long, so that axes match the paper's.
         let from = self.t(first).max(-0.5);
         (
             if from > -0.05 { 0.0 } else { from },
@@ -74,12 +74,12 @@ impl Source<'_> {
             .collect()
     }
 
-    /// Period of the rows over the whole run, s: all of them are kept of a short run.
+    /// Period of the rows over the whole run, s: a short run keeps all of them.
     fn period_s(&self) -> f64 {
         self.recording.period_ms.max(1) as f64 * 1e-3
     }
 
-    /// Whether a row stands on that period, rather than near an event, where all are kept.
+    /// Whether a row is on that period, rather than near an event, where all are kept.
     fn regular<S>(&self, row: &Row<S>) -> bool {
         let period_ms = self.recording.period_ms.max(1);
         (row.t_ns / 1_000_000).is_multiple_of(period_ms)
@@ -103,7 +103,7 @@ impl Source<'_> {
     }
 }
 
-/// A range that holds the paper's axis and all data, with a little air.
+/// A range that holds the paper's axis and all data, with a small margin.
 fn fitted(axis: (f64, f64), series: &[Series]) -> (f64, f64) {
     let (mut lo, mut hi) = axis;
     for (_, y) in series.iter().flat_map(|s| &s.points) {
@@ -120,7 +120,7 @@ fn fitted(axis: (f64, f64), series: &[Series]) -> (f64, f64) {
     )
 }
 
-/// All figures that the scenario gives.
+/// All figures of the scenario.
 pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
     let side = s.analysis.leg.unwrap_or(LegChoice::Left);
     let first = if side == LegChoice::Left { 0 } else { 3 };
@@ -254,7 +254,7 @@ fn strokes(s: &Source<'_>) -> Figure {
     let panels = [0, 3].map(|first| {
         let series: Vec<Series> = (first..first + 3)
             .flat_map(|j| {
-                // Grey: blue is a joint.
+                // Grey: blue is used for a joint.
                 let label = if j == first { "commands" } else { "" };
                 [
                     line(label, colour::RAW, 1, s.joint(j, |v| v.commanded_mm)),
@@ -322,8 +322,8 @@ fn pressures(s: &Source<'_>, first: usize) -> Figure {
 /// Valve raster of all joints over a window, from rows of a period in s.
 fn valves(s: &Source<'_>, (window, period_s): ((f64, f64), f64), id: &str, title: &str) -> Figure {
     const VALVES: [&str; 4] = ["fill A", "vent A", "fill B", "vent B"];
-    // Bins of whole PWM periods where a period is narrower than a pixel or so,
-    // so that bins and pulses do not beat.
+    // Bins of whole PWM periods if a period is narrower than about a pixel, so that bins and pulses do not
+    // beat.
     let bin = (((window.1 - window.0) / 450.0) / period_s).ceil().max(1.0) as usize;
     let bin = if bin > 5 {
         bin.next_multiple_of(20)

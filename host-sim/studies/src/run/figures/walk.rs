@@ -7,22 +7,22 @@ use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_report::plot::{Colour, Content, Figure, Panel, RasterRow, colour, line, runs};
 use wheeleg_telemetry::{BehaviourSample, Cause, Row};
 
-/// Code of a leg in the log that stands.
+/// Code of a standing leg in the log.
 const STANCE: u8 = 1;
 /// A foot is loaded above this force, N.
 const LOADED_N: f64 = 1.0;
 /// Period of the rows of behaviours, s: a bus cycle.
 const CYCLE_S: f64 = 0.01;
-/// An instant is drawn as wide as this share of the whole, so that it is seen.
+/// Drawn width of an instant, as a share of the whole, so that it is visible.
 const TICK: f64 = 1.0 / 400.0;
 /// Height of a row, pixels.
 const ROW: u32 = 20;
-/// Slip is a mean over so many samples of 1 ms.
+/// Samples of 1 ms in a mean of the slip.
 const SLIP_SAMPLES: usize = 200;
-/// Slower rims have no slip that means anything, mm/s.
+/// Slower rims have no meaningful slip, mm/s.
 const SLOW_MM_S: f64 = 5.0;
 
-/// Those of a walk; none if the robot did not walk.
+/// The figures of a walk; none if the robot did not walk.
 pub(super) fn figures(s: &Source<'_>) -> Vec<Figure> {
     if s.recording.behaviours.is_empty() {
         return Vec::new();
@@ -112,7 +112,7 @@ fn count(v: &BehaviourSample, one: Behaviour) -> u32 {
     }
 }
 
-/// What the user should look at first: the robot stops, or nearly so.
+/// Whether the user should look at it first: the robot stops, or nearly so.
 fn is_grave(one: Behaviour) -> bool {
     matches!(
         one,
@@ -238,7 +238,7 @@ mod tests {
             recorder.foot(t_ns, 0, foot(!swings));
             recorder.foot(t_ns, 1, foot(true));
             for wheel in 0..2 {
-                // A quarter of the left rim's way is slip; the right one stands.
+                // A quarter of the left rim's travel is slip; the right one stands.
                 let v = WheelSample {
                     velocity_mm_s: if wheel == 0 { 100.0 } else { 0.0 },
                     slip_mm_s: if wheel == 0 { 25.0 } else { 1.0 },
