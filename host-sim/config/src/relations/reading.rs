@@ -178,7 +178,7 @@ pub(super) fn calibration(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
             offers.push(vec![Offer::new(f, it.fields[7], Bound::From, least_mm)]);
         }
     }
-    // Rounded to what people write; from a stop that is measured too low nothing follows.
+    // Rounded to usual numbers; a stop that is measured too low gives no limit.
     let stroke_m = sensor.stroke_at(most - off_mm, full_scale_mm, f.si(it.fields[5])?);
     let stroke_m = (stroke_m * 1e4).floor() * 1e-4;
     if stroke_m > 0.0 && stroke_m < sensor.stroke_m {

@@ -165,8 +165,8 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
     ))
 }
 
-/// Starts every cylinder of the study once from both of its ends: what cannot be simulated, or never
-/// moves, is told before anything is measured.
+/// Starts every cylinder of the study once from both of its ends, so that one that cannot be simulated, or
+/// never moves, is reported before anything is measured.
 fn ensure_moves(bores: &[AxisParams], options: &Options, file: &str) -> Result<(), StudyError> {
     let given = format!(
         "`--mass` = {} kg, `--load` = {} N",
@@ -196,7 +196,7 @@ fn ensure_moves(bores: &[AxisParams], options: &Options, file: &str) -> Result<(
     Ok(())
 }
 
-/// The answer where the plant does not take a cylinder in one of the bores that the study tries.
+/// The error for a bore of the study that the plant does not accept.
 fn not_bored(bored: &AxisParams, file: &str, error: &AxisSimError) -> StudyError {
     StudyError::refused(
         format!(
@@ -208,7 +208,7 @@ fn not_bored(bored: &AxisParams, file: &str, error: &AxisSimError) -> StudyError
     )
 }
 
-/// The answer to what leaves the model: `given` are the values of the command line.
+/// The error for a trial that leaves the model: `given` are the values of the command line.
 fn not_simulated(given: &str, error: &AxisSimError) -> StudyError {
     let cause = match error {
         AxisSimError::Unphysical { help, .. } => format!("; {help}"),
