@@ -312,7 +312,7 @@ async fn handshake(
 }
 
 /// Whether a name can be shown to others as it is.
-fn is_name(name: &str) -> bool {
+pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     (1..=32).contains(&name.len()) && name.chars().all(plain)
 }
