@@ -166,6 +166,11 @@ def answers(page, last, seconds=15):
     return page.inner_text(".answer").strip().startswith(f"{last}: done")
 
 
+def spoken(command):
+    """A command as the page says it."""
+    return re.sub("(?<=.)[A-Z]", lambda letter: f" {letter[0].lower()}", command)
+
+
 def becomes_ready(page):
     """Presses Ready until the robot stands armed: a fault is cleared, control that was lost is taken again, and air that
     went out comes back in its time."""
@@ -179,9 +184,9 @@ def becomes_ready(page):
             # It reads otherwise as soon as the control is there.
             with contextlib.suppress(Exception):
                 take.click(timeout=1000)
-                answers(page, "TakeControl")
+                answers(page, "Take control")
         press(page, "Clear fault")
-        answers(page, "ClearFault")
+        answers(page, "Clear fault")
         page.wait_for_timeout(500)
     return False
 
@@ -327,7 +332,7 @@ def walks_by_hand(page, robot, name="walking by hand"):
     """The legs step along; who lets go stops with both feet down, and the robot is not held."""
     page.select_option("select[aria-label='What moves']", "walk")
     button = page.get_by_role("button", name="Forward")
-    undisturbed(page, robot, drives, name, lambda: hold_down(page, button), page.mouse.up, "StopGait", 20.0, "ARMED")
+    undisturbed(page, robot, drives, name, lambda: hold_down(page, button), page.mouse.up, "Stop walking", 20.0, "ARMED")
 
 
 def drives_by_gamepad(page, robot):
@@ -350,7 +355,7 @@ def events(page):
     folded = [line for line in whole if "joints 1–6, wheels 7–8" in line]
     expect(folded, f"alike events of eight boards are not one line: {whole[:12]}")
     newest = "\n".join(whole[:8])
-    says = [line for line in whole[:8] if "says why" in line and "Emergency stop" in line]
+    says = [line for line in whole[:8] if re.search(" says? why", line) and "Emergency stop" in line]
     expect(len(says) == 1 and "EmergencyStop: accepted (by you)" in newest, f"a stop is not in sight among the newest events: {whole[:8]}")
     expect(not any("foot leaves the ground" in line for line in whole), f"contacts push out what counts: {whole[:8]}")
     panel.get_by_label("Kind of events").select_option("contact")
@@ -425,13 +430,14 @@ def events_alone(page):
         view.add(event(9, "wheel 7: faults cleared", { code: "faults_cleared", board: 7, fault: 0 }));
         view.add(event(10, "left foot leaves the ground", { kind: "contact", code: "lift_off", fault: 0 }));
         for (const [number, board, s] of [[11, 1, 0.004], [12, 2, 0.017]]) view.add({ ...says(number, board, s), fault: 39 });
-        view.add(event(13, "stop", { code: "hold", stopped: { via: "console", name: "ctl", session: "0", role: "control", at_us: 1 } }));
+        view.add(event(14, "no foot carries: the wheels slow down", { kind: "info", code: "tip_guard", fault: 0 }));
+        view.add(event(15, "stop", { code: "hold", stopped: { via: "console", name: "ctl", session: "0", role: "control", at_us: 1 } }));
         return [...view.root.querySelectorAll("li")].map((line) => `${line.textContent.slice(4)}${line.hidden ? " (hidden)" : ""}${line.className === "bad" ? "" : " (plain)"}`).reverse();
     }""")
     wanted = ["first", "second", "third", "fourth"]
-    wanted += [f"{who} says why: first fault, {s} s ago: it is hot" for who, s in (("joints 1–2", "0.01"), ("joint 3 (left vertical)", "0.25"))]
+    wanted += [f"{who} why: first fault, {s} s ago: it is hot" for who, s in (("joints 1–2 say", "0.01"), ("joint 3 (left vertical) says", "0.25"))]
     wanted += ["hold (tablet, revoked by owner)", "wheel 7 (left): faults cleared (plain)", "left foot leaves the ground (hidden) (plain)"]
-    wanted += ["joints 1–2 says why: first fault, 0.004 s ago: it is hot", "stop (by “ctl”)"]
+    wanted += ["joints 1–2 say why: first fault, 0.004 s ago: it is hot", "no foot carries: the wheels slow down (hidden) (plain)", "stop (by “ctl”)"]
     expect(lines == wanted, f"the list of events: {lines}")
     with page.expect_download() as download:
         page.locator("#alone").get_by_role("button", name="Save events as CSV").click()
@@ -442,11 +448,30 @@ def events_alone(page):
     expect(names == ["Joint 3 (left vertical)", "Wheel 7 (left)", "Wheel 8 (right)", "Joints 1–2", "Joints 1–6, wheel 8 (right)"], f"boards by name: {names}")
 
 
+def ground_goes_on(page):
+    """However far the robot has gone, there are marks and metres on the ground, each where it is."""
+    seen = page.evaluate("""async () => {
+        const { floorSide } = await import("/ground.js");
+        const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+        const move = floorSide(picture);
+        return [0, 6400, 25030, -7300].map((travel_mm) => {
+            move({ travel_mm }, []);
+            const places = (one) => [...one.closest("svg").querySelectorAll("g[transform]")].filter((g) => g.contains(one)).reduce((sum, g) => sum + Number(g.getAttribute("transform").match(/-?[0-9.]+/)[0]), 0);
+            const lines = [...picture.querySelectorAll("line")].map((line) => Number(line.getAttribute("x2")) + places(line));
+            const texts = [...picture.querySelectorAll("text")].filter((text) => text.getAttribute("visibility") === "visible");
+            // A label is 8 mm beside its mark, which the depth of the near edge moves by 135.2 mm.
+            const off = texts.map((text) => Number(text.getAttribute("x")) + places(text) - 8 + 135.2 + travel_mm - 1000 * Number(text.textContent.replace("−", "-").split(" ")[0]));
+            return [Math.min(...lines) < -392, Math.max(...lines) > 918, texts.length >= 2, Math.max(...off.map(Math.abs)) < 1];
+        });
+    }""")
+    expect(all(all(one) for one in seen), f"marks on the ground: {seen}")
+
+
 def board_table(page):
     page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
     row = page.locator(".boardlist .boardtable tbody tr").nth(2)
     try:
-        page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardlist .boardtable tbody tr')[2].cells[3].textContent)", timeout=15000)
+        page.wait_for_function("() => /^[1-9]/.test(document.querySelectorAll('.boardlist .boardtable tbody tr')[2].cells[1].textContent)", timeout=15000)
     except Exception:
         problems.append(f"the table of boards has no counts: {row.inner_text()!r}")
     page.get_by_role("region", name="Boards").locator("summary", has_text="Table").click()
@@ -550,7 +575,7 @@ def form(page, command, **arguments):
     for name, value in arguments.items():
         page.fill(f".fields [name={name}]", str(value))
     page.get_by_role("button", name="Send", exact=True).last.click()
-    page.wait_for_function("command => RegExp(`${command}: `).test(document.querySelector('.answer').textContent)", arg=command, timeout=6000)
+    page.wait_for_function("command => RegExp(`${command}: `).test(document.querySelector('.answer').textContent)", arg=spoken(command), timeout=6000)
     return page.inner_text(".answer")
 
 
@@ -586,7 +611,7 @@ def parameters(page):
         problems.append(f"the panel writes: {page.inner_text('.answer')!r}")
     expect(float(value.input_value()) == 22.5, f"what was written is shown as {value.input_value()}")
     panel.get_by_role("button", name="Save on the board").click()
-    page.wait_for_function("() => /SaveParameters: /.test(document.querySelector('.answer').textContent)", timeout=5000)
+    page.wait_for_function("() => /Save parameters: /.test(document.querySelector('.answer').textContent)", timeout=5000)
     told = page.inner_text(".answer")
     expect("refused" in told and "disarm" in told.lower(), f"saving while armed, in the panel: {told!r}")
 
@@ -699,7 +724,7 @@ def server_is_gone(page):
     for part in [".control", ".drive", ".try", ".form", "section[aria-label=Recording]", ".joints"]:
         count = page.locator(f"{part} :is(button, input, select):not([disabled]):visible").count()
         expect(count == 0, f"{count} things of {part} can be pressed without a server")
-    expect(page.locator(".fault p:visible").count() == 0, f"without a server a card asks for what cannot be pressed: {page.inner_text('.faults')!r}")
+    expect(page.locator(".faults :is(p, ol):visible").count() == 0, f"without a server a card asks for what cannot be pressed: {page.inner_text('.faults')!r}")
     page.keyboard.press("Space")
     expect("no connection" in page.inner_text(".answer"), f"Space without a server: {page.inner_text('.answer')!r}")
     page.keyboard.press("Escape")
@@ -747,6 +772,7 @@ def journey(browser, console, folder):
     expect(becomes_ready(page), f"Ready after a look in space: {page.inner_text('.answer')!r}")
     plots(page, folder)
     board_table(page)
+    ground_goes_on(page)
     before = page.locator(".views .side svg").inner_html()
     expect(walks(page), f"Walk: {page.inner_text('.answer')!r}")
     expect(page.locator(".views .side svg").inner_html() != before, "the robot stands still on the page while it walks")
@@ -764,11 +790,12 @@ def journey(browser, console, folder):
     done_until_seen(page, inject.click, ".fault:has-text('Joint 3')", 5000)
     remedy = page.inner_text(".faults")
     expect("Joint 3 (left vertical)" in remedy and "potentiometer" in remedy, f"the fault and its remedy: {remedy!r}")
-    expect("Injected by you: pot-open:joint3. Press End" in remedy, f"what is in the way: {remedy!r}")
+    expect("You have injected pot-open:joint3." in remedy, f"what is in the way: {remedy!r}")
     told = page.inner_text(".try .answer")
     expect("Inject: done" in told, f"beside Inject: {told!r}")
     expect(waits(page, "State", ["HOLD"]), f"after the fault: {cell(page, 'State')}")
     expect("No reading" in page.locator(".joint").nth(2).inner_text(), "the joint shows a reading all the same")
+    expect(page.locator(".scope-plot .legend b").nth(1).inner_text() == "–", f"the plot shows a reading all the same: {page.inner_text('.scope-plot .legend')!r}")
     expect("error" not in page.locator(".joint").nth(2).inner_text(), "the joint shows an error of no reading")
     expect(page.locator(".joint.blind").count() == 1, "other joints show no reading, too")
     page.evaluate("scrollTo(0, 0)")
@@ -856,16 +883,20 @@ def lost_again(page):
     told = page.inner_text(".faults")
     expect(re.search(r"[0-9.]+ s after you had taken it", told) and "Joint 3 (left vertical)" in told, f"control that was lost again: {told!r}")
     press(page, "Clear fault")
-    page.wait_for_function("() => document.querySelector('.answer').textContent.includes('ClearFault: refused')", timeout=5000)
+    page.wait_for_function("() => document.querySelector('.answer').textContent.includes('Clear fault: refused')", timeout=5000)
     told = page.inner_text(".answer")
-    expect(re.search(r"you lost control [0-9.]+ s ago: press Take control again", told), f"without control: {told!r}")
+    expect(re.search(r"you lost control at [0-9.]+ s of the robot's clock: press Take control again", told), f"without control: {told!r}")
     page.locator(".buttons button", has_text="Take control").click()
     expect(waits(page, "Control", ["you"]) and "You lost control" not in page.inner_text(".faults"), f"with control: {page.inner_text('.faults')!r}")
 
 
 def ends_by_key(page, inject):
-    """Who ends a fault by keyboard goes on at what is pressed next."""
-    page.get_by_role("button", name="End", exact=True).focus()
+    """Who ends a fault by keyboard, on its card, goes on at what is pressed next. A board that keeps its fault does not keep the others from being cleared."""
+    press(page, "Clear fault")
+    page.wait_for_function("() => document.querySelector('.answer').textContent.includes('Clear fault: refused')", timeout=5000)
+    told = page.inner_text(".answer")
+    expect("then clear it. The other boards no longer hold, and are disarmed. Injected: pot-open:joint3." in told or "Take control" in told, f"a fault that stays: {told!r}")
+    page.get_by_role("button", name="End pot-open:joint3").focus()
     page.keyboard.press("Enter")
     page.wait_for_selector(".injected li", state="detached", timeout=5000)
     focused = page.evaluate("document.activeElement.textContent")
@@ -881,14 +912,14 @@ def stopped_by_another(page, viewer):
     expect(waits(page, "State", ["STOPPED"]), f"a viewer's stop: {cell(page, 'State')}")
     passes(page, 3)
     told = page.inner_text(".faults")
-    expect("Stopped by another browser, with the view key, at" in told and "Clear fault, then Ready" in told, f"who stopped, for the operator: {told!r}")
+    expect("Stopped by another browser, with the view key, at" in told and "Make sure that nobody needs" in told and "Press Clear fault.\nPress Ready" in told, f"who stopped, for the operator: {told!r}")
     told = viewer.inner_text(".faults")
     expect("Stopped by you" in told and "you can only watch" in told and "press" not in told.lower(), f"who stopped, for the viewer: {told!r}")
     if cell(page, "Control") != "you":
         page.locator(".buttons button", has_text="Take control").click()
         waits(page, "Control", ["you"])
     press(page, "Clear fault")
-    answers(page, "ClearFault")
+    answers(page, "Clear fault")
     press(page, "Ready")
     try:
         page.wait_for_function("() => /^Ready waits for air: [0-9.]+ of 6.6 bar absolute/.test(document.querySelector('.answer').textContent)", timeout=10000)

@@ -118,7 +118,7 @@ fn the_status_of_a_stopped_robot_begins_with_the_stop() {
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
     assert!(told.starts_with("STOPPED, wheeleg, "), "{told}");
     assert!(
-        told.contains("stopped by a program, over the HTTP API"),
+        told.contains("stopped by \"wheeleg ctl\", over the HTTP API"),
         "{told}"
     );
     assert!(told.contains("joint 3 (left vertical)"), "{told}");

@@ -9,7 +9,7 @@ use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Extension, Query, Request, State};
 use axum::http::header::{
     AUTHORIZATION, CACHE_CONTROL, CONNECTION, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
-    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
+    REFERRER_POLICY, USER_AGENT, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri};
@@ -25,7 +25,7 @@ use crate::guard::{Hosts, Peer, Place};
 use crate::hub::{EVENTS, LONGEST_S, StopBy};
 use crate::page::Page;
 use crate::record::folder;
-use crate::session::{self, Context};
+use crate::session::{self, Context, is_name};
 use crate::table::{prefers_csv, table};
 use wheeleg_access::hex;
 use wheeleg_access::request::FRAME_MAX;
@@ -462,6 +462,12 @@ async fn faults(State(server): State<Arc<Server>>) -> Response {
     ))
 }
 
+/// What a program calls itself in `User-Agent`, without its version, if that can be shown to others.
+fn product(agent: &str) -> Option<&str> {
+    let name = agent.split('/').next().unwrap_or_default().trim();
+    is_name(name).then_some(name)
+}
+
 /// Most recordings of one answer.
 const RECORDINGS: usize = 256;
 
@@ -479,8 +485,12 @@ async fn recordings(State(server): State<Arc<Server>>) -> Response {
     json_text(json!({ "recordings": list.collect::<Vec<_>>() }).to_string())
 }
 
-async fn stop(State(server): State<Arc<Server>>) -> Response {
-    match server.context.hub.stop(StopBy::Api).await {
+async fn stop(State(server): State<Arc<Server>>, headers: HeaderMap) -> Response {
+    let agent = headers
+        .get(USER_AGENT)
+        .and_then(|agent| agent.to_str().ok());
+    let name = agent.and_then(product).map(str::to_owned);
+    match server.context.hub.stop(StopBy::Api(name)).await {
         Some(now_us) => json_text(json!({ "stopped": true, "master_us": now_us }).to_string()),
         None => problem(
             StatusCode::GATEWAY_TIMEOUT,
@@ -495,6 +505,19 @@ mod tests {
     use super::*;
     use serde_json::Value;
     use std::collections::BTreeSet;
+
+    #[test]
+    fn a_program_is_named_by_its_product_or_not_at_all() {
+        for (agent, name) in [
+            ("wheeleg ctl", Some("wheeleg ctl")),
+            ("curl/8.5.0", Some("curl")),
+            ("Python-urllib/3.12", Some("Python-urllib")),
+            ("<b>", None),
+            ("/1", None),
+        ] {
+            assert_eq!(product(agent), name, "{agent}");
+        }
+    }
 
     #[test]
     fn the_document_has_every_route_and_no_other() {

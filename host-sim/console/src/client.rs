@@ -27,7 +27,9 @@ const LARGEST_ANSWER: usize = 1 << 20;
 const NO_CONSOLE: &str = "this is not a Wheeleg console";
 /// Remedy for a key that does not belong to the server.
 pub const KEYS: &str = "give the server's control.key to drive, or its view.key to watch and stop, with --key; `wheeleg serve` prints their paths";
-/// How often a beat renews control.
+/// As the command line calls itself.
+pub const PROGRAM: &str = "wheeleg ctl";
+/// How often the control is kept by a beat.
 const BEAT: Duration = Duration::from_millis(50);
 /// How long a check for a message lasts.
 const LOOK: Duration = Duration::from_millis(10);
@@ -46,7 +48,7 @@ pub fn http(url: &Url, method: &str, path: &str, key: &Key) -> Result<(u16, Valu
     let mut stream = url.stream()?;
     // With HTTP/1.0, an answer of unknown length comes in one piece.
     let request = format!(
-        "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\n\r\n",
+        "{method} /api/v1/{path} HTTP/1.0\r\nHost: {}\r\nUser-Agent: {PROGRAM}\r\nAuthorization: Bearer {}\r\nContent-Length: 0\r\n\r\n",
         url.host,
         key.to_hex()
     );

@@ -133,7 +133,23 @@ mod tests {
         assert!(text("boards.js").contains(&line), "{line}");
     }
 
-    /// The page names buttons where a terminal names commands; both give the reason in the same words.
+    #[test]
+    fn the_page_knows_by_which_faults_a_reading_is_none() {
+        use wheeleg_protocol::Fault::{SensorRange, SensorRate};
+        let joint = text("joint.js");
+        for line in [
+            format!("new Set([{}, {}])", SensorRange.code(), SensorRate.code()),
+            format!(
+                "= (1 << {}) | (1 << {});",
+                SensorRange.bit(),
+                SensorRate.bit()
+            ),
+        ] {
+            assert!(joint.contains(&line), "{line}");
+        }
+    }
+
+    /// The page says what to press where a terminal names commands; why, both say in the same words.
     #[test]
     fn the_page_gives_the_same_reasons_as_a_terminal() {
         let words = text("words.js");

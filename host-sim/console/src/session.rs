@@ -311,8 +311,8 @@ async fn handshake(
     })
 }
 
-/// Whether a name can be shown to others unchanged.
-fn is_name(name: &str) -> bool {
+/// Whether a name can be shown to others as it is.
+pub(crate) fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | ' ');
     (1..=32).contains(&name.len()) && name.chars().all(plain)
 }

@@ -39,14 +39,15 @@ export function titled(boards) {
 }
 /** What makes a frame unsound, each counted by the board. */
 const UNSOUND = ["overflow", "truncated", "short", "version", "length", "address"];
-const HEADS = ["Board", "Mode", "Faults", "Sound frames", "CRC errors", "Other errors", "Unsent", "Drift, ppm", "Parameters"];
+// Mode and faults are on the chips and cards.
+const HEADS = ["Board", "Sound frames", "CRC errors", "Other errors", "Unsent", "Drift, ppm", "Parameters"];
 
 /** Chips and table. */
 export function boardsView() {
   const chips = html("ol", { class: "boards" });
   const rows = PLACES.map((_, i) => {
     const cells = HEADS.slice(1).map(() => html("td", { class: "num" }, "–"));
-    return { cells, root: html("tr", {}, html("th", { scope: "row" }, named(i + 1)), cells) };
+    return { cells, root: html("tr", {}, html("th", { scope: "row" }, `${i + 1}, ${place(i + 1)}${i + 1 < FIRST_WHEEL ? "" : " wheel"}`), cells) };
   });
   const table = html("table", { class: "boardtable" }, html("thead", {}, html("tr", {}, HEADS.map((head) => html("th", { scope: "col" }, head)))), html("tbody", {}, rows.map((row) => row.root)));
   const more = html("details", {}, html("summary", {}, "Table"), html("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of boards" }, table));
@@ -64,19 +65,14 @@ export function boardsView() {
           return html("li", { class: bad ? "bad" : "", title: named(b.address) }, html("b", {}, String(b.address), sign(bad ? "alarm" : "met")), html("span", {}, b.present ? b.mode : "missing"));
         }),
       );
-      for (const b of state.boards) {
-        const row = rows[b.address - 1];
-        say(row.cells[0], b.present ? b.mode : "missing");
-        say(row.cells[1], b.faults.map((f) => f.name).join(", ") || "none");
-        row.root.classList.toggle("bad", !b.present || b.faults.length > 0);
-      }
+      for (const b of state.boards) rows[b.address - 1].root.classList.toggle("bad", !b.present || b.faults.length > 0);
     },
     /** What a board has heard. @param {string} topic @param {any} v */
     link(topic, v) {
       const row = rows[Number(topic.slice("/link/".length)) - 1];
       if (!row) return;
       const values = [v.frames, v.crc, UNSOUND.reduce((sum, name) => sum + v[name], 0), v.unsent, v.drift_ppm, `0x${Number(v.parameters).toString(16).padStart(8, "0")}`];
-      values.forEach((value, i) => say(row.cells[i + 2], String(value).replace("-", "−")));
+      values.forEach((value, i) => say(row.cells[i], String(value).replace("-", "−")));
     },
   };
 }

@@ -11,11 +11,15 @@ const KEPT = 500;
 const ALIKE_NS = 50e6;
 /** Lines among which such a one is looked for. */
 const RECENT = 32;
-/** What the boards write for whoever looks for a cause in them: many lines, left out at first. */
+/** What the boards write for whoever looks for a cause in them: many lines, a detail that is left out at first. */
 const LOG = "log";
-const BUT_LOG = "but log";
+const BUT_DETAILS = "but details";
 /** A foot touches the ground and leaves it, a dozen times in a step: left out at first, too. */
 const CONTACT = "contact";
+/** What a walk does about the ground, many times in it: left out at first, too. What stands in its way is not. */
+const OF_A_WALK = new Set(["tip_guard", "early_ground", "late_ground", "lost_ground", "slip", "load_share", "governor"]);
+/** What is said behind the name of one board, and behind those of several, by code. @type {Object<string, [string, string]>} */
+const SEVERAL = { board_back: [" answers", " answer"], board_lost: [" is lost", " are lost"], diagnosis: [" says why", " say why"], log: [" logs", " log"], link: [" has heard", " have heard"] };
 /** A board's own account of a stop tells no more than the stop itself. */
 const DIAGNOSIS = "diagnosis";
 const BOARDS = [1, 2, 3, 4, 5, 6, 7, 8];
@@ -40,18 +44,24 @@ export function eventsView(own = () => "") {
   let newest = 0;
   const missing = html("p", { class: "effect bad", role: "status", hidden: true });
   const list = html("ol", { class: "events", tabindex: 0, "aria-label": "Events" });
-  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_LOG }, "all but logs, contacts"), html("option", { value: "" }, "every kind"));
+  const kinds = html("select", { "aria-label": "Kind of events", onchange: sieve }, html("option", { value: BUT_DETAILS }, "all but details"), html("option", { value: "" }, "every kind"));
   const board = html("select", { "aria-label": "Board of events", onchange: sieve }, html("option", { value: "" }, "every board"), html("option", { value: 0 }, "no board"), BOARDS.map((b) => html("option", { value: b }, named(b))));
   const words = html("input", { type: "search", "aria-label": "Events whose text has", placeholder: "text", size: 8, oninput: sieve });
   const count = html("span", { class: "effect", role: "status" });
   const table = html("button", { class: "btn", type: "button", onclick: () => save("wheeleg-events.csv", "text/csv", csv()) }, "Save events as CSV");
 
-  const shown = (line) => `${line.before}${listed(line.boards)}${line.after}`;
+  /** @param {Line} line */
+  function shown({ before, after, boards, events: [first] }) {
+    const [one, several] = SEVERAL[first.code] ?? ["", ""];
+    const verb = boards.length > 1 && one && after.startsWith(one) ? several + after.slice(one.length) : after;
+    return `${before}${listed(boards)}${verb}`;
+  }
   function fits(line) {
-    const { kind } = line.events[0];
+    const { kind, code } = line.events[0];
+    const detail = kind === LOG || kind === CONTACT || OF_A_WALK.has(code);
     const wanted = words.value.trim().toLowerCase();
     const of = board.value === "" || (board.value === "0" ? line.events[0].board === 0 : line.events.some((event) => event.board === Number(board.value)));
-    const asked = kinds.value === "" || (kinds.value === BUT_LOG ? kind !== LOG && kind !== CONTACT : kind === kinds.value);
+    const asked = kinds.value === "" || (kinds.value === BUT_DETAILS ? !detail : kind === kinds.value);
     return of && asked && line.what.textContent.toLowerCase().includes(wanted);
   }
   function sieve() {

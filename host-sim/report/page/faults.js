@@ -2,11 +2,15 @@
 // somebody tries on a simulated one.
 import { html, say, sign, fixed } from "./dom.js";
 import { place, titled } from "./boards.js";
-import { E_STOP, filled, stopper } from "./words.js";
+import { BROWSER, E_STOP, filled, stopper } from "./words.js";
 
 /** Boards by their address from 1 on, as the target of a fault names them. */
 const BOARDS = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "wheel7", "wheel8"];
-const LOST = "You saw nothing new for 0.4 s. Keep the page in front, and check the connection.";
+/** Who has seen nothing new for so long loses control, s. */
+const LEASE_S = 0.4;
+/** What the page needs beside a pause, at most: until it is drawn, and the next beat, s. */
+const BESIDE_S = 0.15;
+const LOST = `You saw nothing new for ${LEASE_S} s. Keep the page in front, and check the connection.`;
 /** Who loses control again so soon has a computer that is too slow for it. */
 const TOO_SLOW = "Close other programs, or drive from another computer.";
 const WATCHING = "With the view key you can only watch and stop.";
@@ -42,8 +46,10 @@ export class Pauses {
     const now = performance.now();
     const recent = ({ ms, at_ms }) => (now - at_ms <= RECENT_MS ? ms : 0);
     const [page, line] = [recent(this.longest.page), recent(this.longest.line)];
-    if (page > 0) return `For ${fixed(page / 1000, 2)} s this page did not run; the computer may be busy.`;
-    return line > 0 ? `An answer took ${fixed(line / 1000, 2)} s: the line or the robot's computer is slow.` : LOST;
+    // What is shorter than the lease is no cause by itself.
+    const lease = (ms) => `${ms < LEASE_S * 1000 ? `, to which up to ${BESIDE_S} s come for drawing and answering` : ""}; control ends after ${LEASE_S} s`;
+    if (page > 0) return `For ${fixed(page / 1000, 2)} s this page did not run${lease(page)}. The computer may be busy.`;
+    return line > 0 ? `An answer took ${fixed(line / 1000, 2)} s${lease(line)}. The line or the robot's computer is slow.` : LOST;
   }
 }
 
@@ -67,14 +73,24 @@ function told({ holder, revoked_by, gone }) {
   return gone ? `The connection of ${holder} has ended: its page was closed or reloaded, or its program has ended.` : "";
 }
 
-/** How this page has lost its control: when, how long it had had it, and how often within a minute.
- * @typedef {{at_ms: number, kept_ms: number, times: number, why: string}} Loss */
-/** @typedef {{session: string, looks: boolean, air_bar: number, full_bar: number, lost: Loss | null}} Here of this page, and what it knows of the air */
+/** How this page has lost its control: when, by the robot's clock, how long it had had it, and how often within a minute.
+ * @typedef {{at_s: number, kept_ms: number, times: number, why: string}} Loss */
+/** `mine`: this page is in control. @typedef {{session: string, looks: boolean, mine: boolean, air_bar: number, full_bar: number, lost: Loss | null}} Here of this page, and what it knows of the air */
 
 /** Why all axes may hold, in the words of the server. @typedef {{hold: string, cause: string, consequence: string | null, remedy: string | null}} Hold */
 
-/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault */
-export function faultsView(ours) {
+/** Faults of a board that stay when it is armed no more, but for a stop. @param {any} board of the state */
+const own = (board) => board.faults.filter((f) => f.number !== E_STOP);
+
+/** What is latched, in a word or two each; the strongest first. @param {any} state */
+export function latched(state) {
+  const hold = state.emergency_stop ? "STOPPED" : state.hold && `HOLD: ${state.hold.replaceAll("_", " ")}`;
+  const more = state.hold !== "board_fault" || state.emergency_stop ? state.boards.some((b) => own(b).length > 0) : false;
+  return hold && `${hold}${more ? ", board fault" : ""}`;
+}
+
+/** What is wrong. @param {(fault: string) => boolean} ours whether this page has injected a fault @param {(fault: string) => void} end ends one @param {() => HTMLElement} next what is pressed after the last one has ended */
+export function faultsView(ours, end, next) {
   /** @type {Map<string, Hold>} */
   let holds = new Map();
   /** The newest event of a hold, with the board that it is about, if it is about one. */
@@ -83,35 +99,54 @@ export function faultsView(ours) {
   /** The newest loss of an operator. @type {import("./events.js").RobotEvent | null} */
   let loss = null;
   let shown = "";
-  /** Whether who sees it may only look, as it was told last. */
-  let looks = false;
-  const inTheWay = (faults) => faults.map((fault) => html("p", {}, `Injected${ours(fault) ? " by you" : ""}: `, html("code", {}, fault), looks ? "." : ". Press End under Faults to try, then Clear fault."));
-  const card = (title, remedy, injected = [], number = "") => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${title}`), remedy && html("p", {}, remedy), inTheWay(injected), number && html("small", {}, number));
+  /** @param {string} title @param {string} [remedy] @param {string} [number] */
+  const card = (title, remedy, number) => html("li", { class: "fault" }, html("b", {}, sign("alarm"), ` ${title}`), remedy && html("p", {}, remedy), number && html("small", {}, ` ${number}`));
+  /** The one way on from all that is told, in its order. @param {any} state @param {Here} here @param {string[]} injected in the way @param {boolean} cause a cause that is not injected has to be removed */
+  function wayOn(state, here, injected, cause) {
+    if (here.looks) return html("li", { class: "way" }, html("p", {}, `Whoever has the control key must go on. ${WATCHING}`));
+    const { control } = state;
+    if (!here.mine && control && !control.ended) return html("li", { class: "way" }, html("p", {}, `${called(control.holder)} is in control, and can go on.`));
+    const step = (...parts) => html("li", {}, ...parts);
+    return html(
+      "li",
+      { class: "way" },
+      html("p", {}, "To go on:"),
+      html(
+        "ol",
+        {},
+        !here.mine && step("Press Take control."),
+        cause && step("Remove the cause, as told above."),
+        injected.map((fault) => step(`${ours(fault) ? "You have injected" : "Injected is"} `, html("code", {}, fault), ". ", html("button", { class: "btn", type: "button", onclick: () => end(fault) }, `End ${fault}`))),
+        step("Press Clear fault."),
+        step("Press Ready, which waits for the air."),
+      ),
+    );
+  }
+  const called = (name) => (name === BROWSER ? "Another browser" : `“${name}”`);
   const again = ({ times, kept_ms }) => (times > 1 ? ` That was ${fixed(kept_ms / 1000)} s after you had taken it, and ${times} times within a minute. ${TOO_SLOW}` : "");
   /** Why nobody drives any more. @param {Here} here */
   function whyLost({ lost }) {
     if (lost) return `${(loss && told(loss)) || lost.why}${again(lost)}`;
     if (loss && told(loss)) return told(loss);
-    return `${loss?.holder ? `“${loss.holder}”, in control until then,` : "Whoever was in control"} saw nothing new for 0.4 s.`;
+    return `${loss?.holder ? `${called(loss.holder)}, in control until then,` : "Whoever was in control"} saw nothing new for ${LEASE_S} s.`;
   }
-  /** A robot that holds, and no board says why. @param {any} state @param {Here} here @param {boolean} alone nothing else is told */
-  function held(state, here, alone) {
+  /** A robot that holds, and no board says why. @param {any} state @param {Here} here */
+  function held(state, here) {
     const { cause, consequence, remedy } = holds.get(state.hold) ?? { cause: `All axes hold: ${state.hold.replaceAll("_", " ")}`, consequence: null, remedy: null };
     const lost = state.hold === "operator_lost";
     const missing = state.hold === "board_lost" ? state.boards.filter((b) => !b.present).map((b) => b.address) : [];
     const of = missing.length > 0 || newest.board === 0 || newest.detail !== state.hold ? missing : [newest.board];
     const more = consequence ?? (state.hold === "supply_lost" ? filled(here) : "");
     const title = `${of.length > 0 ? `${titled(of)}: ` : ""}${cause}${more && `: ${more}`}. The robot holds.`;
-    const next = here.looks ? `Whoever has the control key must go on. ${WATCHING}` : `${remedy ? `${remedy} Then press` : "To go on, press"} Clear fault and Ready.`;
-    return card(title, lost ? `${whyLost(here)} ${next}` : next, alone && !lost ? state.faults : []);
+    return card(title, lost ? whyLost(here) : (remedy ?? ""));
   }
   /** A stop that somebody pressed. @param {any} state @param {Here} here @param {number[]} boards */
   function stopCard(state, here, boards) {
     const { stopped } = state;
     const by = stopped && stopper(stopped, here.session);
     const title = stopped ? `Stopped by ${by}, at ${fixed(stopped.at_us * 1e-6)} s.` : "Stopped.";
-    const next = here.looks ? WATCHING : `${by && by !== "you" ? "Make sure that nobody needs the robot to stay stopped, then press" : "To go on, press"} Clear fault, then Ready, which waits for the air.`;
-    return card(title, next, [], `${boards.length > 0 ? `${titled(boards)}: ` : ""}EmergencyStop, number ${E_STOP}`);
+    const next = !here.looks && by && by !== "you" ? "Make sure that nobody needs the robot to stay stopped." : "";
+    return card(title, next, `${boards.length > 0 ? `${titled(boards)}: ` : ""}EmergencyStop, number ${E_STOP}`);
   }
   return {
     root: html("section", { class: "panel faultlist", "data-live": true }, html("h2", {}, "Faults"), list),
@@ -122,7 +157,7 @@ export function faultsView(ours) {
     },
     /** Nothing can be pressed any more. */
     end() {
-      for (const remedy of list.querySelectorAll("p")) remedy.hidden = true;
+      for (const remedy of list.querySelectorAll("p, ol")) /** @type {HTMLElement} */ (remedy).hidden = true;
     },
     /** @param {import("./events.js").RobotEvent} event */
     event(event) {
@@ -137,20 +172,31 @@ export function faultsView(ours) {
     /** One line for what many boards have. @param {any} state @param {Here} here */
     state(state, here) {
       const air = state.hold === "supply_lost" ? filled(here) : "";
-      const key = JSON.stringify([state.hold, state.stopped, state.faults, state.boards.map((b) => [b.present, b.faults]), here.lost, air]);
+      const key = JSON.stringify([state.hold, state.emergency_stop, state.stopped, state.faults, state.boards.map((b) => [b.present, b.faults]), here.lost, here.mine, state.control?.holder, state.control?.ended, air]);
       if (key === shown) return;
       shown = key;
-      ({ looks } = here);
       const rows = new Map();
       for (const b of state.boards) for (const f of b.faults) rows.set(f.number, { fault: f, boards: [...(rows.get(f.number)?.boards ?? []), b.address] });
       const stop = rows.get(E_STOP);
       rows.delete(E_STOP);
-      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${titled(of)}: ${f.cause}`, f.remedy, acting(state.faults, of), `${f.name}, number ${f.number}`));
+      const cards = [...rows.values()].map(({ fault: f, boards: of }) => card(`${titled(of)}: ${f.cause}`, f.remedy, `${f.name}, number ${f.number}`));
+      const found = [...rows.values()].flatMap(({ boards: of }) => of);
       // A stop and a board's fault are told by the boards.
-      if (state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault") cards.unshift(held(state, here, cards.length === 0));
-      if (here.lost && state.hold !== "operator_lost") cards.unshift(card(`You lost control${here.lost.times > 1 ? " again" : ""}.`, `${here.lost.why}${again(here.lost)} Press Take control.`));
+      if (state.hold && state.hold !== "emergency_stop" && state.hold !== "board_fault") cards.unshift(held(state, here));
+      const free = !here.mine && !(state.control && !state.control.ended);
+      if (here.lost && free && state.hold !== "operator_lost") cards.unshift(card(`You lost control${here.lost.times > 1 ? " again" : ""}.`, `${here.lost.why}${again(here.lost)}`));
       if (stop || state.emergency_stop) cards.unshift(stopCard(state, here, stop?.boards ?? []));
+      const stays = state.emergency_stop || stop || state.hold || found.length > 0;
+      // No board need tell of what was injected where the robot holds for another reason than its operator.
+      const unexplained = found.length === 0 && !state.emergency_stop && state.hold && state.hold !== "operator_lost";
+      const injected = found.length > 0 ? acting(state.faults, found) : unexplained ? state.faults : [];
+      const cause = found.length > 0 || Boolean(unexplained && holds.get(state.hold)?.remedy);
+      if (stays) cards.push(wayOn(state, here, injected, cause && injected.length === 0));
+      else if (cards.length > 0 && !here.looks) cards[0].append(html("p", {}, "Press Take control."));
+      const focused = list.contains(document.activeElement);
       list.replaceChildren(...(cards.length > 0 ? cards : [html("li", { class: "none" }, sign("met"), " No board has a fault.")]));
+      // Whoever pressed End with the keyboard goes on from here.
+      if (focused) (list.querySelector("button") ?? next()).focus();
     },
   };
 }

@@ -1,5 +1,5 @@
 // The ground below the robot, from its side and from above (mm).
-import { svg, set, say } from "./dom.js";
+import { svg, set, say, fixed } from "./dom.js";
 import { oblique, points, tenth } from "./projection.js";
 import { SIDES } from "./shape.js";
 
@@ -62,6 +62,7 @@ function castShadow(shadow, [ahead, left, height], ground) {
   const [cx, cy] = oblique(ahead, left, ground);
   set(shadow, Number.isFinite(ground) ? { cx, cy, opacity: tenth(Math.max(0.2, 1 - (height - ground) / SHADOW_MM)) } : { opacity: 0 });
 }
+const metres = (mm) => `${fixed(mm / 1000)} m`;
 const fits = (x) => (x >= LABELS_MM[0] && x <= LABELS_MM[1] ? "visible" : "hidden");
 
 /** A level floor, drawn once and moved. @param {SVGElement} picture */
@@ -70,21 +71,26 @@ export function floorSide(picture) {
   const all = svg("g", {}, picture);
   svg("polygon", { class: "r-ground", points: points([oblique(-1500, far, 0), oblique(2500, far, 0), oblique(2500, -far, 0), oblique(-1500, -far, 0)]) }, all);
   const ticks = svg("g", {}, all);
+  // They go along with the robot in whole marks: there is no end of the ground.
+  const near = svg("g", {}, ticks);
   /** @type {{x: number, text: Element}[]} */
   const labels = [];
-  for (let x = -2000; x <= 6000; x += 100) {
+  for (let x = -3 * MARK_MM; x <= 5 * MARK_MM; x += 100) {
     const [[x1, y1], [x2, y2]] = [oblique(x, far, 0), oblique(x, -far, 0)];
-    svg("line", { class: x % MARK_MM === 0 ? "r-tick r-tick5" : "r-tick", x1, y1, x2, y2 }, ticks);
+    svg("line", { class: x % MARK_MM === 0 ? "r-tick r-tick5" : "r-tick", x1, y1, x2, y2 }, near);
     if (x % MARK_MM !== 0) continue;
-    const text = svg("text", { x: x2 + 8, y: y2 - 8 }, ticks);
-    say(text, `${(x / 1000).toFixed(1)} m`);
-    labels.push({ x: x2 + 8, text });
+    labels.push({ x, text: svg("text", { x: x2 + 8, y: y2 - 8 }, near) });
   }
   const shadows = SIDES.map(() => shadowOf(all));
   /** @param {import("./robot.js").Pose} pose @param {FootPlace[]} feet */
   return (pose, feet) => {
+    const first = Math.floor(pose.travel_mm / MARK_MM) * MARK_MM;
     set(ticks, { transform: `translate(${tenth(-pose.travel_mm)},0)` });
-    for (const { x, text } of labels) set(text, { visibility: fits(x - pose.travel_mm) });
+    set(near, { transform: `translate(${first},0)` });
+    for (const { x, text } of labels) {
+      set(text, { visibility: fits(Number(text.getAttribute("x")) + first - pose.travel_mm) });
+      say(text, metres(first + x));
+    }
     feet.forEach((foot, i) => castShadow(shadows[i], foot, 0));
   };
 }
@@ -133,7 +139,7 @@ export function terrainSide(picture, g, heights) {
       const [x, y] = Number.isFinite(z) ? oblique(at - pose.travel_mm, -half, z) : [LABELS_MM[1] + 1, 0];
       set(line, { x1: x, x2: x, y1: y, y2: y + 14, visibility: Number.isFinite(z) ? "visible" : "hidden" });
       set(text, { x: x + 6, y: y + 26, visibility: y + 26 < LOWEST_LABEL_MM ? fits(x) : "hidden" });
-      say(text, `${(at / 1000).toFixed(1)} m`);
+      say(text, metres(at));
     });
     feet.forEach((foot, i) => castShadow(shadows[i], foot, height(foot[0], foot[1])));
   };

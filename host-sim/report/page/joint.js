@@ -7,6 +7,12 @@ const STROKE_MM = 180;
 /** Faults that say of a reading that it is none: SensorRange, SensorRate. */
 const NO_READING = new Set([32, 33]);
 
+/** The same in a sample; a test holds them against the protocol. */
+const NO_READING_BITS = (1 << 4) | (1 << 5);
+
+/** Whether a sample of a joint has no reading. @param {any} values */
+export const isUnread = (values) => (values.faults & NO_READING_BITS) !== 0;
+
 /** Whether a board says that its sensor gives no reading. @param {any} about of the state */
 export const isBlind = (about) => (about?.faults ?? []).some((f) => NO_READING.has(f.number));
 

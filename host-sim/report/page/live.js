@@ -5,12 +5,12 @@ import { sideView, topView, footView } from "./robot.js";
 import { Link, Refused } from "./link.js";
 import { HZ, Scope } from "./scope.js";
 import { LINKS, boardsView, titled } from "./boards.js";
-import { Pauses, faultsToTry, faultsView } from "./faults.js";
+import { Pauses, faultsToTry, faultsView, latched } from "./faults.js";
 import { driver } from "./drive.js";
-import { isBlind, jointCard } from "./joint.js";
+import { isBlind, isUnread, jointCard } from "./joint.js";
 import { eventsView } from "./events.js";
 import { parametersView } from "./parameters.js";
-import { BROWSER, filled, refusal } from "./words.js";
+import { BROWSER, filled, refusal, spoken } from "./words.js";
 
 /** What is older is not shown as if it were now, ms. */
 const STALE_MS = 300;
@@ -73,7 +73,7 @@ const button = (name, hint, act) => html("button", { class: "btn", type: "button
 const codes = new Map();
 const answer = html("p", { class: "answer", role: "status" }, "No command sent yet.");
 /** What the robot is like, for words. */
-const around = () => ({ air_bar: air_bar(), full_bar, injected: now.state?.faults ?? [], lost_s: loss ? (performance.now() - loss.at_ms) / 1000 : null });
+const around = () => ({ air_bar: air_bar(), full_bar, injected: now.state?.faults ?? [], lost_s: loss?.at_s ?? null });
 /** @param {string} what @param {import("./link.js").Answer} given @param {HTMLElement[]} places where it is shown */
 function tell(what, given, places = [answer]) {
   const { status, reason, holder } = given;
@@ -83,7 +83,7 @@ function tell(what, given, places = [answer]) {
   const words = { done: "done", unknown: "no answer: look at the robot" }[status] ?? `${verdict}: ${refusal(what, given, around())}${held}`;
   const code = codes.get(what);
   for (const place of places) {
-    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${what}: ${words}`);
+    place.replaceChildren(sign(status === "done" ? "met" : "warn"), ` ${spoken(what)}: ${words}`);
     place.title = code ? `${what} ${code}` : "";
     place.classList.toggle("bad", status !== "done");
   }
@@ -101,10 +101,10 @@ async function command(name, args, taken, beside = []) {
 /** The same without a word about its end. @param {string} name @param {Object<string, any>} [args] @param {() => void} [taken] @param {HTMLElement[]} [places] */
 async function ask(name, args, taken, places = []) {
   if (!link) {
-    say(answer, `${name}: not sent, there is no connection.`);
+    say(answer, `${spoken(name)}: not sent, there is no connection.`);
     return null;
   }
-  for (const place of places) say(place, `${name} …`);
+  for (const place of places) say(place, `${spoken(name)} …`);
   // Who gives the control away does not lose it.
   if (GIVE_AWAY.has(name)) gave = true;
   const given = await link.command(name, args, taken);
@@ -246,8 +246,10 @@ const joints = JOINTS.map((name, i) => jointCard(name, (stroke) => command("Join
 
 // ---- faults, boards, events ----
 const toTry = faultsToTry((name, args, beside) => command(name, args, undefined, [beside]), () => clear);
-const faults = faultsView(toTry.ours);
+const faults = faultsView(toTry.ours, (fault) => command("EndFault", { fault }), () => clear);
 const pauses = new Pauses();
+/** Why all axes hold where an operator was lost. */
+const OPERATOR_LOST = "operator_lost";
 /** Since when this page is in control. @type {number | null} */
 let took_ms = null;
 /** Commands that give the control away, and whether one was given. */
@@ -264,19 +266,20 @@ function watchControl() {
   const at_ms = performance.now();
   if (mine()) {
     took_ms ??= at_ms;
-    loss = null;
+    // Of a robot that holds for it, it goes on to be told.
+    if (now.state?.hold !== OPERATOR_LOST) loss = null;
     revoker = "";
   } else if (took_ms !== null) {
     if (!gave) {
       losses = [...losses.filter((ms) => at_ms - ms < LOSSES_MS), at_ms];
       const why = revoker ? `${revoker}, at the robot's computer, has revoked it.` : pauses.reason();
-      loss = { at_ms, kept_ms: at_ms - took_ms, times: losses.length, why };
+      loss = { at_s: now.t_us * 1e-6, kept_ms: at_ms - took_ms, times: losses.length, why };
     }
     took_ms = null;
   }
   if (took_ms === null) gave = false;
   // Somebody else drives: there is nothing to take again.
-  if (!mine() && now.state?.control && !now.state.control.ended) loss = null;
+  if (!mine() && now.state?.control && !now.state.control.ended && now.state.hold !== OPERATOR_LOST) loss = null;
 }
 const boards = boardsView();
 /** @type {Scope | null} */
@@ -419,20 +422,23 @@ function build({ robot, commands: list, faults: injectable, holds }) {
   toTry.offer(injectable);
   faults.know(holds);
   byHand.begin(list.find((c) => c.name === "Walk")?.arguments ?? []);
-  page.replaceChildren(
+  const top = html(
+    "header",
+    { class: "top" },
     html(
-      "header",
-      { class: "top" },
-      html(
-        "div",
-        { class: "bar" },
-        html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
-        html("div", { class: "cells", "data-live": true }, head.mode.root, head.gait.root, head.control.root, link?.identity.role === "view" && head.you.root, head.air.root, head.link.root, head.time.root, head.speed.root, head.robot.root),
-        html("div", { class: "stopbox" }, stopButton),
-      ),
-      alarm,
-      banner,
+      "div",
+      { class: "bar" },
+      html("h1", {}, "Wheeleg ", html("small", {}, robot.simulated ? "simulated" : "boards at a serial port")),
+      html("div", { class: "cells", "data-live": true }, head.mode.root, head.gait.root, head.control.root, link?.identity.role === "view" && head.you.root, head.air.root, head.link.root, head.time.root, head.speed.root, head.robot.root),
+      html("div", { class: "stopbox" }, stopButton),
     ),
+    alarm,
+    banner,
+  );
+  // What stays in sight below it goes down where a banner comes.
+  new ResizeObserver(() => document.documentElement.style.setProperty("--top", `${top.offsetHeight}px`)).observe(top);
+  page.replaceChildren(
+    top,
     ...(isSecureContext ? [] : [html("p", { class: "banner", role: "note" }, sign("warn"), " Not protected: anyone on the network can read and alter what is shown. From here the robot can be looked at and stopped, not driven.")]),
     html(
       "main",
@@ -473,7 +479,7 @@ function whose({ control, reserved_for: reserved }) {
 
 const ROLE = { armed: "ARMED", disarmed: "disarmed" };
 function showState(state) {
-  const stopped = state.emergency_stop ? "STOPPED" : state.hold ? `HOLD: ${state.hold.replaceAll("_", " ")}` : null;
+  const stopped = latched(state);
   say(head.mode.value, !state.alive ? "master is dead" : stopped ?? (state.armed ? ROLE.armed : ROLE.disarmed));
   head.mode.root.classList.toggle("alarm", Boolean(stopped) || !state.alive);
   say(head.gait.value, state.step > 0 && state.stepping ? `${state.phase}, step ${state.step}` : state.phase);
@@ -490,7 +496,7 @@ function showState(state) {
   const late = !mine() || !heir || performance.now() > heir.until_ms;
   if (late && !handOver.hidden && answer.textContent === asking) say(answer, "");
   handOver.hidden ||= late;
-  faults.state(state, { session: link?.session ?? "", looks: link?.identity.role === "view", air_bar: air_bar(), full_bar, lost: loss });
+  faults.state(state, { session: link?.session ?? "", looks: link?.identity.role === "view", mine: mine(), air_bar: air_bar(), full_bar, lost: loss });
   toTry.state(state.faults);
 }
 
@@ -559,7 +565,8 @@ const listener = {
     now.of.set(topic, values);
     now.heard_ms = performance.now();
     now.t_us = Math.max(now.t_us, t_us);
-    scope?.sample(topic, t_us * 1e-6, values);
+    // A reading that is none has no value, as in a report.
+    scope?.sample(topic, t_us * 1e-6, topic.startsWith("/joint/") && isUnread(values) ? { ...values, sensed_mm: NaN } : values);
     if (topic.startsWith("/link/")) boards.link(topic, values);
   },
   state(state) {

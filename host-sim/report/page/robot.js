@@ -15,6 +15,8 @@ import { floorSide, terrainAbove, terrainSide } from "./ground.js";
 
 /** Outlines nearer to the measured part than this would only blur it. */
 const VISIBLE_MM = 3;
+/** The name of a leg stands so high, above the horizontal cylinder of the other one. */
+const TAG_MM = 424;
 
 /** @param {Element} line @param {number[]} from @param {number[]} to */
 export const put = (line, [x1, y1], [x2, y2]) => set(line, { x1: tenth(x1), y1: tenth(y1), x2: tenth(x2), y2: tenth(y2) });
@@ -97,7 +99,7 @@ export function sideView(picture, g, heights) {
     const sensed = svg("g", {}, group);
     const setSensed = verticalCylinder(sensed, false);
     const load = svg("path", { class: "r-force" }, group);
-    const tag = svg("text", { class: "r-tag", "text-anchor": "end" }, group);
+    const tag = svg("text", { class: "r-tag" }, group);
     return { group, crank, barrel, rod, commanded, setCommanded, sensed, setSensed, load, tag };
   });
   const nearWheel = wheelSide(picture, g, -g.track_mm / 2);
@@ -117,9 +119,11 @@ export function sideView(picture, g, heights) {
       farWheel(left);
       nearWheel(right);
       set(root, { transform: `rotate(${(-pose.pitch_deg).toFixed(2)} 0 ${-g.wheel_radius_mm})` });
+      const places = SIDES.map((side, i) => leg(g, side.y, pose.legs[i].sensed_mm));
+      const [leftX, rightX] = places.map(({ o6 }) => oblique(...o6, 0)[0]);
       SIDES.forEach((side, i) => {
         const [state, part, yaw] = [pose.legs[i], legs[i], yaws[i]];
-        const at = leg(g, side.y, state.sensed_mm);
+        const at = places[i];
         const towards = (w) => {
           const length = Math.hypot(at.o3[0] - at.o1[0], at.o3[1] - at.o1[1]);
           return [at.o1[0] + ((at.o3[0] - at.o1[0]) * w) / length, at.o1[1] + ((at.o3[1] - at.o1[1]) * w) / length];
@@ -145,8 +149,10 @@ export function sideView(picture, g, heights) {
         // From the sole: a foot may press against a wall, above the ground.
         const from = oblique(...at.o6, at.sole)[1];
         const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
-        set(part.load, { d: length > 0 ? `M${x - 52},${from} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
-        set(part.tag, { x: tenth(x - 24), y: tenth(y - 378) });
+        set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
+        // On the side where the other leg is not; what is long has its room behind.
+        const ahead = (i === 0 ? leftX >= rightX : rightX > leftX) && !state.blind;
+        set(part.tag, { x: tenth(ahead ? x + 24 : x - 24), y: tenth(y - TAG_MM), "text-anchor": ahead ? "start" : "end" });
       });
       say(title, `Robot from its right side, ${Math.round(pose.travel_mm)} mm travelled`);
     },

@@ -68,13 +68,14 @@ class Ring {
   since(from) {
     /** @type {number[]} */
     const x = [];
-    /** @type {number[]} */
+    /** @type {(number | null)[]} */
     const y = [];
     for (let i = 0; i < this.count; i += 1) {
       const at = (this.next - this.count + i + KEPT) % KEPT;
       if (this.t[at] < from) continue;
       x.push(this.t[at]);
-      y.push(this.v[at]);
+      // What is not a number was not measured: a gap.
+      y.push(Number.isNaN(this.v[at]) ? null : this.v[at]);
     }
     return { x, y };
   }
@@ -225,7 +226,7 @@ export class Scope {
     const rows = ["t_s,signal,value"];
     for (const { topic, field } of columns) {
       const points = this.rings.get(topic)?.get(field)?.since(this.player.start);
-      points?.x.forEach((t, i) => t <= this.player.end && rows.push(`${t.toFixed(4)},${topic}.${field},${points.y[i]}`));
+      points?.x.forEach((t, i) => t <= this.player.end && rows.push(`${t.toFixed(4)},${topic}.${field},${points.y[i] ?? ""}`));
     }
     return `${rows.join("\n")}\n`;
   }

@@ -1,9 +1,15 @@
 // Who did what, and why a command was refused, in the words of the console's buttons. What is not here is told as the server tells it.
 import { fixed } from "./dom.js";
 
-/** Absolute pressure in the reservoir, and where it is full, bar; no numbers of real boards. How long ago this page lost its control, if it did, s.
+/** Absolute pressure in the reservoir, and where it is full, bar; no numbers of real boards. When this page lost its control, if it did, by
+ * the robot's clock, s.
  * @typedef {{air_bar: number, full_bar: number, injected: string[], lost_s: number | null}} Around what the robot is like just now */
-/** Who has asked for the stop that is latched. @typedef {{via: string, name?: string, session?: string, role?: string, at_us: number}} Stopped */
+/** Who has asked for the stop that is latched. @typedef {{via: string, name?: string | null, session?: string, role?: string, at_us: number}} Stopped */
+
+/** Commands whose buttons say something else than their names. @type {Object<string, string>} */
+const BUTTONS = { StopGait: "Stop walking", RecordStart: "Record", RecordStop: "Stop recording", EndFault: "End" };
+/** A command as its button says it: "Take control". @param {string} name */
+export const spoken = (name) => BUTTONS[name] ?? (name === name.toUpperCase() ? name : name.replace(/(?<=.)[A-Z]/g, (letter) => ` ${letter.toLowerCase()}`));
 
 /** The boards' fault EmergencyStop. */
 export const E_STOP = 39;
@@ -12,7 +18,7 @@ export const BROWSER = "browser";
 
 /** Who has stopped the robot, for the page of this session. @param {Stopped} stopped @param {string} own */
 export function stopper({ via, name, session, role }, own) {
-  if (via === "api") return "a program, over the HTTP API";
+  if (via === "api") return `${name ? `“${name}”` : "a program"}, over the HTTP API`;
   if (via === "foxglove") return "a Foxglove viewer";
   if (session === own) return "you";
   const who = name === BROWSER ? "another browser" : `“${name}”`;
@@ -24,7 +30,7 @@ export const filled = ({ air_bar, full_bar }) => (Number.isFinite(air_bar) && Nu
 
 /** By the reason of the answer. @type {Object<string, (around: Around) => string>} */
 const WORDS = {
-  not_in_control: ({ lost_s }) => (lost_s === null ? "press Take control first" : `you lost control ${fixed(lost_s)} s ago: press Take control again`),
+  not_in_control: ({ lost_s }) => (lost_s === null ? "press Take control first" : `you lost control at ${fixed(lost_s)} s of the robot's clock: press Take control again`),
   not_armed: () => "the robot is not armed: press Ready; after a stop or a hold press Clear fault before",
   not_disarmed: () => "the robot is armed: press Disarm first",
   moving: () => "the robot is moving: wait for the end of the motion, or press Hold, or in a walk Stop walking",
@@ -34,10 +40,14 @@ const WORDS = {
   interrupted: () => "a stop, a hold or another command came between: Faults and Events tell which",
 };
 
+/** With a full stop. @param {string} sentence */
+const ended = (sentence) => (/[.!?]$/.test(sentence) ? sentence : `${sentence}.`);
+
 /** @param {string} command @param {import("./link.js").Answer} answer @param {Around} around */
 export function refusal(command, { reason, text }, around) {
   const own = reason && Object.hasOwn(WORDS, reason) ? WORDS[reason](around) : text || reason || "";
-  // A board keeps a fault whose cause is there.
-  const kept = command === "ClearFault" && reason?.startsWith("board_") && around.injected.length > 0;
-  return kept ? `${own} Injected: ${around.injected.join(", ")}. Press End under Faults to try, then Clear fault.` : own;
+  // A board keeps a fault whose cause is there; all others were cleared, and disarmed.
+  if (command !== "ClearFault" || !(reason?.startsWith("board_") || reason === "no_answer")) return own;
+  const end = around.injected.length > 0 ? ` Injected: ${around.injected.join(", ")}. Press End, then Clear fault.` : "";
+  return `${ended(own)} The other boards no longer hold, and are disarmed.${end}`;
 }

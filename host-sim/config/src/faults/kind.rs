@@ -125,7 +125,7 @@ const fn signed(
 
 kinds! {
     MasterSilent = "master-silent", Robot, None,
-        "The master stops sending in mid-cycle, permanently unless an end is given.";
+        "The master stops sending in mid-cycle, until the fault ends.";
     MasterFrozen = "master-frozen", Robot, None,
         "The master repeats its last SYNC: it sends, but its cycle counter does not advance.";
     MasterReset = "master-reset", Robot, value("ms", 1.0, 1000.0, 30.0, "time until it sends again"),
@@ -139,7 +139,7 @@ kinds! {
     NodeSilent = "node-silent", Board, None,
         "A board receives and works, but its transmitter is dead.";
     NodeOff = "node-off", Board, None,
-        "A board loses its power, permanently unless an end is given: its outputs drop, it neither receives nor sends.";
+        "A board loses its power until the fault ends: its outputs drop, it neither receives nor sends.";
     NodeReset = "node-reset", Board, None,
         "A board loses its power for a tick and restarts.";
     BrownOut = "brown-out", Board, value("ms", 1.0, 1000.0, 30.0, "time without power"),

@@ -20,8 +20,8 @@ const TAKEN: Duration = Duration::from_secs(1);
 pub(crate) enum StopBy {
     /// A client of `/ws`.
     Client(ClientId),
-    /// The HTTP API.
-    Api,
+    /// The HTTP API, with what the program calls itself.
+    Api(Option<String>),
     /// Foxglove's protocol.
     Foxglove,
 }
@@ -58,8 +58,12 @@ enum Stopper {
         /// What its key allows.
         role: &'static str,
     },
-    /// A user of the HTTP API.
-    Api,
+    /// Who uses the HTTP API.
+    Api {
+        /// As it calls itself, if it does.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+    },
     /// A viewer by Foxglove's protocol.
     Foxglove,
 }
@@ -124,7 +128,7 @@ impl Inner {
             return;
         }
         let by = match by {
-            StopBy::Api => Some(Stopper::Api),
+            StopBy::Api(name) => Some(Stopper::Api { name }),
             StopBy::Foxglove => Some(Stopper::Foxglove),
             StopBy::Client(id) => self.clients.get(&id).map(|client| Stopper::Console {
                 name: client.name.clone(),
@@ -167,7 +171,7 @@ mod tests {
             let (asked, signals) = (asked.clone(), Arc::clone(&signals));
             std::thread::spawn(move || {
                 (0..STOPS).for_each(|_| {
-                    asked.stop(&signals, StopBy::Api);
+                    asked.stop(&signals, StopBy::Api(None));
                 });
             })
         };

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use wheeleg_console::client::{Client, Incoming, Outcome, http};
+use wheeleg_console::client::{Client, Incoming, Outcome, PROGRAM, http};
 use wheeleg_protocol::NodeMode;
 use wheeleg_telemetry::{JointSample, Sample as _};
 
@@ -75,6 +75,7 @@ fn a_command_is_latched_within_13_ms_and_a_stop_as_well() {
     let held_ns = first(&mut viewer, |fields| fields[84..88] == hold.to_le_bytes());
     let given = rig.event("hold");
     assert_eq!(given["stopped"]["via"], "api", "{given}");
+    assert_eq!(given["stopped"]["name"], PROGRAM, "{given}");
     let took_ns = held_ns - given["t_ns"].as_u64().expect("a time");
     assert!(took_ns <= 13_000_000, "{took_ns} ns");
 }

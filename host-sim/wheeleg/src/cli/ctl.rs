@@ -17,16 +17,17 @@ use serde_json::{Map, Value, json};
 use wheeleg_access::Key;
 use wheeleg_access::host::{HOLD_S, SPEED, STEP_MAX};
 use wheeleg_access::request::HZ_MAX;
-use wheeleg_console::client::{Client, Incoming, Outcome, Url, http};
+use wheeleg_console::client::{Client, Incoming, Outcome, PROGRAM, Url, http};
 use wheeleg_console::keys::{CONTROL_FILE, VIEW_FILE};
 use wheeleg_console::unpack::unpack;
 use wheeleg_console::{EVENTS, usual};
 use wheeleg_master::command::CommandCode;
-use wheeleg_protocol::Address;
+use wheeleg_master::event::HoldReason;
+use wheeleg_protocol::{Address, Fault};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
-use wheeleg_telemetry::event::hold_words_of;
-use wheeleg_telemetry::{channels, placed};
+use wheeleg_telemetry::event::{hold_name, hold_words_of};
+use wheeleg_telemetry::{EventCode, EventKind, channels, placed};
 
 use super::exit::{self, LOST};
 use super::{fitted, print, say, show, stop_on_signals, tell, tell_error, whole};
@@ -62,8 +63,8 @@ enum CtlCommand {
     /// Take control, send one command, wait until it has finished, and release control. Ctrl-C ends what
     /// it has begun: a walk with both feet down, any other motion where it is.
     Take {
-        /// Command of the master and its arguments: `JointReference joint=3 stroke=120`.
-        #[arg(last = true, required = true, value_name = "COMMAND [ARG=VALUE]")]
+        /// Command of the master and its arguments: `JointReference joint=3 stroke=120`. `Ready` is Arm, then Stand.
+        #[arg(required = true, value_name = "COMMAND [ARG=VALUE]")]
         command: Vec<String>,
     },
     /// Print the newest events, the oldest of them first.
@@ -71,6 +72,9 @@ enum CtlCommand {
         /// How many, 1 to 256.
         #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1_u32, EVENTS as u32))]
         last: u32,
+        /// Also logs and modes of the boards, their accounts of a stop, and contacts of the feet.
+        #[arg(long)]
+        all: bool,
     },
     /// Stop the robot.
     Stop,
@@ -155,7 +159,7 @@ pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
         CtlCommand::Watch { channels, hz } => watch(reach, &reach.key(VIEW_FILE)?, channels, *hz),
         #[cfg(unix)]
         CtlCommand::Top => top::top(reach, &reach.key(VIEW_FILE)?),
-        CtlCommand::Events { last } => events(reach, &reach.key(VIEW_FILE)?, *last),
+        CtlCommand::Events { last, all } => events(reach, &reach.key(VIEW_FILE)?, *last, *all),
         CtlCommand::Stop => {
             let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
             stopped.or_else(|why| match why.downcast_ref() {
@@ -201,21 +205,29 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
         Value::Null => "max".to_owned(),
         speed => word(speed),
     };
+    let step = match state["step"].as_u64() {
+        Some(step @ 1..) => format!(", step {step}"),
+        _ => String::new(),
+    };
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{}, {}, {:.2} s after power-up, boards ready {}, armed {}, phase {}, step {}\nhold {}, control {}, speed {}, paused {}",
+        "{}, {}, {:.2} s after power-up, boards {}, gait: {}{step}\ncontrol: {}, speed: {}",
         mode(&state),
         word(&state["robot"]),
         state["master_us"].as_f64().unwrap_or(0.0) * 1e-6,
-        word(&state["ready"]),
-        word(&state["armed"]),
+        if state["ready"] == true {
+            "ready"
+        } else {
+            "not ready"
+        },
         word(&state["phase"]),
-        word(&state["step"]),
-        word(&state["hold"]),
-        holder(&state).unwrap_or_else(|| "none".to_owned()),
-        pace,
-        word(&state["pace"]["paused"]),
+        holder(&state).unwrap_or_else(|| "free".to_owned()),
+        if state["pace"]["paused"] == true {
+            "paused"
+        } else {
+            &*pace
+        },
     );
     if let Some(why) = why_held(&state) {
         let _ = writeln!(text, "{why}");
@@ -240,7 +252,11 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     }
     for board in state["boards"].as_array().into_iter().flatten() {
         let name = address(board).map_or_else(|| word(&board["address"]), placed);
-        let _ = writeln!(text, "{name:26}{}", word(&board["mode"]));
+        let mode = match &board["mode"] {
+            Value::Null => "missing".to_owned(),
+            mode => word(mode),
+        };
+        let _ = writeln!(text, "{name:28}{mode}");
         for fault in board["faults"].as_array().into_iter().flatten() {
             let (cause, remedy) = (word(&fault["cause"]), word(&fault["remedy"]));
             let _ = writeln!(text, "         {cause} {remedy}");
@@ -257,24 +273,53 @@ fn address(board: &Value) -> Option<Address> {
 
 /// What the robot is, in the words of the page. A stop is more than the hold that it may have met.
 fn mode(state: &Value) -> String {
+    let more = |why: &str| match has_board_fault(state) && why != BOARD_FAULT {
+        true => ", board fault",
+        false => "",
+    };
     match (&state["emergency_stop"], &state["hold"], &state["armed"]) {
         _ if state["alive"] == false => "MASTER IS DEAD".to_owned(),
-        (Value::Bool(true), ..) => "STOPPED".to_owned(),
-        (_, Value::String(why), _) => format!("HOLD: {}", plain(why).replace('_', " ")),
+        (Value::Bool(true), ..) => format!("STOPPED{}", more("")),
+        (_, Value::String(why), _) => {
+            format!("HOLD: {}{}", plain(why).replace('_', " "), more(why))
+        }
         (.., Value::Bool(true)) => "ARMED".to_owned(),
         _ => "disarmed".to_owned(),
     }
 }
 
+/// The hold that a fault of a board has caused.
+const BOARD_FAULT: &str = hold_name(&HoldReason::NodeFault { node: 0, faults: 0 });
+
+/// Whether a board has a fault, beside the stop that all of them report.
+fn has_board_fault(state: &Value) -> bool {
+    let boards = state["boards"].as_array().into_iter().flatten();
+    let mut faults = boards.flat_map(|board| board["faults"].as_array().into_iter().flatten());
+    faults.any(|fault| fault["number"] != Fault::EmergencyStop.code())
+}
+
 /// How a robot goes on that was stopped, or holds.
-const GO_ON: &str = "To go on: `wheeleg ctl take -- ClearFault`, then `wheeleg ctl take -- Arm`";
+const GO_ON: &str = "To go on: `wheeleg ctl take -- ClearFault`, then, once the reservoir is full, `wheeleg ctl take -- Ready`";
+
+/// The same, after the end of what somebody has injected: until then a board keeps its fault.
+fn go_on(state: &Value) -> String {
+    let faults = state["faults"]
+        .as_array()
+        .filter(|_| has_board_fault(state));
+    let faults = faults.into_iter().flatten().filter_map(Value::as_str);
+    let ends: String = faults
+        .map(|fault| format!("End {} with `wheeleg ctl end-fault`. ", plain(fault)))
+        .collect();
+    format!("{ends}{GO_ON}")
+}
 
 /// Who has stopped the robot, or why it holds, and how it goes on; none: it does neither.
 fn why_held(state: &Value) -> Option<String> {
     if state["emergency_stop"] == true {
         let stopped = &state["stopped"];
         let by = match (stopped["via"].as_str(), stopped["name"].as_str()) {
-            (Some("api"), _) => " by a program, over the HTTP API".to_owned(),
+            (Some("api"), Some(name)) => format!(" by {:?}, over the HTTP API", plain(name)),
+            (Some("api"), None) => " by a program, over the HTTP API".to_owned(),
             (Some("foxglove"), _) => " by a Foxglove viewer".to_owned(),
             (_, Some(name)) if stopped["role"] == "view" => {
                 format!(" by {:?}, with the view key", plain(name))
@@ -284,29 +329,43 @@ fn why_held(state: &Value) -> Option<String> {
         };
         let at = stopped["at_us"].as_f64();
         let at = at.map(|us| format!(", at {:.2} s", us * 1e-6));
-        return Some(format!("stopped{by}{}. {GO_ON}", at.unwrap_or_default()));
+        let at = at.unwrap_or_default();
+        return Some(format!("stopped{by}{at}. {}", go_on(state)));
     }
     let words = hold_words_of(state["hold"].as_str()?)?;
     let remedy = words.remedy.map(|remedy| format!(" {remedy}"));
     Some(format!(
-        "{}.{} {GO_ON}",
+        "{}.{} {}",
         words.cause,
-        remedy.unwrap_or_default()
+        remedy.unwrap_or_default(),
+        go_on(state)
     ))
 }
 
-/// Prints the newest events that the server keeps.
-fn events(reach: &Reach, key: &Key, last: u32) -> miette::Result<ExitCode> {
-    let path = format!("events?last={last}");
-    let (code, list) = http(&reach.url(), "GET", &path, key)?;
+/// Prints the newest events that the server keeps: `last` of them, of all kinds or without the many details.
+fn events(reach: &Reach, key: &Key, last: u32, all: bool) -> miette::Result<ExitCode> {
+    let (code, mut list) = http(&reach.url(), "GET", "events", key)?;
     if code != 200 {
         return reach.not_answered(&list, VIEW_FILE);
+    }
+    if let Some(events) = list.get_mut("events").and_then(Value::as_array_mut) {
+        events.retain(|event| all || !is_detail(event));
+        events.drain(..events.len().saturating_sub(last as usize));
     }
     if reach.json {
         return Ok(print(&format!("{list:#}\n"))?);
     }
     let lines = list["events"].as_array().into_iter().flatten();
     Ok(show(&lines.map(event_line).collect::<String>())?)
+}
+
+/// Whether an event is one of many that would push out what counts: after a stop each board tells of it four times.
+fn is_detail(event: &Value) -> bool {
+    let kinds = [EventKind::Log, EventKind::Contact].map(EventKind::name);
+    let of_board = event["board"] != 0;
+    let of_stop = event["fault"] == Fault::EmergencyStop.code();
+    kinds.iter().any(|kind| event["kind"] == *kind)
+        || of_board && (of_stop || event["code"] == EventCode::Mode.name())
 }
 
 fn event_line(event: &Value) -> String {
@@ -412,7 +471,7 @@ fn state_when(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Va
 
 /// Over plain HTTP no key may be sent: the frames of a session prove it without.
 fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> miette::Result<ExitCode> {
-    let mut client = Client::connect(url, "view", "ctl", key)?;
+    let mut client = Client::connect(url, "view", PROGRAM, key)?;
     let stopped = client.prompt(json!({ "op": "stop" }))?;
     match stopped {
         Outcome::Done => reach.print_outcome(&Outcome::Done),
@@ -431,7 +490,7 @@ fn not_confirmed() -> ExitCode {
 }
 
 fn watch(reach: &Reach, key: &Key, topics: &[String], hz: u32) -> miette::Result<ExitCode> {
-    let mut client = Client::connect(&reach.url(), "view", "ctl", key)?;
+    let mut client = Client::connect(&reach.url(), "view", PROGRAM, key)?;
     if !topics.is_empty() {
         let frame = json!({ "op": "subscribe", "channels": topics, "hz": hz });
         let n = client.send(frame)?;
@@ -511,6 +570,9 @@ fn argument(text: &str) -> Result<(String, Value), StudyError> {
     Ok((name.to_owned(), parsed.unwrap_or_else(|| json!(value))))
 }
 
+/// What the page's button of this name does, but for the wait for air.
+const READY: &str = "Ready";
+
 fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
     let Some((name, arguments)) = words.split_first() else {
         return Ok(ExitCode::SUCCESS);
@@ -527,8 +589,11 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
         given.entry(argument).or_insert(value);
     }
     let stop = stop_on_signals()?;
-    let command = (name.as_str(), Value::Object(given));
-    match (reach.in_control_unless(&[command], &stop)?, stop.signal()) {
+    let commands = match name.as_str() {
+        READY if given.is_empty() => vec![("Arm", json!({})), ("Stand", json!({}))],
+        name => vec![(name, Value::Object(given))],
+    };
+    match (reach.in_control_unless(&commands, &stop)?, stop.signal()) {
         (None, Some(signal)) => {
             tell(&format!("{}: `{name}` was ended", signal.label()));
             Ok(ExitCode::from(signal.exit_code()))
@@ -547,6 +612,11 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
 fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
     if !matches!(end, Outcome::Refused { .. }) || reach.url().is_exposed() {
         return Ok(());
+    }
+    if let Outcome::Refused { reason, .. } = end
+        && (reason.starts_with("board_") || reason == "no_answer")
+    {
+        tell("the other boards no longer hold, and are disarmed");
     }
     let key = reach.key(CONTROL_FILE)?;
     let (_, state) = http(&reach.url(), "GET", "state", &key)?;
@@ -581,6 +651,71 @@ mod tests {
         assert!(told.starts_with("Operator lost. Take control. "), "{told}");
         state["hold"] = Value::Null;
         assert_eq!((mode(&state), why_held(&state)), ("ARMED".to_owned(), None));
+    }
+
+    /// Two causes at once are told both; the stop itself is a fault that all boards report.
+    #[test]
+    fn a_fault_of_a_board_is_told_beside_another_hold() {
+        let told = |hold: &str, stop: bool, number: u8| {
+            mode(&json!({
+                "alive": true, "armed": true, "emergency_stop": stop, "hold": hold,
+                "boards": [{ "address": 3, "faults": [{ "number": number }] }],
+            }))
+        };
+        let (range, stop) = (Fault::SensorRange.code(), Fault::EmergencyStop.code());
+        assert_eq!(
+            told("operator_lost", false, range),
+            "HOLD: operator lost, board fault"
+        );
+        assert_eq!(told(BOARD_FAULT, false, range), "HOLD: board fault");
+        assert_eq!(told("emergency_stop", true, range), "STOPPED, board fault");
+        assert_eq!(told("emergency_stop", true, stop), "STOPPED");
+        let mut state = json!({
+            "hold": BOARD_FAULT, "faults": ["pot-open:joint3"], "boards": [{ "faults": [{ "number": range }] }],
+        });
+        let way = why_held(&state).expect("a hold");
+        let wanted = format!("End pot-open:joint3 with `wheeleg ctl end-fault`. {GO_ON}");
+        assert!(way.ends_with(&wanted), "{way}");
+        state["boards"] = json!([]);
+        assert_eq!(go_on(&state), GO_ON);
+    }
+
+    /// Whoever has stopped over HTTP is told by name, if there is one.
+    #[test]
+    fn a_stop_over_http_is_told_by_the_name_of_its_program() {
+        let state = |name: Value| json!({ "emergency_stop": true, "stopped": { "via": "api", "name": name, "at_us": 1_000_000 } });
+        let told = why_held(&state(json!(PROGRAM))).expect("a stop");
+        let begin = "stopped by \"wheeleg ctl\", over the HTTP API, at 1.00 s. To go on: ";
+        assert!(
+            told.starts_with(begin) && told.contains("reservoir is full"),
+            "{told}"
+        );
+        let told = why_held(&state(Value::Null)).expect("a stop");
+        assert!(
+            told.starts_with("stopped by a program, over the HTTP API"),
+            "{told}"
+        );
+    }
+
+    /// What a person did and what the robot answered is not pushed out by what eight boards tell of it.
+    #[test]
+    fn events_of_a_stop_are_its_command_and_the_hold() {
+        let (stop, range) = (Fault::EmergencyStop.code(), Fault::SensorRange.code());
+        for (kind, code, board, fault, detail) in [
+            ("command", "command_accepted", 0, 0, false),
+            ("fault", "hold", 0, 0, false),
+            ("fault", "hold", 3, range, false),
+            ("fault", "fault_latched", 3, range, false),
+            ("fault", "fault_latched", 3, stop, true),
+            ("fault", "diagnosis", 3, stop, true),
+            ("mode", "mode", 3, 0, true),
+            ("mode", "armed", 0, 0, false),
+            ("log", "log", 3, 0, true),
+            ("contact", "lift_off", 0, 0, true),
+        ] {
+            let event = json!({ "kind": kind, "code": code, "board": board, "fault": fault });
+            assert_eq!(is_detail(&event), detail, "{event}");
+        }
     }
 
     #[test]

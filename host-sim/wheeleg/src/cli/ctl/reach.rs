@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use wheeleg_access::Key;
 use wheeleg_access::reason::Reason;
 use wheeleg_access::request::FRAME_MAX;
-use wheeleg_console::client::{Client, KEYS, Outcome, Url};
+use wheeleg_console::client::{Client, Incoming, KEYS, Outcome, PROGRAM, Url};
 use wheeleg_console::keys::{self, CONTROL_FILE};
 use wheeleg_console::{ADDRESS, ConsoleError, Fingerprint};
 use wheeleg_master::command::CommandCode;
@@ -28,8 +28,8 @@ const WRONG_KEY: u16 = 401;
 const NOT_RELEASED: &str = "the control is not released: the robot will hold";
 /// Longest time that a walk needs to put both feet down.
 const COMES_TO_REST: Duration = Duration::from_secs(20);
-/// Between two attempts to release the control. Beats are sent in each, more often than they are due.
-const BETWEEN: Duration = Duration::from_millis(50);
+/// Between two attempts to release the control, each of which is an event.
+const BETWEEN: Duration = Duration::from_millis(500);
 /// How long a command of this program may be under way, ms.
 const VALID_MS: u32 = 1_000;
 
@@ -95,7 +95,7 @@ impl Reach {
     /// A session that may drive.
     pub(super) fn control(&self) -> miette::Result<Client> {
         let key = self.key(CONTROL_FILE)?;
-        Ok(Client::connect(&self.url(), "control", "ctl", &key)?)
+        Ok(Client::connect(&self.url(), "control", PROGRAM, &key)?)
     }
 
     /// Takes the control, gives commands up to the first that is not done, and releases the control;
@@ -187,22 +187,34 @@ fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
         CommandCode::of_name(name),
         Some(CommandCode::Walk | CommandCode::StartGait)
     );
-    let mut give = |name: &str| client.carry_out(name, &json!({}), VALID_MS);
-    if !is_gait || give("StopGait")? != Outcome::Done {
+    let give = |client: &mut Client, name: &str| client.carry_out(name, &json!({}), VALID_MS);
+    if !is_gait || give(client, "StopGait")? != Outcome::Done {
         // Refused where nothing is armed: then nothing moves.
-        give("Hold")?;
+        give(client, "Hold")?;
     }
-    let begin = Instant::now();
-    let mut end = give("ReleaseControl")?;
+    let end_of_wait = Instant::now() + COMES_TO_REST;
+    keep_until(client, end_of_wait, |state| state["stepping"] != true);
+    let mut end = give(client, "ReleaseControl")?;
     // Refused as long as the robot moves.
-    while matches!(end, Outcome::Refused { .. }) && begin.elapsed() <= COMES_TO_REST {
-        std::thread::sleep(BETWEEN);
-        end = give("ReleaseControl")?;
+    while matches!(end, Outcome::Refused { .. }) && Instant::now() <= end_of_wait {
+        keep_until(client, Instant::now() + BETWEEN, |_| false);
+        end = give(client, "ReleaseControl")?;
     }
     if end != Outcome::Done {
         tell(NOT_RELEASED);
     }
     Ok(())
+}
+
+/// Keeps the control until then, or until the state is as wanted, or the connection has ended.
+fn keep_until(client: &mut Client, end: Instant, wanted: impl Fn(&Value) -> bool) {
+    while Instant::now() < end {
+        match client.read() {
+            Some(Incoming::Json(state)) if state["op"] == "state" && wanted(&state) => return,
+            Some(Incoming::Closed { .. }) => return,
+            _ => {}
+        }
+    }
 }
 
 /// What helps whoever was refused for this reason.

@@ -19,6 +19,10 @@ use super::reach::{Reach, ended};
 use super::sample;
 use super::terminal::{Key, Line, Terminal};
 
+/// As it calls itself to others.
+const TOP: &str = "wheeleg ctl top";
+/// Switches of a foot, by their bits.
+const SWITCHES: [&str; 4] = ["front", "back", "left", "right"];
 /// Samples a second of each channel.
 const HZ: u32 = 10;
 /// How often the screen is drawn anew.
@@ -129,7 +133,7 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
 
 /// A client that looks at what is drawn.
 fn connect(reach: &Reach, key: &AccessKey) -> miette::Result<Client> {
-    let mut client = Client::connect(&reach.url(), "view", "top", key)?;
+    let mut client = Client::connect(&reach.url(), "view", TOP, key)?;
     let topics = (1..=6).map(|n| format!("/joint/{n}"));
     let others = WHEELS
         .iter()
@@ -139,6 +143,15 @@ fn connect(reach: &Reach, key: &AccessKey) -> miette::Result<Client> {
     let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
     client.send(frame)?;
     Ok(client)
+}
+
+/// A number with fixed decimals; what is rounded to nothing has no sign.
+fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
+        _ => text,
+    }
 }
 
 impl Seen {
@@ -203,7 +216,23 @@ impl Seen {
     /// The same as a text; `-`: none.
     fn number(&self, topic: &str, field: &str, decimals: usize) -> String {
         let value = self.value(topic, field);
-        value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+        value.map_or_else(|| "-".to_owned(), |value| rounded(value, decimals))
+    }
+
+    /// Closed switches of a foot, by their names.
+    fn switches(&self, topic: &str) -> String {
+        let Some(bits) = self.value(topic, "switches").map(|bits| bits as u8) else {
+            return "-".to_owned();
+        };
+        let names = SWITCHES.iter().enumerate();
+        let closed: Vec<&str> = names
+            .filter_map(|(bit, name)| (bits >> bit & 1 == 1).then_some(*name))
+            .collect();
+        if closed.is_empty() {
+            "none".to_owned()
+        } else {
+            closed.join(", ")
+        }
     }
 
     /// What is shown when the newest message came so long ago, in so many lines.
@@ -223,6 +252,10 @@ impl Seen {
         }
         put(false, String::new());
         put(false, self.joints_head());
+        put(
+            false,
+            "open valves: A+ fills chamber A, A- vents it; B alike".to_owned(),
+        );
         for (n, name) in (1..=6).zip(PLACES) {
             put(false, self.joint(n, name));
         }
@@ -238,12 +271,18 @@ impl Seen {
         }
         for (topic, name) in FEET {
             let load = self.number(topic, "normal_force_n", 0);
-            let switches = self.number(topic, "switches", 0);
-            put(false, format!("{name:18}{load:>9} N   switches {switches}"));
+            let switches = self.switches(topic);
+            put(
+                false,
+                format!("{name:18}{load:>9} N   closed switches: {switches}"),
+            );
         }
         put(false, String::new());
         for fault in self.faults() {
             put(true, fault);
+        }
+        if let Some(why) = super::why_held(&self.state) {
+            put(true, format!(" {why}"));
         }
         let room = rows.saturating_sub(lines.len());
         let newest = self.events.iter().rev().take(room);
@@ -292,7 +331,7 @@ impl Seen {
         let error = value("commanded_mm").zip(value("sensed_mm"));
         let error = error.map_or_else(
             || "-".to_owned(),
-            |(asked, sensed)| format!("{:.1}", asked - sensed),
+            |(asked, sensed)| rounded(asked - sensed, 1),
         );
         // Bit 0 fill A, 1 vent A, 2 fill B, 3 vent B.
         let open = value("valves_open").map(|bits| bits as u8);
@@ -407,6 +446,41 @@ mod tests {
         // Before anything has come, nothing is made up.
         let empty = text(&Seen::default().screen(Duration::ZERO, 24));
         assert!(!empty.contains("0.0 "), "{empty}");
+    }
+
+    #[test]
+    fn what_is_rounded_to_nothing_has_no_sign() {
+        for (value, decimals, text) in [
+            (-0.4, 0, "0"),
+            (-0.04, 1, "0.0"),
+            (-0.06, 1, "-0.1"),
+            (-3.0, 0, "-3"),
+        ] {
+            assert_eq!(rounded(value, decimals), text);
+        }
+    }
+
+    /// Whoever looks at it reads who has stopped the robot, and what to do.
+    #[test]
+    fn the_screen_has_the_way_on_and_names_of_switches() {
+        let mut seen = seen();
+        seen.state["emergency_stop"] = json!(true);
+        seen.state["stopped"] =
+            json!({ "via": "console", "name": TOP, "session": "0", "role": "view", "at_us": 1 });
+        let values = json!({ "switches": 13, "normal_force_n": 1.0 });
+        let Value::Object(values) = values else {
+            panic!("an object")
+        };
+        seen.samples.insert("/foot/left", values);
+        let text = text(&seen.screen(Duration::ZERO, 50));
+        assert!(
+            text.contains("stopped by \"wheeleg ctl top\", with the view key"),
+            "{text}"
+        );
+        assert!(
+            text.contains("To go on: ") && text.contains("closed switches: front, left, right"),
+            "{text}"
+        );
     }
 
     /// Of real boards nobody knows the valves: in their place 0 is sent, which would be "shut".
