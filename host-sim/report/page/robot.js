@@ -149,7 +149,7 @@ export function sideView(picture, g, heights) {
         // From the sole: a foot may press against a wall, above the ground.
         const from = oblique(...at.o6, at.sole)[1];
         const length = state.load_n > 0.5 ? 18 + Math.min(150, state.load_n * 2.2) : 0;
-        set(part.load, { d: length > 0 ? `M${x - 52},${y} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
+        set(part.load, { d: length > 0 ? `M${x - 52},${from} v${tenth(-length)} m-9,12 l9,-14 l9,14` : "" });
         // On the side where the other leg is not; what is long has its room behind.
         const ahead = (i === 0 ? leftX >= rightX : rightX > leftX) && !state.blind;
         set(part.tag, { x: tenth(ahead ? x + 24 : x - 24), y: tenth(y - TAG_MM), "text-anchor": ahead ? "start" : "end" });
