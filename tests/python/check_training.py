@@ -11,7 +11,8 @@ import numpy as np
 import stable_baselines3
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 import wheeleg.envs
 
@@ -37,8 +38,12 @@ def score(model):
 def main():
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     torch.set_num_threads(1)
-    envs = make_vec_env(NAME, n_envs=8, seed=1, env_kwargs={"randomise": {"moving.mass": (0.7, 1.5)}},
-                        wrapper_class=gymnasium.wrappers.TimeLimit, wrapper_kwargs={"max_episode_steps": EPISODE})
+    def make():
+        env = gymnasium.make(NAME, max_episode_steps=EPISODE, randomise={"moving.mass": (0.7, 1.5)})
+        return Monitor(env)
+
+    envs = DummyVecEnv([make] * 8)
+    envs.seed(1)
     model = PPO("MlpPolicy", envs, n_steps=256, batch_size=256, gamma=0.97, seed=1, device="cpu")
     before = score(model)
     begun = time.monotonic()

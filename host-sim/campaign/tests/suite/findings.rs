@@ -224,3 +224,28 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
     assert_eq!(told(19), format!("{id} within its limit by 50 %"));
     assert!(findings.worst.iter().all(|worst| worst.passed));
 }
+
+/// What is more than nothing is no share of it: the amount is told.
+#[test]
+fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
+    let plan = spread(2);
+    let folder = tempfile::tempdir().expect("a folder");
+    run_in(folder.path(), &plan, &options(1), &|case| {
+        let mut outcome = computed(case);
+        let edges = outcome.targets.iter_mut().find(|target| target.id == "R1");
+        let edges = edges.expect("a robot that stands is to switch no valve");
+        assert_eq!(edges.max, Some(0.0));
+        (edges.value, edges.pass) = (Some(132.0), false);
+        outcome.passed = Some(false);
+        Some(outcome)
+    })
+    .0
+    .expect("it runs");
+    let table = folder.path().join("cases.parquet");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let findings = report::Report::of(&table, None).expect("a table").findings;
+    for worst in &findings.worst {
+        assert!(worst.missed.contains(&"R1 by 132".to_owned()), "{worst:?}");
+    }
+    assert_eq!(findings.worst.len(), 4);
+}
