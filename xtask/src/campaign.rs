@@ -6,8 +6,9 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
+use serde_json::Value;
 
-use crate::process::{command, empty_folder, root, run, step_folder, wheeleg};
+use crate::process::{command, empty_folder, figures, output, root, run, step_folder, wheeleg};
 use crate::report::{Report, StepResult};
 use crate::rust::measured;
 use crate::{rust, tools};
@@ -116,4 +117,83 @@ pub(crate) fn deep() -> StepResult<String> {
     ];
     let shared = measured(["campaign", test], &amounts, "campaign: ")?;
     Ok(format!("{shared}; {}", slurm::check()?))
+}
+
+/// Tables as large as they get: merge, report, first row.
+pub(crate) fn large() -> StepResult<String> {
+    let test = "a_large_table_is_merged_and_told_in_time";
+    let rows = ("WHEELEG_CAMPAIGN_ROWS", 1_000_000);
+    measured(["large", test], &[rows], "large: ")
+}
+
+/// Random robots that both laws meet.
+const PAIRS: u32 = 10_000;
+
+/// The shipped comparison of both laws, with more robots. Its folder is kept: stopped or killed, the same command goes
+/// on, with the same program.
+pub(crate) fn pairs() -> StepResult<String> {
+    let wheeleg = rust::build_wheeleg()?;
+    let folder = step_folder("pairs");
+    fs::create_dir_all(&folder).context("the folder of the campaign")?;
+    let shipped = root().join("host-sim/campaigns/three-step-spread.toml");
+    let plan = fs::read_to_string(shipped).context("the shipped plan")?;
+    let plan = plan
+        .replace("samples = 100", &format!("samples = {PAIRS}"))
+        .replace("block = 8", "block = 64");
+    let [file, parts, table] =
+        ["pairs.toml", "parts", "pairs.parquet"].map(|name| folder.join(name));
+    fs::write(&file, plan).context("the plan")?;
+    let campaign = |words: &[&str]| {
+        let mut command = command(&wheeleg);
+        command.arg("campaign").args(words);
+        command
+    };
+    run(campaign(&["run"]).arg(&file).arg("--out").arg(&parts))?;
+    let merged = output(campaign(&["merge"]).arg(&parts).arg("--out").arg(&table))?;
+    let said = output(campaign(&["report", "--json"]).arg(&table))?;
+    let findings: Value = serde_json::from_str(&said).context("the report")?;
+    let findings = &findings["findings"];
+    let cells = findings["passed"].as_array().into_iter().flatten();
+    let rates = cells.map(|cell| {
+        let [low, high] =
+            [0_usize, 1].map(|end| 1e2 * cell[1]["exact"][end].as_f64().unwrap_or(f64::NAN));
+        let of = |key: &str| cell[1][key].clone();
+        let name = cell[0].as_str().unwrap_or_default();
+        format!(
+            "{name}: {} of {} ({low:.1} to {high:.1} %)",
+            of("met"),
+            of("of")
+        )
+    });
+    let rates: Vec<String> = rates.collect();
+    let pair = &findings["paired"][0]["passed"];
+    let hash = merged
+        .lines()
+        .find_map(|line| line.strip_prefix("hash "))
+        .unwrap_or_default();
+    Ok(format!(
+        "{}; of {} pairs the second alone fails {}, the first alone {}, p = {:.2e}; hash {}",
+        rates.join("; "),
+        findings["paired"][0]["pairs"],
+        pair["lost"],
+        pair["gained"],
+        pair["p"].as_f64().unwrap_or(f64::NAN),
+        hash.trim()
+    ))
+}
+
+/// The manifest in a validator that has the schemas of Kubernetes.
+pub(crate) fn kubernetes() -> StepResult<String> {
+    let python = tools::deep_python("kubernetes_validate")?;
+    let wheeleg = rust::build_wheeleg()?;
+    let folder = step_folder("kubernetes");
+    empty_folder(&folder)?;
+    let told = figures(
+        command(python)
+            .arg("tests/python/check_kubernetes.py")
+            .arg(wheeleg)
+            .arg(&folder),
+        |line| line.starts_with("kubernetes: "),
+    )?;
+    Ok(told.join("; "))
 }

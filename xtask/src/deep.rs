@@ -7,7 +7,7 @@ use clap::Args;
 use crate::process::{cargo, command, output, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::rust::measured;
-use crate::{browser, campaign, fuzz, mutants, pil, record, rust, tools};
+use crate::{browser, campaign, fuzz, mutants, pil, python, record, rust, tools};
 
 /// Seconds per target when fuzzing.
 const FUZZ_SECONDS: u64 = 600;
@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 24] = [
+const CHECKS: [Check; 29] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -76,6 +76,36 @@ const CHECKS: [Check; 24] = [
         "200 cases shared, killed 20 times and replayed; Slurm on two nodes of this computer",
         10,
         campaign::deep,
+    ),
+    Check(
+        "large",
+        "1 000 000 made-up rows of 44 columns merged and told, and the first row of as large a plan",
+        5,
+        campaign::large,
+    ),
+    Check(
+        "pairs",
+        "both laws on 10 000 random robots with the same noise; goes on where it was stopped",
+        90,
+        campaign::pairs,
+    ),
+    Check(
+        "kubernetes",
+        "the manifest of an indexed job against the schema that Kubernetes publishes",
+        1,
+        campaign::kubernetes,
+    ),
+    Check(
+        "ecos",
+        "mock-up units of FMI 2.0 in Ecos, a second engine, beside the Python package",
+        5,
+        python::ecos,
+    ),
+    Check(
+        "training",
+        "Stable-Baselines3 trains a policy on the cylinder",
+        10,
+        python::training,
     ),
     Check(
         "identify",

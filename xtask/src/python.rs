@@ -61,6 +61,41 @@ pub(crate) fn steps(report: &mut Report) {
     });
 }
 
+/// Units of FMI 2.0 in an engine that is written in C++ and knows nothing of FMPy, beside the package.
+pub(crate) fn ecos() -> StepResult<String> {
+    let wheeleg = rust::build_wheeleg()?;
+    let folder = step_folder("ecos");
+    empty_folder(&folder)?;
+    in_both("ecospy", "ecos", &mut |python| {
+        python
+            .arg("tests/python/check_ecos.py")
+            .arg(&wheeleg)
+            .arg(target_dir().join("release/deps/libwheeleg_fmu.so"))
+            .arg(&folder);
+    })
+}
+
+/// A policy trained by Stable-Baselines3 comes closer to targets that it has not seen.
+pub(crate) fn training() -> StepResult<String> {
+    in_both("stable_baselines3", "training", &mut |python| {
+        python.arg("tests/python/check_training.py");
+    })
+}
+
+/// The figures of a check, in an environment that has the wheel, and a module that only long checks need.
+fn in_both(module: &str, name: &str, of: &mut dyn FnMut(&mut Command)) -> StepResult<String> {
+    let deep = tools::deep_python(module)?;
+    let place = crate::process::output(command(deep).args([
+        "-c",
+        "import sysconfig; print(sysconfig.get_path('purelib'))",
+    ]))?;
+    let mut check = command(installed()?);
+    check.env("PYTHONPATH", place.trim());
+    of(&mut check);
+    let told = figures(&mut check, |line| line.starts_with(&format!("{name}: ")))?;
+    Ok(told.join("; "))
+}
+
 /// `wheeleg identify` comes to the cost that SciPy's least squares finds over the package's plant.
 fn identification(python: &Path, wheeleg: &Path) -> StepResult {
     let folder = step_folder("identify");

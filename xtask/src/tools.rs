@@ -11,6 +11,9 @@ use crate::report::{StepError, StepResult};
 /// Pinned Python packages of the test scripts and reference generators.
 pub(crate) const REQUIREMENTS: &str = "tests/python/requirements.txt";
 
+/// Pinned Python packages that long checks alone need: much to download, so nobody gets them unasked.
+pub(crate) const DEEP_REQUIREMENTS: &str = "tests/python/deep-requirements.txt";
+
 /// Pinned Node packages of the checks of the page.
 pub(crate) const NODE_PACKAGES: &str = "tests/browser/package.json";
 /// The same with everything that they need, and with hashes.
@@ -56,6 +59,20 @@ pub(crate) fn python() -> StepResult<PathBuf> {
         return Ok(python);
     }
     Err(StepError::not_set_up("the Python environment"))
+}
+
+/// The Python of the environment with what long checks need, if it has `module`.
+pub(crate) fn deep_python(module: &str) -> anyhow::Result<PathBuf> {
+    let folder = target_dir().join("venv-deep");
+    let python = python_in(&folder);
+    let there = succeeds(command(&python).args(["-c", &format!("import {module}")]));
+    anyhow::ensure!(
+        there,
+        "{module} is missing: `python3 -m venv {0}`, then `{0}/bin/pip install --requirement \
+         {DEEP_REQUIREMENTS}`",
+        folder.display()
+    );
+    Ok(python)
 }
 
 pub(crate) fn python_path() -> PathBuf {

@@ -365,7 +365,11 @@ mod tests {
             write_whole(path, &bytes).expect("written");
         };
         for block in 0..store.blocks() {
-            write(&store.part(block), store.cases_of(block));
+            let rows: Vec<Row> = store
+                .cases_of(block)
+                .map(|index| row(index, &columns))
+                .collect();
+            store.write_part(&columns, block, &rows).expect("written");
         }
         let out = folder.path().join("cases.parquet");
         let folders = [folder.path().to_owned()];

@@ -24,6 +24,7 @@ use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
 use wheeleg_report::output::same_file;
 use wheeleg_studies::study::Stop;
 
+use crate::columns::Columns;
 use crate::part::NotAPart;
 use crate::row::Row;
 use crate::table::Table;
@@ -323,6 +324,20 @@ impl Store {
     #[must_use]
     pub fn part(&self, block: u64) -> PathBuf {
         self.folder.join(format!("parts/{block:06}.parquet"))
+    }
+
+    /// Writes the part of a block, which has all its rows.
+    ///
+    /// # Errors
+    /// [`CampaignError::Output`] if it cannot be written.
+    pub fn write_part(
+        &self,
+        columns: &Columns,
+        block: u64,
+        rows: &[Row],
+    ) -> Result<(), CampaignError> {
+        let bytes = part::bytes(columns, &self.plan.hash, rows);
+        write_whole(&self.part(block), &bytes)
     }
 
     pub(crate) fn attempts(&self, block: u64) -> PathBuf {

@@ -284,7 +284,8 @@ impl Work<'_> {
             &part.with_extension("run.parquet"),
             &part::run_bytes(hash, &efforts),
         )?;
-        write_whole(&part, &part::bytes(self.cases.columns(), hash, &rows))?;
+        self.store
+            .write_part(self.cases.columns(), block.number, &rows)?;
         for path in partials {
             let _ = std::fs::remove_file(path);
         }

@@ -548,6 +548,21 @@ fn a_plan_needs_its_head() {
             "`sampler` = \"sobbol\" is not known",
         ),
         (
+            "name = \"x\"\nroot = 1\nsampler = \"saltelli\"\nsamples = 3\n[base]\nscenario = \"stand\"\n\
+             [factor.a]\nparameter = \"robot.supply.droop\"\n\
+             uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n",
+            "`sampler` = \"saltelli\" with 1 drawn factor: allowed from 2",
+        ),
+        (
+            "name = \"x\"\nroot = 1\nsampler = \"saltelli\"\nsamples = 10\n[base]\nscenario = \"stand\"\n\
+             [factor.a]\nparameter = \"robot.supply.droop\"\n\
+             uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n\
+             [factor.b]\nparameter = \"robot.friction.viscous\"\nscale = true\n\
+             uniform = { min = 0.9, max = 1.1 }\n",
+            "`samples` = 10 with `sampler` = \"saltelli\" and 2 drawn factors: allowed are multiples of 4, \
+             such as 8 or 12",
+        ),
+        (
             "name = \"x\"\nroot = 1\nsamples = 65536000000\nreplicates = 2\n\
              [base]\nscenario = \"stand\"\n",
             "131072000000 cases: allowed are 1 to 65536000000",

@@ -7,12 +7,14 @@
 mod binomial;
 mod rank;
 mod resample;
+mod sensitivity;
 
 pub use binomial::{
     ALPHA, at_most, clopper_pearson, mcnemar, quantile_bound_rank, quantile_ranks, wilson,
 };
 pub use rank::spearman;
 pub use resample::bootstrap;
+pub use sensitivity::{Share, Shares, shares};
 
 /// Quantile of a share from 0 to 1; `None` without values. Not a number sorts last.
 ///

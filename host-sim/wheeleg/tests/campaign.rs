@@ -149,18 +149,14 @@ fn however_it_is_run_the_table_is_the_same() {
         assert!(child.wait().expect("ended").success());
     }
     let kills = number(KILLS_VARIABLE, 4);
-    let mut random = 88_172_645_463_325_252_u64;
+    let mut state = 88_172_645_463_325_252;
     for _ in 0..kills {
         let mut child = run(&killed)
             .args(["--threads", "2"])
             .stdout(Stdio::null())
             .spawn()
             .expect("started");
-        // Xorshift (Marsaglia 2003).
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        let wait = one_s / (kills + 2) as f64 * (random % 1000) as f64 * 2e-3;
+        let wait = one_s / (kills + 2) as f64 * (random(&mut state) % 1000) as f64 * 2e-3;
         std::thread::sleep(Duration::from_secs_f64(wait));
         let _ = child.kill();
         let _ = child.wait();
@@ -351,6 +347,13 @@ fn a_pilot_has_a_table_and_a_page() {
     let table = next.last().expect("the table");
     let told = succeeded(wheeleg().args(["report", table]));
     assert!(told.contains("rows    3"), "{told}");
+    // None of these short runs meets its targets: the worst is named, with the command that runs it again.
+    let after = |word: &str| told.lines().find_map(|line| line.strip_prefix(word));
+    let worst = after("worst   ").expect("the worst case");
+    let (case, why) = worst.split_once(": ").expect("why");
+    assert!(why.starts_with("missed "), "{worst}");
+    let replay = format!("replay {table} {case}");
+    assert_eq!(after("next    wheeleg campaign "), Some(&*replay));
     let page = fs::read_to_string(out.join("cases.html")).expect("a page");
     assert!(page.contains("3 of 8 cases") && page.contains("a level floor of rock"));
     let state = output(wheeleg().arg("status").arg(&out).arg("--json"));
@@ -417,4 +420,56 @@ fn bad_input_is_told_before_the_first_case() {
     );
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("the Slurm array says 1/2"));
+}
+
+/// A pod of an indexed job has a completion index in its environment, and the manifest says the rest: so many
+/// pods, started by a loop in no order, come to the table of one process.
+#[test]
+fn an_indexed_job_of_kubernetes_comes_to_the_table_of_one_process() {
+    const PODS: usize = 3;
+    let home = folder();
+    let plan = plan(home.path(), 6);
+    let [one, job] = ["one", "job"].map(|name| home.path().join(name));
+    succeeded(wheeleg().arg("run").arg(&plan).arg("--out").arg(&one));
+    let submit = |shards: usize| {
+        let mut command = wheeleg();
+        command.arg("submit").arg(&plan).arg("--out").arg(&job);
+        command.args(["--kubernetes", "--shards", &shards.to_string()]);
+        command
+    };
+    let manifest = succeeded(&mut submit(PODS));
+    let line = manifest
+        .lines()
+        .find_map(|line| line.trim().strip_prefix("command: ["));
+    let words = line.and_then(|words| words.strip_suffix(']'));
+    let words: Vec<String> = words
+        .expect("the command of a pod")
+        .split(", ")
+        .map(|word| word.trim_matches('"').to_owned())
+        // The volume is mounted there.
+        .map(|word| word.replacen("/campaign", &job.to_string_lossy(), 1))
+        .collect();
+    assert_eq!(words[..2], ["wheeleg", "campaign"]);
+    for index in [2, 0, 1, 0] {
+        let pod = succeeded(
+            wheeleg()
+                .args(&words[2..])
+                .env("JOB_COMPLETION_INDEX", index.to_string()),
+        );
+        assert!(pod.contains(&format!("in shard {index}/{PODS}")), "{pod}");
+    }
+    let table = home.path().join("cases.parquet");
+    assert_eq!(merged(&[&job], &table), merged(&[&one], &table));
+    assert!(parts(&job) == parts(&one));
+    let refused = output(&mut submit(1_000));
+    assert_eq!(refused.status.code(), Some(2), "more pods than blocks");
+}
+
+/// Numbers at random, the same every time.
+fn random(state: &mut u64) -> u64 {
+    // Xorshift (Marsaglia 2003).
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
 }

@@ -23,6 +23,8 @@ enum Kind {
     Random,
     LatinHypercube(Vec<Permutation>),
     Sobol(Vec<Directions>),
+    /// Of the first point of two, then of the second.
+    Saltelli(Vec<Directions>),
 }
 
 impl<'a> Draws<'a> {
@@ -31,11 +33,8 @@ impl<'a> Draws<'a> {
     /// # Errors
     /// [`CampaignError::Refused`] if a Sobol sequence has not so many dimensions.
     pub fn new(plan: &'a Plan) -> Result<Self, CampaignError> {
-        let factors = plan.factors.iter();
-        let drawn: Vec<&str> = factors
-            .filter(|factor| matches!(factor.values, Values::Drawn(_)))
-            .map(|factor| factor.name.as_str())
-            .collect();
+        let drawn: Vec<&str> = plan.drawn().map(|factor| factor.name.as_str()).collect();
+        let of_point = |point: u64| drawn.iter().map(move |name| (*name, point));
         let kind = match plan.sampler {
             Sampler::Random => Kind::Random,
             Sampler::LatinHypercube => {
@@ -44,7 +43,11 @@ impl<'a> Draws<'a> {
                 let permutations = permutations.map(|key| Permutation::new(key, plan.samples));
                 Kind::LatinHypercube(permutations.collect())
             }
-            Sampler::Sobol => Kind::Sobol(sobol::directions(plan.root, &drawn)?),
+            Sampler::Sobol => Kind::Sobol(sobol::directions(plan.root, of_point(0))?),
+            Sampler::Saltelli => {
+                let both = of_point(0).chain(of_point(1));
+                Kind::Saltelli(sobol::directions(plan.root, both)?)
+            }
         };
         Ok(Self { plan, kind })
     }
@@ -84,6 +87,14 @@ impl<'a> Draws<'a> {
                 ((cell + within) / self.plan.samples as f64).clamp(LEAST, MOST)
             }
             Kind::Sobol(directions) => unit(directions[dimension].shifted(sample)),
+            Kind::Saltelli(directions) => {
+                let factors = directions.len() / 2;
+                let (point, place) = (sample / (factors as u64 + 2), sample % (factors as u64 + 2));
+                // The first of two points, then the same with one factor of the other, then the other.
+                let of_other = place == factors as u64 + 1 || place == dimension as u64 + 1;
+                let dimension = dimension + if of_other { factors } else { 0 };
+                unit(directions[dimension].shifted(point))
+            }
         }
     }
 }

@@ -16,14 +16,21 @@ pub(super) struct Directions {
     shift: u64,
 }
 
-/// Those of Joe and Kuo (2008, their table D6) for the factors, in their order.
-pub(super) fn directions(root: u64, factors: &[&str]) -> Result<Vec<Directions>, CampaignError> {
+/// Those of Joe and Kuo (2008, their table D6) for the factors of points, in their order.
+pub(super) fn directions<'a>(
+    root: u64,
+    factors: impl Iterator<Item = (&'a str, u64)>,
+) -> Result<Vec<Directions>, CampaignError> {
+    let factors: Vec<(&str, u64)> = factors.collect();
     let table = match factors.len() {
         n if n <= DIMENSIONS[0] => JoeKuoD6::minimal(),
         n if n <= DIMENSIONS[1] => JoeKuoD6::standard(),
         n => {
             return Err(CampaignError::refused(
-                format!("{n} factors are drawn: a Sobol sequence has 1 to 1000 dimensions here"),
+                format!(
+                    "the drawn factors take {n} dimensions: a Sobol sequence has 1 to 1000 here, and \
+                     \"saltelli\" takes two for each factor"
+                ),
                 "use `sampler = \"random\"`",
             ));
         }
@@ -36,9 +43,9 @@ pub(super) fn directions(root: u64, factors: &[&str]) -> Result<Vec<Directions>,
     );
     let directions = numbers.into_iter().zip(factors);
     Ok(directions
-        .map(|(numbers, factor)| Directions {
+        .map(|(numbers, (factor, point))| Directions {
             numbers,
-            shift: super::first(super::hash(root, "sobol shift", factor, 0)),
+            shift: super::first(super::hash(root, "sobol shift", factor, point)),
         })
         .collect())
 }
@@ -62,8 +69,8 @@ mod tests {
     use super::directions;
 
     fn points(dimensions: usize, numbers: std::ops::Range<u64>) -> Vec<Vec<f64>> {
-        let names = vec!["x"; dimensions];
-        let all = directions(1, &names).expect("so many dimensions");
+        let names = vec![("x", 0); dimensions];
+        let all = directions(1, names.into_iter()).expect("so many dimensions");
         let share = |bits: u64| bits as f64 / 2_f64.powi(64);
         numbers
             .map(|n| all.iter().map(|d| share(d.point(n))).collect())
@@ -102,14 +109,9 @@ mod tests {
 
     #[test]
     fn too_many_factors_are_refused() {
-        let names = vec!["x"; 1001];
-        let error = directions(1, &names).err().expect("refused").to_string();
+        let of = |count: usize| directions(1, vec![("x", 0); count].into_iter());
+        let error = of(1001).err().expect("refused").to_string();
         assert!(error.contains("1001") && error.contains("1000"), "{error}");
-        assert_eq!(
-            directions(1, &names[..200])
-                .expect("the larger table")
-                .len(),
-            200
-        );
+        assert_eq!(of(200).expect("the larger table").len(), 200);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_config::plan::Plan;
+use wheeleg_config::plan::{Plan, Sampler};
 use wheeleg_report::stats;
 
 use super::Merged;
@@ -13,6 +13,7 @@ use super::pairs::{self, Paired};
 use super::worst::{Worst, worst};
 use crate::columns::Column;
 use crate::row::Status;
+use crate::table::Table;
 use crate::{CampaignError, Cases};
 
 /// Kinds of errors that are listed.
@@ -70,6 +71,36 @@ pub struct InCell {
     pub quantiles: Vec<Quantile>,
     /// Rank correlation with each factor that is drawn.
     pub spearman: Vec<Option<f64>>,
+    /// Shares of the variance that the factors of [`Findings::shared`] cause; empty where there are none.
+    pub shares: Vec<Shares>,
+}
+
+/// Shares of a target's variance that one factor causes.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Shares {
+    /// Alone.
+    pub first: Share,
+    /// With all that it does together with others.
+    pub total: Share,
+}
+
+/// A share of a variance. Noise may make it less than 0 or more than 1.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Share {
+    /// Its estimate.
+    pub value: f64,
+    /// Its interval, 95 %, by drawing from the samples; none of too many.
+    pub interval: Option<[f64; 2]>,
+}
+
+impl From<stats::Shares> for Shares {
+    fn from(shares: stats::Shares) -> Self {
+        let [first, total] = [shares.first, shares.total].map(|share| Share {
+            value: share.value,
+            interval: share.interval,
+        });
+        Self { first, total }
+    }
 }
 
 /// A target.
@@ -103,6 +134,8 @@ pub struct Findings {
     pub factors: Vec<String>,
     /// Names of the factors that are drawn and have numbers.
     pub drawn: Vec<String>,
+    /// Names of the factors that cause shares of the variance: those that Saltelli's design draws.
+    pub shared: Vec<String>,
     /// Each target.
     pub targets: Vec<OfTarget>,
     /// Errors by kind, the most frequent first.
@@ -137,7 +170,11 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
         .collect();
     let columns = merged.columns.all.iter();
     let columns = columns.filter(|column| merged.columns.targets.contains(&column.name));
-    let targets = columns.map(|column| of_target(merged, column, &cells, &drawn));
+    let shared: Vec<String> = match plan.sampler {
+        Sampler::Saltelli => plan.drawn().map(|factor| factor.name.clone()).collect(),
+        Sampler::Random | Sampler::LatinHypercube | Sampler::Sobol => Vec::new(),
+    };
+    let targets = columns.map(|column| of_target(merged, column, &cells, &drawn, shared.len()));
     Ok(Findings {
         rows: table.rows() as u64,
         by_status: by_status.to_vec(),
@@ -152,6 +189,7 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
         factors: merged.columns.factors.clone(),
         targets: targets.collect(),
         drawn,
+        shared,
         errors: errors(merged),
         grounds: grounds(&plan, merged, &cells)?,
         worst: worst(merged),
@@ -189,7 +227,13 @@ fn grounds(plan: &Plan, merged: &Merged, cells: &[Cell]) -> Result<Vec<OfScenari
     Ok(found)
 }
 
-fn of_target(merged: &Merged, column: &Column, cells: &[Cell], drawn: &[String]) -> OfTarget {
+fn of_target(
+    merged: &Merged,
+    column: &Column,
+    cells: &[Cell],
+    drawn: &[String],
+    shared: usize,
+) -> OfTarget {
     let table = &merged.table;
     let values = table.numbers(&column.name);
     let verdicts = table.flags(&format!("{}.pass", column.name));
@@ -216,12 +260,36 @@ fn of_target(merged: &Merged, column: &Column, cells: &[Cell], drawn: &[String])
             rate: Rate::of(met, of),
             quantiles: quantiles.collect(),
             spearman: spearman.collect(),
+            shares: match shared {
+                0 => Vec::new(),
+                factors => shares(table, cell, values, factors),
+            },
         }
     };
     OfTarget {
         column: column.clone(),
         cells: cells.iter().map(in_cell).collect(),
     }
+}
+
+/// Shares of the variance of a cell's values; empty where they are the same, or too few sets of samples have
+/// all their values.
+fn shares(table: &Table, cell: &Cell, values: &[Option<f64>], factors: usize) -> Vec<Shares> {
+    let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
+    let size = factors + 2;
+    let mut sets: BTreeMap<(i64, i64), Vec<f64>> = BTreeMap::new();
+    for row in &cell.rows {
+        let (Some(sample), Some(value)) = (samples[*row], values[*row]) else {
+            continue;
+        };
+        let (set, place) = (sample / size as i64, sample.rem_euclid(size as i64));
+        let set = sets.entry((set, replicates[*row].unwrap_or(0)));
+        set.or_insert_with(|| vec![f64::NAN; size])[place as usize] = value;
+    }
+    let whole = |set: &Vec<f64>| set.iter().all(|value| value.is_finite());
+    let sets: Vec<Vec<f64>> = sets.into_values().filter(whole).collect();
+    let found = stats::shares(&sets).into_iter().flatten();
+    found.map(Shares::from).collect()
 }
 
 fn quantile(sorted: &[f64], share: f64) -> Option<Quantile> {

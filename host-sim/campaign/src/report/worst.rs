@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::plan::Value;
+use wheeleg_report::number::short;
 
 use super::{Merged, cells};
 use crate::columns::Column;
@@ -38,6 +39,22 @@ fn excess(value: f64, column: &Column) -> f64 {
     let low = column.min.map_or(0.0, |min| beyond(min, min - value));
     let high = column.max.map_or(0.0, |max| beyond(max, value - max));
     low.max(high)
+}
+
+/// By how much a value is outside of its limits, in words: a share of the limit, but of a limit of nothing the
+/// amount.
+fn amount(value: f64, by: f64, column: &Column) -> String {
+    let below = column.min.filter(|min| value < *min);
+    let limit = below.or(column.max).unwrap_or(0.0);
+    if limit.abs() > NOTHING {
+        return percent(by);
+    }
+    let unit = match column.unit.as_str() {
+        // A number without a unit.
+        "" | "1" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    format!("{}{unit}", short((value - limit).abs()))
 }
 
 /// How much room a value has within its limits, as a share of the limit that it is nearest to; none
@@ -128,17 +145,21 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
                 .factors
                 .iter()
                 .map(|factor| match cells::value(table, factor, row) {
-                    Some(Value::Number(x)) => wheeleg_report::number::short(x),
+                    Some(Value::Number(x)) => short(x),
                     Some(other) => other.to_string(),
                     None => String::new(),
                 })
                 .collect(),
             missed: missed_in(row)
                 .into_iter()
-                .map(|(column, by)| match by.is_finite() {
-                    true => format!("{} by {}", column.name, percent(by)),
-                    false => format!("{} not measured", column.name),
-                })
+                .map(
+                    |(column, by)| match merged.table.numbers(&column.name)[row] {
+                        Some(value) if by.is_finite() => {
+                            format!("{} by {}", column.name, amount(value, by, column))
+                        }
+                        _ => format!("{} not measured", column.name),
+                    },
+                )
                 .collect(),
         })
         .collect()

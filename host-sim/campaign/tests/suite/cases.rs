@@ -107,6 +107,41 @@ fn more_samples_and_another_order_of_work_leave_a_case_as_it_is() {
     }
 }
 
+/// Of two points the design of Saltelli has the first, it with each factor of the other in turn, and the other.
+/// More samples leave those before them.
+#[test]
+fn saltelli_takes_one_factor_after_the_other_from_the_other_point() {
+    let of = |samples: u64| {
+        plan_of(&format!(
+            "samples = {samples}\nsampler = \"saltelli\"\n{HEAD}{BASE}{SPREAD}"
+        ))
+    };
+    let (few, many) = (of(8), of(40));
+    let (few, many) = (
+        Cases::new(&few).expect("a plan"),
+        Cases::new(&many).expect("a plan"),
+    );
+    let mut points = BTreeSet::new();
+    // Two cells: a sample is every second case.
+    for set in 0..2 {
+        let sample = |place: u64| few.case(2 * (4 * set + place));
+        let values = [0, 1, 2, 3].map(|place| {
+            let case = sample(place);
+            assert_eq!(case.place.sample, 4 * set + place);
+            [number(&case, 0), number(&case, 1)]
+        });
+        let [first, droop, friction, other] = values;
+        assert!(first[0] != other[0] && first[1] != other[1], "{values:?}");
+        assert_eq!(droop, [other[0], first[1]]);
+        assert_eq!(friction, [first[0], other[1]]);
+        points.extend(values.map(|v| v.map(f64::to_bits)));
+    }
+    assert_eq!(points.len(), 8);
+    for index in 0..16 {
+        assert_eq!(few.case(index).id, many.case(index).id);
+    }
+}
+
 /// The content decides, not the unit that the plan's author likes for the file: names of files
 /// and comments do not enter either.
 #[test]

@@ -96,6 +96,52 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     assert!(html.len() < 10_000_000);
 }
 
+/// A sum of two factors of which the second has four times the variance of the first: shares of 0.2 and 0.8.
+/// A set of samples without a value is left out.
+#[test]
+fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
+    let head = HEAD.replace("block = 4", "block = 256");
+    let plan = plan_of(&format!(
+        "samples = 512\nsampler = \"saltelli\"\n{head}{BASE}\
+         [factor.a]\nparameter = \"robot.supply.droop\"\n\
+         uniform = {{ min = 20000, max = 21000, unit = \"Pa\" }}\n\
+         [factor.b]\nparameter = \"scenario.duration\"\n\
+         uniform = {{ min = 2000, max = 4000, unit = \"ms\" }}\n"
+    ));
+    let folder = tempfile::tempdir().expect("a folder");
+    run_in(folder.path(), &plan, &options(2), &|case| {
+        let outcome = computed(case);
+        Some(match case.place.index {
+            5 => Outcome {
+                targets: Vec::new(),
+                ..outcome
+            },
+            _ => outcome,
+        })
+    })
+    .0
+    .expect("it runs");
+    let table = folder.path().join("cases.parquet");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let report = report::Report::of(&table, None).expect("a table");
+    assert_eq!(report.findings.shared, ["a", "b"]);
+    let first = &report.findings.targets[0].cells[0];
+    for (found, wanted) in first.shares.iter().zip([0.2, 0.8]) {
+        for share in [&found.first, &found.total] {
+            assert!((share.value - wanted).abs() < 0.1, "{found:?}");
+            let [low, high] = share.interval.expect("drawn");
+            assert!(low < share.value && share.value < high, "{found:?}");
+        }
+    }
+    assert_eq!(first.shares.len(), 2);
+    let page = folder.path().join("cases.html");
+    report.write(&page).expect("a page");
+    let html = fs::read_to_string(&page).expect("there");
+    for words in ["Shares of the variance", "b, in all"] {
+        assert!(html.contains(words), "{words}");
+    }
+}
+
 /// The page begins with what came of it; of very many cells it shows the first twenty, and folds the others.
 #[test]
 fn the_page_begins_with_its_verdict_and_folds_what_is_long() {
@@ -177,4 +223,29 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
     assert_eq!(told(0), format!("{id} within its limit by 12 %"));
     assert_eq!(told(19), format!("{id} within its limit by 50 %"));
     assert!(findings.worst.iter().all(|worst| worst.passed));
+}
+
+/// What is more than nothing is no share of it: the amount is told.
+#[test]
+fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
+    let plan = spread(2);
+    let folder = tempfile::tempdir().expect("a folder");
+    run_in(folder.path(), &plan, &options(1), &|case| {
+        let mut outcome = computed(case);
+        let edges = outcome.targets.iter_mut().find(|target| target.id == "R1");
+        let edges = edges.expect("a robot that stands is to switch no valve");
+        assert_eq!(edges.max, Some(0.0));
+        (edges.value, edges.pass) = (Some(132.0), false);
+        outcome.passed = Some(false);
+        Some(outcome)
+    })
+    .0
+    .expect("it runs");
+    let table = folder.path().join("cases.parquet");
+    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let findings = report::Report::of(&table, None).expect("a table").findings;
+    for worst in &findings.worst {
+        assert!(worst.missed.contains(&"R1 by 132".to_owned()), "{worst:?}");
+    }
+    assert_eq!(findings.worst.len(), 4);
 }

@@ -39,13 +39,17 @@ pub enum Sampler {
     LatinHypercube,
     /// The sequence of Sobol with the direction numbers of Joe and Kuo, shifted.
     Sobol,
+    /// The design of Saltelli over that sequence: of each two points one, then one with a single factor
+    /// taken from the other for each factor, then the other.
+    Saltelli,
 }
 
 /// Samplers by name.
-pub const SAMPLERS: [(&str, Sampler); 3] = [
+pub const SAMPLERS: [(&str, Sampler); 4] = [
     ("random", Sampler::Random),
     ("latin-hypercube", Sampler::LatinHypercube),
     ("sobol", Sampler::Sobol),
+    ("saltelli", Sampler::Saltelli),
 ];
 
 /// Which cases keep their log.
@@ -148,6 +152,7 @@ impl Plan {
                 check::check(&mut r, plan)?;
             }
             ensure_samples_differ(&mut r, plan);
+            ensure_saltelli_is_whole(&mut r, plan);
         }
         r.finish(&what, plan).map(|(plan, _)| plan)
     }
@@ -164,18 +169,25 @@ impl Plan {
         self.cells() * self.samples * self.replicates
     }
 
-    /// Whether two samples are likely to have the same values: some factors are drawn, and each of them from
+    /// Factors that are drawn, in the order of the file.
+    pub fn drawn(&self) -> impl Iterator<Item = &Factor> {
+        let factors = self.factors.iter();
+        factors.filter(|factor| matches!(factor.values, Values::Drawn(_)))
+    }
+
+    /// Samples that Saltelli's design makes of two points.
+    #[must_use]
+    pub fn saltelli_samples(&self) -> u64 {
+        self.drawn().count() as u64 + 2
+    }
+
+    /// Whether two samples may well have the same values: some factors are drawn, and each of them from
     /// a list.
     #[must_use]
     pub fn draws_from_lists_alone(&self) -> bool {
-        let drawn = self
-            .factors
-            .iter()
-            .filter_map(|factor| match &factor.values {
-                Values::Drawn(distribution) => Some(distribution),
-                Values::Grid(_) => None,
-            });
-        let mut from_list = drawn.map(|drawn| matches!(drawn, Distribution::Choice(_)));
+        let mut from_list = self
+            .drawn()
+            .map(|factor| matches!(factor.values, Values::Drawn(Distribution::Choice(_))));
         from_list.next() == Some(true) && from_list.all(|from_list| from_list)
     }
 }
@@ -282,9 +294,8 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
 
 /// Reports samples without anything drawn: each case would be computed again.
 fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
-    let drawn = |factor: &Factor| matches!(factor.values, Values::Drawn(_));
     let samples = plan.samples;
-    if samples == 1 || plan.factors.iter().any(drawn) {
+    if samples == 1 || plan.drawn().next().is_some() {
         return;
     }
     let top = r.table("");
@@ -300,7 +311,45 @@ fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
     );
 }
 
-/// The bars as written in the plan, once they are known to be right.
+/// Saltelli's design needs factors to tell apart, and all samples that belong to two points.
+fn ensure_saltelli_is_whole(r: &mut Reader, plan: &Plan) {
+    if plan.sampler != Sampler::Saltelli {
+        return;
+    }
+    let top = r.table("");
+    let span = |key: &str| Some(top.as_ref()?.get(key)?.0);
+    let (drawn, samples) = (plan.drawn().count(), plan.samples);
+    let set = plan.saltelli_samples();
+    if drawn < 2 {
+        r.problem(
+            span("sampler"),
+            format!(
+                "`sampler` = \"saltelli\" with {} drawn factor{}: allowed from 2",
+                drawn,
+                if drawn == 1 { "" } else { "s" }
+            ),
+            "nothing to tell apart",
+            Some("it says how much of a figure's variance each drawn factor causes".into()),
+        );
+    } else if !samples.is_multiple_of(set) {
+        let below = samples / set * set;
+        let near = match below {
+            0 => format!("{set}"),
+            below => format!("{below} or {}", below + set),
+        };
+        r.problem(
+            span("samples"),
+            format!(
+                "`samples` = {samples} with `sampler` = \"saltelli\" and {drawn} drawn factors: allowed \
+                 are multiples of {set}, such as {near}"
+            ),
+            "not a multiple",
+            Some("two points make a sample each, and one for each drawn factor".into()),
+        );
+    }
+}
+
+/// The bars as they stand in the plan, once they are known to be right.
 fn bars(r: &mut Reader, sources: &Sources) -> Option<ArrayOfTables> {
     if crate::bars::read(r, &TOP).is_empty() {
         return None;

@@ -28,11 +28,11 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut ranks = vec![0.0; values.len()];
+    let mut below = 0;
     for equal in order.chunk_by(|a, b| values[*a] == values[*b]) {
-        // Ranks follow the sorted order, so the neighbours give the first of the group.
-        let below = order.partition_point(|i| values[*i] < values[equal[0]]);
         let rank = below as f64 + 0.5 * (equal.len() as f64 + 1.0);
         equal.iter().for_each(|i| ranks[*i] = rank);
+        below += equal.len();
     }
     ranks
 }

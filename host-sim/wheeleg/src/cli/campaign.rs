@@ -379,7 +379,7 @@ fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
     if args.json {
         print(&print::findings_json(findings, pairs))?;
     } else {
-        show(&print::findings(findings, pairs, page))?;
+        show(&print::findings(&args.table, findings, pairs, page))?;
     }
     written?;
     Ok(ExitCode::from(stop.signal().map_or(0, stopped_code)))

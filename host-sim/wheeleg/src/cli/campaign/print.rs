@@ -206,7 +206,12 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
 }
 
 /// What a table says, in a few lines.
-pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<&Path>) -> String {
+pub(super) fn findings(
+    table: &Path,
+    findings: &Findings,
+    pairs: Option<&Pairs>,
+    page: Option<&Path>,
+) -> String {
     let mut out = format!("rows    {}\n", findings.rows);
     let passed = findings.passed.iter().map(|(cell, rate)| {
         let cell = if cell.is_empty() { "all cases" } else { cell };
@@ -238,8 +243,24 @@ pub(super) fn findings(findings: &Findings, pairs: Option<&Pairs>, page: Option<
             pairs.same_log, pairs.paired.pairs
         );
     }
+    if let Some(worst) = findings.worst.first() {
+        let why = match (&worst.nearest, worst.missed.as_slice()) {
+            (Some(nearest), _) => format!("passed, {nearest}"),
+            (None, []) => worst.status.clone(),
+            (None, missed) => format!("missed {}", missed.join(", ")),
+        };
+        let _ = writeln!(out, "worst   {}: {why}", worst.case);
+    }
     if let Some(page) = page {
         let _ = writeln!(out, "report  {}", page.display());
+    }
+    if let Some(worst) = findings.worst.first() {
+        let table = table.display();
+        let _ = writeln!(
+            out,
+            "next    wheeleg campaign replay {table} {}",
+            worst.case
+        );
     }
     out
 }
@@ -300,7 +321,7 @@ mod tests {
                 paired,
                 ..Findings::default()
             };
-            let text = super::findings(&findings, None, None);
+            let text = super::findings(Path::new("cases.parquet"), &findings, None, None);
             let (cells, last) = lines(&text, "passed  ");
             assert_eq!(cells, told, "{text}");
             assert_eq!(lines(&text, "paired  ").0, told, "{text}");
