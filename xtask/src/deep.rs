@@ -4,7 +4,7 @@
 use anyhow::Context;
 use clap::Args;
 
-use crate::process::{cargo, command, output, run, target_dir};
+use crate::process::{cargo, command, figures, output, run, target_dir};
 use crate::report::{Report, StepResult};
 use crate::rust::measured;
 use crate::{browser, campaign, fuzz, mutants, pil, python, record, rust, tools};
@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 29] = [
+const CHECKS: [Check; 25] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -58,6 +58,12 @@ const CHECKS: [Check; 29] = [
         "the predictive law on the four axes, 5 000 and 2 000 combinations, vented and with unknown air",
         12,
         combinations,
+    ),
+    Check(
+        "ablation",
+        "each part of the predictive law taken out, 1 200 combinations with and without it",
+        10,
+        ablation,
     ),
     Check(
         "field",
@@ -301,6 +307,18 @@ fn combinations() -> StepResult<String> {
         &[("WHEELEG_COMBINATIONS", 5_000)],
         "combinations from number ",
     )
+}
+
+/// A build of its own: only it has a law whose parts can be taken out.
+fn ablation() -> StepResult<String> {
+    let mut test = cargo();
+    test.args(["test", "--locked", "--release"])
+        .args(rust::HOST)
+        .args(["--features", "wheeleg-tests/ablation", "--test", "ablation"])
+        .args(["--", "--nocapture"]);
+    let found = figures(&mut test, |line| line.starts_with("each part of the law "))?;
+    let first = found.into_iter().next();
+    Ok(first.context("no line with the parts of the law")?)
 }
 
 fn behaviours() -> StepResult<String> {

@@ -41,7 +41,7 @@ pub(crate) fn clippy() -> StepResult {
     run(cargo().args(["clippy", "--locked"]).args(HOST).args([
         "--all-targets",
         "--features",
-        "wheeleg-tests/pil,wheeleg-tests/qemu",
+        "wheeleg-tests/ablation,wheeleg-tests/pil,wheeleg-tests/qemu",
         "--",
         "-D",
         "warnings",

@@ -5,6 +5,7 @@
 //! | [`observer`] | estimates without a pressure sensor: valves, chamber pressures, motion, load, mass |
 //! | [`law`] | the predictive law on top: reference, prediction, switching curve, allocation, pulses, standstill |
 //! | [`tuning`] | all gains and thresholds of these two, each with unit, reason and the test that guards it |
+//! | [`ablation`] | parts of these two that a study takes out, in a build of its own |
 //! | [`axis`] | the axis data of a board, and the coefficients computed from them |
 //! | [`paper`] | the paper's fuzzy inference with its rules, and the estimate of ė |
 //! | [`joint`] | the controller of a joint board: one of six laws, the paper's by default (with one of two corrections) |
@@ -58,6 +59,7 @@
     )
 )]
 
+pub mod ablation;
 pub mod axis;
 mod gain;
 pub mod joint;

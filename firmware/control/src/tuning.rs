@@ -78,7 +78,7 @@ tuning! {
     LEARN_PEAK_SPEED: i32 = 200 << 16, "raw mm/s (200 mm/s)", "a slower move has little impulse of its mass", "what_tells_nothing_is_left";
     LEARN_PEAK_ABOVE: i32 = 100 << 16, "raw mm/s (100 mm/s)", "the same, above the line from begin to end", "what_tells_nothing_is_left";
     MASS_LEARNT_MOST: i32 = 12, "times the mass told", "a payload adds to it", "what_cannot_be_is_bounded";
-    MASS_LEARNT_LEAST: i32 = 39_322, "share of the mass told, × 2^16 (0.6)", "rod and carriage stay", "what_cannot_be_is_bounded";
+    MASS_LEARNT_LEAST: i32 = 39_322, "share of the mass told, × 2^16 (0.6)", "rod and carriage stay", "a_mass_below_the_least_is_believed_when_it_is_told_again";
 
     // Observer: identification of mass and air.
     AIR_UNKNOWN: i32 = 1024, "mean width of both pressures' bounds over the largest force, × 2^12 (0.25)", "searched: with more the mass by three instants is wrong by up to five times", "a_move_with_unknown_air_tells_its_mass_and_the_air";
@@ -103,6 +103,7 @@ tuning! {
     FULL_FRICTION_SPEED: i32 = 10, "mm/s", "searched: steeper, the feed-forward is a relay", "friction_is_fed_forward_in_proportion_up_to_ten_mm_s";
     BRAKE_FORCE_USED: i32 = 45_875, "share of the force that can brake, × 2^16 (0.7)", "searched: leaves the rest for what is not known", "what_a_load_leaves_for_braking_slows_the_approach";
     BRAKE_LEAST: i32 = 200, "mm/s²", "a piston whose load is beyond its force still approaches", "what_a_load_leaves_for_braking_slows_the_approach";
+    IMPATIENT_DIVISOR: i32 = 2, "times less acceleration is asked for where patience is over and half is enough", "a swing that lasts is a loop with too much gain; a quarter was no better (decision 61)", "half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pulse";
     ACCELERATION_LIMIT_HALVES: i32 = 5, "limit over the deceleration of the curve, in halves", "searched", "what_a_load_leaves_for_braking_slows_the_approach";
 
     // Law: allocation and pulses.

@@ -9,6 +9,7 @@
 //! v_top = min(w_B, TOP_SPEED w_A)     a_b = BRAKE k v_top
 //! Ḟ   = n/2 · C ρ0 R T0 Σ p_i A_i / V_i          how fast the force can change, at mid-stroke
 //! m_n = NIMBLE Ḟ / (a_b k)                       mass up to which the valves can follow the speed law
+//! F_1 = n C ρ0 R T0 p_B A_B / V_B (t_off + margin)   force of the finest pulse: the shortest, venting B at mid-stroke
 //! T²  = 4 π² m / k_air                           oscillation on the air of both chambers
 //! ```
 //!
@@ -102,6 +103,8 @@ pub struct AxisModel {
     pub mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
     pub nimble_mass: i32,
+    /// Force of the finest pulse F_1, the shortest opening of a vent valve at mid-stroke, mN.
+    pub pulse_force: i32,
     /// Slope of the speed law at the target k, 1/s × 2^8, up to `nimble_mass`.
     pub slope: i32,
     /// Gain of the speed error D, 1/s × 2^8, likewise.
@@ -218,17 +221,22 @@ impl AxisModel {
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented:
         // how fast the force can change, mN/s.
+        let vent_8 = stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke);
         let both_8 = percent(
             stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke),
             FILL_FLOW_PERCENT,
         )
-        .wrapping_add(stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke));
-        // Half of both; 2^29 × 2^31 × 2^-12.
-        let slew = flow_24
-            .wrapping_shr(20)
-            .wrapping_mul(both_8)
-            .wrapping_shr(13);
-        let slew = divide(slew.wrapping_mul(EXPONENT_PERCENT), 100_000);
+        .wrapping_add(vent_8);
+        // 2^29 × 2^31 × 2^-12.
+        let change = |stiffness_8: u64| {
+            let change = flow_24
+                .wrapping_shr(20)
+                .wrapping_mul(stiffness_8)
+                .wrapping_shr(12);
+            divide(change.wrapping_mul(EXPONENT_PERCENT), 100_000)
+        };
+        // Half of both.
+        let slew = change(both_8).wrapping_shr(1);
         // kg = mN/s over mm/s³. 2^37 × 2^24.
         let nimble_16 = divide(
             percent(slew, NIMBLE_PERCENT).wrapping_shl(24),
@@ -293,6 +301,11 @@ impl AxisModel {
             mass: number(raw(data.mass)),
             // 0.01 to 1000 kg: beyond what may be told, and fits.
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
+            // Below 2^41 mN/s and 2^16 µs.
+            pulse_force: number(divide(
+                change(vent_8).wrapping_mul(u64::from(times.shortest_opening().cast_unsigned())),
+                1_000_000,
+            )),
             slope: number(slope_8),
             damping: number(per_dead_time_8(DAMPING_PERCENT)),
             brake: number(brake),

@@ -19,6 +19,7 @@
 //!
 //! Config [`AxisModel`]; no state of its own; update [`PredictedState::new`].
 
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat};
 use crate::observer::Observer;
@@ -42,6 +43,12 @@ impl PredictedState {
             force,
             ..
         } = observer;
+        if is_without(Part::DeadTimePredictor) {
+            return Self {
+                stroke: motion.stroke,
+                speed: motion.speed,
+            };
+        }
         let then = model.pressure_force(observer.expected());
         let drive = then.saturating_add(motion.load);
         let speed = if motion.stuck && drive.saturating_abs() < model.breakaway {

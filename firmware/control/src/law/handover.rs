@@ -3,6 +3,9 @@
 //! The estimates live on what was sent. Where another part drives (exhaust, precharge, hold), and reports it by
 //! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
 //! that is cut counts as far as it was sent.
+//!
+//! Assumes: that whoever drives reports it in every tick. What is not reported is air that the observer does not know of, and
+//! the bounds of the pressures then hold no longer.
 
 use super::Predictive;
 use super::inverse_dynamics::BreakawayRamp;

@@ -4,7 +4,7 @@
 //! e    = r + v_r T_r − x'
 //! a_b' = max(200 mm/s², min(a_b, 0.7 F_left / m))        F_left = F_in − load   for e > 0, F_out + load otherwise
 //! v*   = v_r + curve(e, a_b')
-//! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 5/2 a_b
+//! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 5/2 a_b; half of it where patience is over and half is enough
 //! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*
 //! ```
 //!
@@ -23,7 +23,10 @@
 //! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration that a load leaves,
 //! and the ramp, are this project's (decision 38). The fed-forward friction
 //! is faded out where the piston does not come to rest: more than there is makes a relay. The ramp is an integral that is
-//! forgotten with each new target.
+//! forgotten with each new target. Half the acceleration where patience is over (`standstill`) is the reduction of the gain
+//! against a limit cycle (Slotine and Li, Applied Nonlinear Control, ch. 5): a heavy piston that sticks beside its target gives
+//! way to a pulse on the spring of its friction, faster than the curve allows, and with the full gain other pulses push it
+//! back. Whether half is enough says `switching_curve`.
 //!
 //! Assumes: friction and supply as specified: neither is learnt. Load and mass are those of the observer. The force that is
 //! asked for is there at the end of the dead time, as far as the pulses of one period can make it.
@@ -34,12 +37,13 @@
 use super::dead_time_predictor::PredictedState;
 use super::standstill::Standstill;
 use super::switching_curve::SpeedGains;
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{clip, mul_shr, mul_shr_sat, within};
 use crate::observer::Observer;
 use crate::tuning::{
-    ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED, RAMP_DECAY,
-    REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED,
+    ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED,
+    IMPATIENT_DIVISOR, RAMP_DECAY, REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED,
 };
 
 /// Extra force on a piston that sticks: it grows until the piston slips.
@@ -57,7 +61,10 @@ impl BreakawayRamp {
         if speed > SLIDING_SPEED {
             let decay = mul_shr(self.force, RAMP_DECAY, 16);
             self.force = self.force.saturating_sub(decay);
-        } else if speed < STILL_SPEED && reference_speed.wrapping_abs() <= REFERENCE_RESTS {
+        } else if speed < STILL_SPEED
+            && reference_speed.wrapping_abs() <= REFERENCE_RESTS
+            && !is_without(Part::BreakawayRamp)
+        {
             let step = if missing > 0 {
                 model.stick_step
             } else {
@@ -127,6 +134,12 @@ impl ForceDemand<'_> {
         let damp = mul_shr(gains.damping, wanted.saturating_sub(ahead.speed), 24);
         let limit = gains.brake.saturating_mul(ACCELERATION_LIMIT_HALVES) >> 1;
         let acceleration = within(pull.saturating_add(damp), limit);
+        let acceleration =
+            if gains.half_is_enough && rest.patience_is_over() && !is_without(Part::EasedGain) {
+                acceleration / IMPATIENT_DIVISOR
+            } else {
+                acceleration
+            };
 
         let full = rest.faded(if motion.speed.wrapping_abs() < STILL_SPEED {
             model.breakaway
@@ -143,10 +156,15 @@ impl ForceDemand<'_> {
             within(along, FULL_FRICTION_SPEED << 16),
             full / FULL_FRICTION_SPEED,
             16,
-        );
+        )
+        .saturating_add(mul_shr(wanted, model.viscous, 24));
+        let friction = if is_without(Part::FrictionFeedForward) {
+            0
+        } else {
+            friction
+        };
         mul_shr_sat(inertia.mass, acceleration, 16)
             .saturating_add(friction)
-            .saturating_add(mul_shr(wanted, model.viscous, 24))
             .saturating_add(ramp.force.wrapping_shr(8))
             .saturating_sub(load)
     }

@@ -25,14 +25,25 @@
 //!
 //! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
 //! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
-//! Gains and thresholds stand in [`crate::tuning`], all of them; formats are those of [`crate::observer`].
+//! Gains and thresholds stand in [`crate::tuning`], all of them, each with its unit, its reason and the name of the test
+//! that guards it; what follows from them and from the axis data, in [`AxisModel`]. Formats are those of
+//! [`crate::observer`].
 //!
 //! The files have times as: T_t tick, T period, T_d dead time from the moment of the observer, T_r dead time from the
 //! tick that works; and the deceleration towards the target as a_b.
 //!
-//! Assumes: a stroke that is true. A potentiometer that is open, shorted or loose, or frozen, is not noticed here but in
-//! the node (`firmware/node/src/sensor.rs`, `firmware/node/src/joint/no_motion_detector.rs`). Delays of the valves are as
-//! specified; `wheeleg tune` identifies them on the axis.
+//! Assumes: a stroke that is true, and delays of the valves that are as specified ([`crate::observer::valve_delay`] says how
+//! they are found). What else each part assumes is in its file. Where that does not hold:
+//!
+//! | what happens | what follows |
+//! |---|---|
+//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`): it hands over the last good stroke; two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the data, the air counts as unknown |
+//! | a frozen potentiometer | the node misses the motion (`no_motion_detector.rs` there) |
+//! | no new reference | the node lets the last one run on at its speed for one bus cycle, then stand; when it gives the master up it shuts the valves. The law comes to rest at what it is given |
+//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew |
+//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept, up to the force that is left. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
+//! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
+//! | friction that is not as specified | shows as load; what is fed forward beyond it makes a relay near the target: it is faded out there (`standstill`) |
 //!
 //! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its error shows as
 //! load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction has to stop the piston.

@@ -12,7 +12,8 @@
 //! Pulses are timed to the microsecond and may outlast a period. An opening below the shortest is rounded to that or
 //! to nothing, whichever is nearer. The valve that would undo it shuts as soon as its own pulse allows, and a chamber's
 //! two valves are never on together. Near the target a pulse of one chamber alone: two may be too much of valves that
-//! cannot open for less.
+//! cannot open for less. No vernier: two pulses are never set against each other for a force below that of the
+//! shortest, so a force is made to half of a shortest opening.
 //!
 //! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected one
 //! alone; delays of the valves as specified within their margin; supply and atmosphere as specified.

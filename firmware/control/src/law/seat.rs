@@ -7,8 +7,9 @@
 //!
 //! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
 //! target at the very end of the stroke: beyond every rest band of a position law, which then
-//! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then known to be
-//! full, or the other to be empty. An axis without precharge has no seat: the air of it would make a
+//! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then
+//! full, or the other empty: by the pulses that made the force, from which the observer follows the air as
+//! everywhere. It is not told that this is a stop. An axis without precharge has no seat: the air of it would make a
 //! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`). A piston at rest here is pressed
 //! again when it is 1.5 mm off its target; a new target ends the seat.
 //!

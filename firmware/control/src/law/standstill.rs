@@ -15,7 +15,8 @@
 //!   F_s (|e| − band) < m v²/2 < F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target;
 //!   counted on within 12 bands of it and while F_s is at least Fc/4.
 //! * **Patience.** What does not come to rest near its target for long may do so in a wider band, up to 2.4 times
-//!   and 0.4 mm, and the friction that is fed forward fades. Each time it enters that band the law waits with the
+//!   and 0.4 mm, the friction that is fed forward fades, and a heavy piston is asked for half the acceleration
+//!   (`inverse_dynamics`). Each time it enters that band the law waits with the
 //!   valves shut for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB): no limit
 //!   cycle lasts.
 //! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
@@ -35,6 +36,7 @@
 //!
 //! Config [`AxisModel`], state [`Standstill`], update [`Standstill::update`].
 
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
@@ -176,7 +178,7 @@ impl Standstill {
             .saturating_abs();
         // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
         self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
-            self.near.wrapping_add(1).min(PATIENCE_MOST)
+            self.near.wrapping_add(1).min(patience_most())
         } else {
             self.near.saturating_sub(1)
         };
@@ -281,6 +283,15 @@ impl Standstill {
     }
 }
 
+/// Periods near a target that are counted.
+fn patience_most() -> u16 {
+    if is_without(Part::Patience) {
+        PATIENCE
+    } else {
+        PATIENCE_MOST
+    }
+}
+
 /// Periods of an oscillation of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
 fn oscillation(model: &AxisModel, mass: i32) -> u16 {
@@ -313,7 +324,9 @@ impl Approach<'_> {
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
         let speed = self.motion.speed.wrapping_shr(8);
         let error = self.reference.saturating_sub(self.motion.stroke);
-        if error.saturating_abs() > band.wrapping_mul(STOP_ZONE_BANDS) {
+        if error.saturating_abs() > band.wrapping_mul(STOP_ZONE_BANDS)
+            || is_without(Part::StoppingDistance)
+        {
             return false;
         }
         let net = self.force.saturating_add(self.motion.load);

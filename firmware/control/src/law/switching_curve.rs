@@ -9,11 +9,18 @@
 //! s = min(1, ∛(m_n / m))
 //! v_top = min(v_B, 1.5 v_A)                  v = C ρ0 R T0 / area of the chamber: its choked speed
 //! m_n   = 0.60 · ½ Ḟ / (a_b k)               with s = 1; Ḟ: how fast both valves change the force at mid stroke
+//!
+//! half of the acceleration is enough:  m D k band > F_1
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time, s;
 //! m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
 //! [`crate::observer::pressure`]. `inverse_dynamics` may lower a_b under a load.
+//!
+//! **Half is enough.** An error of the rest band asks for the force m D k band (`inverse_dynamics`, at rest), and half of
+//! the finest pulse, F_1 in mN, is what [`super::pulse_planner`] still sends a pulse for. So where the condition holds half of the
+//! acceleration still brings a piston into the band, and the rest only drives it on: `inverse_dynamics` does without it
+//! where patience is over. Where it does not hold, which is for light pistons, half of it would ask for no pulse at all.
 //!
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot
 //! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
@@ -25,8 +32,9 @@
 //!
 //! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].
 
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
-use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root};
+use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root, within};
 use crate::tuning::{MASS_MIN, SLOPE_LEAST};
 
 /// What of the law follows from the moving mass; worked out when that changes.
@@ -40,6 +48,8 @@ pub(super) struct SpeedGains {
     pub(super) brake: i32,
     /// 1/(2 k²), s² × 2^32.
     linear: i32,
+    /// Half of the acceleration is enough near the target: it still makes a pulse where the rest band ends.
+    pub(super) half_is_enough: bool,
 }
 
 impl SpeedGains {
@@ -56,9 +66,19 @@ impl SpeedGains {
         let slope = mul_shr(model.slope, share, 16).max(SLOPE_LEAST);
         // 2^32 / (2 k²) with k × 2^8, below 2^16: 2^47 / k².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
+        let damping = mul_shr(model.damping, share, 16);
+        // Below 256/s and 680/s: 2^18/s². Of 200 kg times 12 below 2^30 mN/mm, and of a band of 5 mm below 2^33 mN.
+        let stiffness = mul_shr(slope, damping, 16);
+        let stiffness = i64::from(mass)
+            .wrapping_mul(stiffness.into())
+            .wrapping_shr(16);
+        let edge = stiffness
+            .wrapping_mul(i64::from(model.band))
+            .wrapping_shr(16);
         Self {
             slope,
-            damping: mul_shr(model.damping, share, 16),
+            damping,
+            half_is_enough: edge > i64::from(model.pulse_force),
             // Below 2^18 mm/s², 27 g: the curve takes it × 2^13.
             brake: mul_shr(model.brake, mul_shr(share, share, 16), 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
@@ -71,8 +91,9 @@ impl SpeedGains {
         // Half of e_l: a_b / (2 k²), mm/s² × s² × 2^32 to raw mm.
         let half = mul_shr_sat(brake, self.linear, 16);
         let size = error.saturating_abs();
-        if size <= half.saturating_mul(2) {
-            return (mul_shr_sat(self.slope, error, 8), self.slope);
+        if size <= half.saturating_mul(2) || is_without(Part::Parabola) {
+            let line = mul_shr_sat(self.slope, error, 8);
+            return (within(line, top), self.slope);
         }
         // (32 v)² = 2 a_b e × 2^10, e raw: × 2^11 / 2^16.
         let square = i64::from(brake)
@@ -158,6 +179,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// From the mass on at which an error of the band asks for the finest pulse, by the formula of the text.
+    #[test]
+    fn half_is_enough_where_an_error_of_the_band_asks_for_more_than_the_finest_pulse() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        let band = f64::from(model.band) / 65_536.0;
+        let mut enough = [0; 2];
+        for mass_kg in (1..=200).map(f64::from) {
+            let gains = SpeedGains::new(&model, (mass_kg * 65_536.0) as i32);
+            let [slope, damping] = [gains.slope, gains.damping].map(|gain| f64::from(gain) / 256.0);
+            let edge = mass_kg * damping * slope * band;
+            let finest = f64::from(model.pulse_force);
+            if (edge / finest - 1.0).abs() > 0.01 {
+                assert_eq!(
+                    gains.half_is_enough,
+                    edge > finest,
+                    "{mass_kg}: {edge} {finest}"
+                );
+                enough[usize::from(gains.half_is_enough)] += 1;
+            }
+        }
+        assert!(enough.iter().all(|cases| *cases > 1), "{enough:?}");
     }
 
     /// One slope a second at least: half of 1/k² has to fit 2^-32 s².

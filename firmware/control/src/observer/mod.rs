@@ -24,6 +24,7 @@ pub mod pressure;
 mod trajectory;
 pub mod valve_delay;
 
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::mul_shr;
 use crate::pwm::OnTimes;
@@ -167,7 +168,7 @@ impl Observer {
         self.motion.correct(model, &self.inertia, stroke);
         self.trajectory = PeriodTrajectory::of(model, &self.motion);
 
-        if !model.learns_mass {
+        if !model.learns_mass || is_without(Part::MassEstimator) {
             return None;
         }
         let widths = self.widths(model);

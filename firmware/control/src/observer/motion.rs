@@ -29,6 +29,7 @@
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 
+use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{clip, mul_shr, mul_shr_sat, quotient, within};
 use crate::tuning::{
@@ -169,7 +170,7 @@ impl Motion {
         } else {
             self.stroke < CUSHION
         };
-        if !self.stuck && !cushioned {
+        if !self.stuck && !cushioned && !is_without(Part::LoadObserver) {
             let load = self
                 .load
                 .saturating_add(mul_shr(innovation, inertia.load_gain, 16));

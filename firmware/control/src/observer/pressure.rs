@@ -23,7 +23,14 @@
 //! in p, so both bounds keep their order, and their distance says how far the estimate can be off. Only the
 //! identification of a move uses the bounds (`identification`); they hold as long as the assumptions do.
 //!
-//! Assumes: supply and atmosphere as specified, tight seals, no flow but through the valves.
+//! Assumes: supply and atmosphere as specified, tight seals, no flow but through the valves. If the supply is lower, a
+//! chamber that is filled ends below the estimate, and below p⁻, too: the bounds hold no longer. Venting brings
+//! both back.
+//!
+//! One explicit step a period and chamber, at the mean of the pressure and that expected a period ago; then one more over the
+//! dead time, with the pulses that are under way, for the expected pressure. No step goes beyond what valves and
+//! motion can do: the supply to fill, the atmosphere to vent, else half the atmosphere and 2.1 MPa. So a chamber however small
+//! is stable.
 //!
 //! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 

@@ -13,6 +13,11 @@
 //! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data is for
 //! what they differ by. A valve that is open, or shut, and nothing between.
 //!
+//! Nothing here finds a delay: it is axis data. A search at start-up (`host-sim/studies/src/axis_sim/delay_probe.rs`,
+//! in `wheeleg compare` and `tune`) sends a fill valve pulses that grow by 50 µs until the piston moves: the shortest that
+//! moves it is t_on. t_off cannot be seen so; it is taken to differ from its data sheet by the same factor. What does not
+//! move, after a second search with empty chambers, keeps the data sheet's.
+//!
 //! Config [`ValveTimes`], state [`ValveTrack`], updates [`ValveTrack::energise`] and [`ValveTrack::passes`].
 
 /// Changes of one valve that can be under way at once.

@@ -201,6 +201,8 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
     let nimble = 0.60 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
+    let opening = f64::from(data.valve_off.get() + data.margin.get()) * 1e-6;
+    let vented = mean * area_b / (dead_b + 0.5 * area_b * stroke);
     let two = |bits: i32| 2_f64.powi(bits);
     let theta: f64 = 28_400.0 / 65_536.0;
     vec![
@@ -233,6 +235,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ("brake", brake),
         ("top_speed", top * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
+        ("pulse_force", 1.2e-3 * flow * vented * opening),
         ("observe_stroke", (1.0 - theta.powi(3)) * two(16)),
         (
             "observe_speed",
@@ -275,6 +278,7 @@ fn coefficient(model: &AxisModel, name: &str) -> i32 {
         "brake" => model.brake,
         "top_speed" => model.top_speed,
         "nimble_mass" => model.nimble_mass,
+        "pulse_force" => model.pulse_force,
         "observe_stroke" => model.observe_stroke,
         "observe_speed" => model.observe_speed,
         "observe_load" => model.observe_load,

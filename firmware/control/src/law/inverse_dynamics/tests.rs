@@ -3,6 +3,8 @@
 use super::*;
 use crate::axis::AxisData;
 use crate::law::Predictive;
+use crate::law::standstill::Approach;
+use crate::tuning::PATIENCE;
 use wheeleg_units::{Micros, PositionMm};
 
 fn model() -> AxisModel {
@@ -11,9 +13,32 @@ fn model() -> AxisModel {
 
 /// A piston at 90 mm under a force demand for a reference `error_mm` away, with a load and speeds, mm/s.
 fn demanded(model: &AxisModel, error_mm: f64, load: i32, speed: i32, wanted: i32) -> i32 {
+    demanded_after(model, 0, error_mm, load, [speed, wanted])
+}
+
+/// The same after so many periods of 10 mm/s half a millimetre off the target.
+fn demanded_after(
+    model: &AxisModel,
+    periods: u16,
+    error_mm: f64,
+    load: i32,
+    [speed, wanted]: [i32; 2],
+) -> i32 {
     let mut law = Predictive::new(model);
     law.observer.start_at(90 << 16);
     law.observer.motion.load = load;
+    law.observer.motion.speed = 10 << 16;
+    for _ in 0..periods {
+        let now = Approach {
+            reference: (90 << 16) + (1 << 15),
+            reference_speed: 0,
+            measured: 90 << 16,
+            motion: &law.observer.motion,
+            force: 0,
+            mass: model.mass,
+        };
+        law.standstill.update(model, &now);
+    }
     law.observer.motion.speed = speed << 16;
     let demand = ForceDemand {
         reference: (90 << 16) + (error_mm * 65_536.0) as i32,
@@ -88,6 +113,35 @@ fn what_a_load_leaves_for_braking_slows_the_approach() {
         let expected = expected.min(f64::from(model.top_speed) / 65_536.0);
         let ratio = f64::from(found) / expected;
         assert!((0.9..1.1).contains(&ratio), "{found} {expected}");
+    }
+}
+
+/// A millimetre off, at rest and in motion: what is asked for beside friction is halved with the period in which patience
+/// ends, for the default axis with a piston of 40 kg, and not with one of 1.5 kg.
+#[test]
+fn half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pulse() {
+    let of = |gain: i32| f64::from(gain) / 256.0;
+    for (mass_kg, is_enough) in [(1.5, false), (40.0, true)] {
+        let data = AxisData {
+            mass: PositionMm::from_f64(mass_kg),
+            ..AxisData::default()
+        };
+        let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+        let gains = SpeedGains::new(&model, model.mass);
+        // Slow enough for the limit of the acceleration.
+        for speed in [0, 20, -20] {
+            let after = |periods| f64::from(demanded_after(&model, periods, 1.0, 0, [speed, 0]));
+            let pull = -of(gains.slope) * f64::from(speed);
+            let damp = of(gains.damping) * (of(gains.slope) - f64::from(speed));
+            let half = 0.5 * mass_kg * (pull + damp);
+            assert_eq!(after(0), after(PATIENCE));
+            let less = after(0) - after(PATIENCE + 1);
+            if is_enough {
+                assert!((less / half - 1.0).abs() < 0.02, "{speed}: {less} {half}");
+            } else {
+                assert_eq!(less, 0.0, "{speed}");
+            }
+        }
     }
 }
 
