@@ -8,6 +8,7 @@ use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
 use super::{Facts, Found, Relation};
+use crate::params::ParameterInfo;
 use crate::quantity::{pretty, suffix};
 
 /// Files that are tried at most for all relations of a file: each is read as a whole.
@@ -92,7 +93,7 @@ impl Offer {
 }
 
 /// A limit as it is printed, on its own side of what was worked out.
-fn written(limit: f64, bound: Bound) -> f64 {
+pub(super) fn written(limit: f64, bound: Bound) -> f64 {
     let printed = |value: f64| pretty(value).parse().unwrap_or(value);
     let inwards = match bound {
         Bound::UpTo => -limit.abs(),
@@ -277,6 +278,17 @@ impl<'a> Search<'a> {
         }
         None
     }
+}
+
+/// The sets that are within the ranges of their fields.
+pub(super) fn within_ranges(sets: &[Vec<Offer>], parameters: &[ParameterInfo]) -> Vec<Vec<Offer>> {
+    let fits = |Offer { advised, .. }: &Offer| {
+        let info = parameters.iter().find(|info| info.path == advised.path);
+        info.is_none_or(|info| (info.min..=info.max).contains(&advised.value))
+    };
+    let mut sets = sets.to_vec();
+    sets.retain(|set| set.iter().all(fits));
+    sets
 }
 
 /// What a set puts into a file.
