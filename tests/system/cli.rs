@@ -244,6 +244,34 @@ fn parameters_that_contradict_each_other_are_named_with_their_place() {
     }
 }
 
+/// Faults of two factors that overlap in every case: the list says so as the run does.
+#[test]
+fn a_list_of_a_plan_none_of_whose_cases_can_be_is_refused_as_its_run_is() {
+    let dir = folder();
+    let text = "name = \"p\"\nroot = 1\nsamples = 2\nsampler = \"random\"\n[base]\nscenario = \"stand\"\n\
+                [factor.a]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 0.5, max = 1 }\n\
+                [factor.b]\nfault = \"pot-open:joint3@{}s\"\nuniform = { min = 0.5, max = 1 }\n";
+    let plan = write(dir.path(), "p.toml", text);
+    for list in [true, false] {
+        let out = dir.path().join("out");
+        let mut command = wheeleg();
+        command
+            .args(["campaign", "run"])
+            .arg(&plan)
+            .arg("--out")
+            .arg(&out);
+        if list {
+            command.arg("--list");
+        }
+        command
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(contains("no case of the first sample can be").and(contains("overlap")));
+        assert!(!out.exists(), "nothing began");
+    }
+}
+
 #[test]
 fn a_wrong_unit_is_answered_with_file_field_value_and_allowed_units() {
     let dir = folder();

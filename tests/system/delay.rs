@@ -339,6 +339,39 @@ fn a_mass_or_load_that_cannot_be_simulated_is_refused_by_its_option() {
     );
 }
 
+/// Where friction leaves no force for any load, it is what is told, with the value up to which a study begins.
+#[test]
+fn friction_that_nothing_moves_is_told_by_its_field() {
+    let mut robot = builtin::robot("wheeleg-2003").expect("built in");
+    for cylinder in &mut robot.plant.cylinders {
+        cylinder.friction.static_n = 150.0;
+    }
+    let dir = tempfile::tempdir().expect("temporary folder");
+    for load_n in [0.0, 100.0, -50.0] {
+        let options = Options {
+            seeds: 1,
+            load_n,
+            ..Options::default()
+        };
+        let settings = Settings::new(dir.path().join("out"));
+        let error = write(&robot, &options, &settings).expect_err("nothing moves");
+        let said = wheeleg_config::plain_text(&error);
+        assert!(
+            said.contains("`friction.static` = 150.0 N of ") && !said.contains("--load"),
+            "{said}"
+        );
+        let (_, told) = said.split_once("allowed are up to ").expect("a limit");
+        let most: f64 = told
+            .split(' ')
+            .next()
+            .expect("a word")
+            .parse()
+            .expect("a number");
+        // 0.6 MPa on a bore of 16 mm with a rod of 6 mm, at a margin of 1.25.
+        assert!((82.0..84.0).contains(&most), "{most}");
+    }
+}
+
 /// The study tries other bores, with friction in proportion: where the plant does not take one of them, the
 /// robot's file and that bore are named, and no option that was not given.
 #[test]

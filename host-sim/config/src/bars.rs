@@ -108,10 +108,27 @@ pub struct Bar {
 
 /// Reads all `[[bars]]`; `top` are the fields at the top of the file.
 pub(super) fn read(r: &mut Reader, top: &[&str]) -> Vec<Bar> {
-    let mut bars = Vec::new();
+    let mut bars: Vec<Bar> = Vec::new();
     for i in 0..r.array_len("bars") {
         let entry = r.entry("bars", i);
-        bars.extend(bar(r, &entry, top));
+        let Some(bar) = bar(r, &entry, top) else {
+            continue;
+        };
+        // One that informs may stand beside the one that decides.
+        let twice = bars
+            .iter()
+            .any(|other| other.measure == bar.measure && other.required == bar.required);
+        if twice {
+            let message = format!(
+                "`{}`: `measure` = \"{}\" stands in another bar already",
+                entry.path,
+                bar.measure.name()
+            );
+            let help = "give one bar both `min` and `max`".to_owned();
+            r.problem(Some(entry.span.clone()), message, "twice", Some(help));
+            continue;
+        }
+        bars.push(bar);
     }
     bars
 }
@@ -134,10 +151,16 @@ fn bar(r: &mut Reader, entry: &Entry, top: &[&str]) -> Option<Bar> {
         r.required(entry, &spec)
     });
     let informs = info.is_some_and(|value| value != Some(0.0));
+    let written = |key: &str| {
+        let item = entry.get(key).map(|(_, item)| item.to_string());
+        format!("`{key}` = {}", item.unwrap_or_default().trim())
+    };
     let problem = match (min, max) {
-        (None, None) if !informs => "a bar needs `min`, `max` or both, or `info = true`",
-        (Some(Some(min)), Some(Some(max))) if min > max => "`min` is above `max`",
-        _ => "",
+        (None, None) if !informs => "a bar needs `min`, `max` or both, or `info = true`".to_owned(),
+        (Some(Some(min)), Some(Some(max))) if min > max => {
+            format!("{} is above {}", written("min"), written("max"))
+        }
+        _ => String::new(),
     };
     if !problem.is_empty() {
         let message = format!("`{}`: {problem}", entry.path);

@@ -20,6 +20,7 @@ mod board_value;
 pub mod builtin;
 mod command;
 mod commissioned;
+mod contradictions;
 pub mod derived;
 mod drawing;
 mod error;

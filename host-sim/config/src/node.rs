@@ -1,10 +1,10 @@
 //! Board parameters in a robot file, by the names of the protocol's tables.
 
-use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
 use super::board_value::{allowed_raw, allowed_values, in_unit, scale};
+use super::contradictions::{self, Board};
 use super::params::ParameterInfo;
 use super::quantity::{pretty, suffix};
 use super::reader::{Entry, Reader, range};
@@ -60,126 +60,23 @@ pub(super) fn read(r: &mut Reader) -> NodeParams {
     }
     list_defaults(r, "node.joint", JOINT_PARAMS);
     list_defaults(r, "node.wheel", WHEEL_PARAMS);
-    contradictions(r, &params);
+    let board = |node| Board {
+        node,
+        stored: params.of(node),
+        sections: sections_of(node),
+    };
+    contradictions::report(r, &Node::ALL.map(board));
     params
 }
 
-/// Values that a board refuses together though each is within its own limits. The error names each parameter
-/// that, left at its default, makes the board accept the others.
-fn contradictions(r: &mut Reader, params: &NodeParams) {
-    let stored = params.joints.iter().chain(&params.wheels);
-    // One board is enough: others get the same from its section.
-    let mut refused =
-        (Node::ALL.into_iter().zip(stored)).filter(|(to, stored)| !accepts(to.address(), stored));
-    let Some((node, stored)) = refused.next() else {
-        return;
-    };
-    let address = node.address();
-    let of_joint = |(_, joints): &&(_, &[usize])| node.joint().is_some_and(|i| joints.contains(&i));
-    let sections: Vec<&str> = if node.is_joint() {
-        let own = JOINT_SECTIONS.iter().rev().filter(of_joint);
-        own.map(|(name, _)| *name).collect()
-    } else {
-        vec!["wheel"]
-    };
-    let mut named = false;
-    for (place, (id, raw)) in stored.iter().enumerate() {
-        let mut without = stored.clone();
-        without.remove(place);
-        let info = params_at(address.raw()).iter().find(|row| row.id == *id);
-        let Some(info) = info.filter(|_| accepts(address, &without)) else {
-            continue;
-        };
-        let found = sections.iter().find_map(|name| {
-            let path = format!("node.{name}");
-            let (span, _) = r.table(&path)?.get(info.name)?;
-            Some((span, path))
-        });
-        let Some((span, path)) = found else { continue };
-        let with = |info: &ParamInfo, raw: i32| {
-            let mut stored = stored.clone();
-            set(&mut stored, info.id, raw);
-            accepts(address, &stored)
-        };
-        let shown = |raw: i32| format!("{}{}", pretty(in_unit(info, raw)), suffix(info.unit));
-        let side = if *raw > info.default { "up to" } else { "from" };
-        let limit = last_accepted(*raw, info.default, |raw| with(info, raw));
-        // Far from it no single other value may be enough.
-        let just_refused = limit + (*raw - limit).signum();
-        // The printed number has fewer digits than a fine format: go a thousandth inwards.
-        let limit = match scale(info.format) == 1.0 {
-            true => limit,
-            false => limit + (info.default - limit) / 1000,
-        };
-        let mends = |other: &ParamInfo, beside: i32| {
-            [other.min, other.max].into_iter().any(|raw| {
-                let mut stored = stored.clone();
-                set(&mut stored, info.id, beside);
-                set(&mut stored, other.id, raw);
-                accepts(address, &stored)
-            })
-        };
-        let all = params_at(address.raw()).iter();
-        let others = all.filter(|other| {
-            other.id != info.id && (mends(other, *raw) || mends(other, just_refused))
-        });
-        let section = if node.is_joint() { "joint" } else { "wheel" };
-        let others: Vec<String> = others
-            .map(|other| {
-                let own = stored.iter().find(|(id, _)| *id == other.id);
-                let raw = own.map_or(other.default, |(_, raw)| *raw);
-                let value = pretty(in_unit(other, raw));
-                format!(
-                    "`node.{section}.{}` = {value}{}",
-                    other.name,
-                    suffix(other.unit)
-                )
-            })
-            .collect();
-        let contradicts = match others.as_slice() {
-            [] => "other parameters".to_owned(),
-            _ => others.join(", "),
-        };
-        r.problem(
-            Some(span),
-            format!(
-                "`{path}.{}` = {} contradicts {contradicts}: the board of {address} refuses them together",
-                info.name,
-                shown(*raw)
-            ),
-            "not with the others",
-            Some(format!(
-                "`{path}.{}` is allowed {side} {} with the others as they are: {}",
-                info.name,
-                shown(limit),
-                info.text
-            )),
-        );
-        named = true;
+/// The sections that set parameters of a board, the last word first.
+fn sections_of(node: Node) -> Vec<&'static str> {
+    if !node.is_joint() {
+        return vec!["wheel"];
     }
-    if !named {
-        r.problem(
-            None,
-            format!("the board of {address} refuses its parameters together"),
-            "",
-            Some(format!(
-                "see the sections [node.{}]",
-                sections.join("], [node.")
-            )),
-        );
-    }
-}
-
-/// Searches between a refused and an accepted value for the last accepted one.
-fn last_accepted(mut refused: i32, mut accepted: i32, is_accepted: impl Fn(i32) -> bool) -> i32 {
-    while refused.abs_diff(accepted) > 1 {
-        let middle = refused.midpoint(accepted);
-        match is_accepted(middle) {
-            true => accepted = middle,
-            false => refused = middle,
-        }
-    }
-    accepted
+    let own = |(_, joints): &&(_, &[usize])| node.joint().is_some_and(|i| joints.contains(&i));
+    let sections = JOINT_SECTIONS.iter().rev().filter(own);
+    sections.map(|(name, _)| *name).collect()
 }
 
 /// The board named by an event, if there is one with this number.

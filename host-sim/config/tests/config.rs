@@ -2,11 +2,8 @@
 
 mod common;
 
-use std::collections::BTreeMap;
-
 use common::{assert_all, report};
-use wheeleg_config::plan::{Plan, Sources, Text};
-use wheeleg_config::{AxisConfig, ConfigError, RobotConfig, Scenario, builtin};
+use wheeleg_config::{AxisConfig, RobotConfig, Scenario, builtin};
 use wheeleg_protocol::param::{JOINT_PARAMS, WHEEL_PARAMS};
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
@@ -769,56 +766,4 @@ fn boards_that_are_told_otherwise_than_their_cylinders_are_named() {
     // Without its sections the boards have their defaults, and not this robot's valves.
     let valves = told.iter().filter(|told| told.contains("valve_t_"));
     assert_eq!(valves.count() + 1, told.len(), "{told:?}");
-}
-
-/// A plan of this text, which names no other file.
-fn plan_of(text: &str) -> Result<Plan, ConfigError> {
-    let plan = Text {
-        file: "my.toml".into(),
-        text: text.into(),
-    };
-    Plan::of(Sources {
-        plan,
-        scenarios: BTreeMap::new(),
-        robots: BTreeMap::new(),
-        robot_of: BTreeMap::new(),
-        data: BTreeMap::new(),
-    })
-}
-
-/// A file of one kind that is given as another is told so once, not line by line.
-#[test]
-fn a_file_of_another_kind_is_named() {
-    let axis = include_str!("../../axes/bench-vq110u.toml");
-    let plan = include_str!("../../campaigns/how-steep.toml");
-    let texts = [
-        ("a robot", ROBOT),
-        ("an axis", axis),
-        ("a scenario", SCENARIO),
-        ("a plan", plan),
-    ];
-    for (found, text) in texts {
-        let as_kinds = [
-            ("a robot", RobotConfig::parse("my.toml", text).err()),
-            ("an axis", AxisConfig::parse("my.toml", text).err()),
-            ("a scenario", Scenario::parse("my.toml", text).err()),
-            ("a plan", plan_of(text).err()),
-        ];
-        for (wanted, error) in as_kinds {
-            if wanted == found {
-                continue;
-            }
-            let error = error.unwrap_or_else(|| panic!("{found} is accepted as {wanted}"));
-            assert_eq!(error.problems().len(), 1, "{found} as {wanted}");
-            let said = report(&error);
-            assert_all(
-                &said,
-                &[
-                    &format!("this is {found}"),
-                    &format!("{wanted} is wanted"),
-                    "give this file to",
-                ],
-            );
-        }
-    }
 }

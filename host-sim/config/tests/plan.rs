@@ -265,6 +265,15 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
             "conditoning",
         ),
         ("[[bars]]\nmeasure = \"speed\"\nmin = \"20 kg\"\n", "\"kg\""),
+        (
+            "[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\nmax = \"10 mm/s\"\n",
+            "`bars[0]`: `min` = \"20 mm/s\" is above `max` = \"10 mm/s\"",
+        ),
+        (
+            "[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n\
+             [[bars]]\nmeasure = \"speed\"\nmax = \"90 mm/s\"\n",
+            "`bars[1]`: `measure` = \"speed\" stands in another bar already",
+        ),
     ] {
         let error = walks(bars).expect_err(bars);
         let all: Vec<String> = error.problems().iter().map(|p| p.summary()).collect();
@@ -275,7 +284,29 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     }
 }
 
-/// Each with a word of the field, of the value and of the allowed values.
+/// Multiples of 0 are all 0: the cases of such a factor would be the same.
+#[test]
+fn a_factor_that_scales_nothing_is_refused() {
+    let scaled = |parameter: &str| {
+        format!("[factor.a]\nparameter = \"robot.{parameter}\"\nscale = true\ngrid = [0.5, 2.0]\n")
+    };
+    usable(&scaled("supply.droop"));
+    // Of a list that is not all 0 something changes.
+    usable(&scaled("body.gravity"));
+    for parameter in ["node.joint.precharge", "body.gravity[0]"] {
+        let told = refused(&scaled(parameter));
+        let [only] = &told[..] else {
+            panic!("{parameter}: {told:#?}");
+        };
+        let path = parameter.split('[').next().expect("a path");
+        assert!(
+            only.contains("`factor.a`") && only.contains(path) && only.contains("is 0"),
+            "{parameter}: {only}"
+        );
+    }
+}
+
+/// Each with a word of the field, of the value and of what is allowed.
 #[test]
 fn what_is_wrong_is_told_with_field_value_and_range() {
     let on = |parameter: &str, values: &str| {

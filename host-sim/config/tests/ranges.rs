@@ -115,7 +115,7 @@ fn what_contradicts_others_is_told_how_far_it_may_go() {
             panic!("{name}: {said}");
         };
         assert!(before.contains(&format!("contradicts {other}")), "{said}");
-        let number = after.split(' ').next().expect("a number");
+        let number = after.split([' ', ',']).next().expect("a number");
         let limit: f64 = number.parse().expect("a number");
         read("node.joint", info, limit).expect("accepted at its limit");
         let beyond = limit + 0.02 * (value - limit);

@@ -77,7 +77,23 @@ fn moves(robot: &RobotConfig, leg: LegChoice) -> [String; 6] {
     })
 }
 
-/// Time between two checks of a reservoir that is not full yet, ns.
+/// Legs of different heights in the start pose, with the fields that say so: the robot leans on its held
+/// leg or on the one that steps. Empty where they are alike.
+fn uneven(robot: &RobotConfig) -> String {
+    let gait = &robot.gait;
+    let (stroke_m, held_m) = (gait.stroke_m, gait.held_leg_s6_m);
+    if (stroke_m - held_m).abs() <= robot.homing.tolerance_m {
+        return String::new();
+    }
+    format!(
+        "in the start pose the feet are not level, and the robot does not stand on both: \
+         `gait.stroke` = {:.1} mm and `gait.held_leg_s6` = {:.1} mm differ; ",
+        stroke_m * 1e3,
+        held_m * 1e3
+    )
+}
+
+/// Between two looks at a reservoir that is not full yet, ns.
 const FILLING_NS: u64 = 100_000_000;
 
 /// Stage of the start-up.
@@ -123,7 +139,9 @@ pub(super) struct Operator {
     remedy: String,
     /// The move of each joint.
     moves: [String; 6],
-    /// Remedy if the time is not enough.
+    /// Legs of different heights in the start pose.
+    uneven: String,
+    /// What to do where the time is not enough.
     late_remedy: String,
     /// Remedy if a board refuses to be armed.
     arming_remedy: String,
@@ -154,6 +172,7 @@ impl Operator {
             flood_refused: false,
             remedy: remedy(robot),
             moves: moves(robot, scenario.motion.stepping_leg()),
+            uneven: uneven(robot),
             late_remedy: format!(
                 "`start_up.limit` = {:.2} s of the robot {} is over, of which its rest, `start_up.rest`, \
                  takes {:.2} s: allow more time",
@@ -297,7 +316,7 @@ impl Operator {
             self.moves.get(usize::from(joint.raw()) - 1)
         });
         let moves = joint.map_or("", String::as_str);
-        format!("{moves}{}", self.remedy)
+        format!("{}{moves}{}", self.uneven, self.remedy)
     }
 
     fn not_ready(&self, now_ns: u64, help: &str) -> SimError {
@@ -460,5 +479,22 @@ fn link_sample(record: &LinkRecord) -> LinkSample {
         unsent: record.unsent,
         drift_ppm: i32::from(record.drift_ppm),
         parameters: record.parameters,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wheeleg_config::builtin;
+
+    #[test]
+    fn legs_of_different_heights_are_told_by_their_fields() {
+        let mut robot = builtin::robot("wheeleg").expect("built in");
+        assert_eq!(uneven(&robot), "");
+        robot.gait.stroke_m = 0.09;
+        let said = uneven(&robot);
+        for part in ["`gait.stroke` = 90.0 mm", "`gait.held_leg_s6` = 180.0 mm"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
     }
 }

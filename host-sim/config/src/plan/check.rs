@@ -194,6 +194,16 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
         return;
     }
     let span = span_of(r, factor);
+    let mut scaled = info.value.iter().enumerate();
+    if factor.scale && scaled.all(|(i, v)| component.is_some_and(|c| c != i) || *v == 0.0) {
+        let message = format!(
+            "`factor.{}`: `{path}` is 0 in {}, and every multiple of it: its cases would be the same",
+            factor.name, base.file
+        );
+        let help = format!("set `{path}` instead: leave `scale` out, and give values with a unit");
+        r.problem(span, message, "changes nothing", Some(help));
+        return;
+    }
     if !unit_fits(r, factor, info, span.clone()) {
         return;
     }

@@ -203,6 +203,11 @@ impl Reader {
             false => format!("{others} and {last} do not fit together: {why}"),
         };
         self.problem(first, message, "not with the others", Some(help.to_owned()));
+        self.advise(advice);
+    }
+
+    /// With these values, of which each set does, the last problem would be mended.
+    pub(crate) fn advise(&mut self, advice: Vec<Vec<Advised>>) {
         if let Some(problem) = self.problems.last_mut() {
             problem.advise(advice);
         }

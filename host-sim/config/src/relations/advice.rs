@@ -8,6 +8,7 @@ use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
 use super::{Facts, Found, Relation};
+use crate::params::ParameterInfo;
 use crate::quantity::{pretty, suffix};
 
 /// Most files that are tried for all relations of a file: each is read in full.
@@ -91,8 +92,8 @@ impl Offer {
     }
 }
 
-/// A limit as printed, rounded to its own side of the computed value.
-fn written(limit: f64, bound: Bound) -> f64 {
+/// A limit as it is printed, on its own side of what was worked out.
+pub(super) fn written(limit: f64, bound: Bound) -> f64 {
     let printed = |value: f64| pretty(value).parse().unwrap_or(value);
     let inwards = match bound {
         Bound::UpTo => -limit.abs(),
@@ -279,7 +280,18 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The values that a set puts into a file.
+/// The sets that are within the ranges of their fields.
+pub(super) fn within_ranges(sets: &[Vec<Offer>], parameters: &[ParameterInfo]) -> Vec<Vec<Offer>> {
+    let fits = |Offer { advised, .. }: &Offer| {
+        let info = parameters.iter().find(|info| info.path == advised.path);
+        info.is_none_or(|info| (info.min..=info.max).contains(&advised.value))
+    };
+    let mut sets = sets.to_vec();
+    sets.retain(|set| set.iter().all(fits));
+    sets
+}
+
+/// What a set puts into a file.
 fn key(set: &[Offer]) -> Vec<(String, u64)> {
     let of = |Offer { advised, .. }: &Offer| (advised.path.clone(), advised.value.to_bits());
     let mut key: Vec<_> = set.iter().map(of).collect();

@@ -530,7 +530,8 @@ impl<'a> Judge<'a> {
                 own.map_or(path, |(field, _)| field.as_str()).to_owned()
             });
             told.push((
-                one.relation.message(&one.broken, &renamed, untried),
+                one.relation
+                    .message(&one.broken, &renamed, untried.then_some(&[][..])),
                 advice::values(&renamed),
             ));
         }

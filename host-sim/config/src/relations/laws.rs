@@ -174,16 +174,22 @@ pub(super) fn track(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         return None;
     }
     let least_m = (reach_m / SENSOR_TRACK[1] * 1e4).ceil() * 1e-4;
+    let mut offers = vec![
+        Offer::new(f, it.fields[0], Bound::From, least_m),
+        Offer::new(f, it.fields[1], Bound::UpTo, (most_m - offset_m) / gain),
+    ];
+    // With the rod in, too, it stands on its track.
+    let most_offset_m = most_m - gain * stroke_m;
+    if most_offset_m >= SENSOR_TRACK[0] * electrical_m {
+        offers.push(Offer::new(f, it.fields[2], Bound::UpTo, most_offset_m));
+    }
     offered(
         format!(
             "with the rod out it stands at {} of {}",
             f.format(it.fields[0], reach_m),
             f.format(it.fields[0], electrical_m)
         ),
-        vec![
-            Offer::new(f, it.fields[0], Bound::From, least_m),
-            Offer::new(f, it.fields[1], Bound::UpTo, (most_m - offset_m) / gain),
-        ],
+        offers,
     )
 }
 
@@ -443,6 +449,26 @@ pub(super) fn between(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
 pub(super) fn drawn(f: &Facts<'_>, _: &Relation) -> Option<Broken> {
     let [_, wide_m, _] = f.list::<3>("spatial.chassis_size")?;
     wide_enough(f, 0.5 * wide_m)
+}
+
+/// Hips are on their own sides, between the wheels.
+pub(super) fn hips(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
+    let [_, left_m, _] = f.list::<3>(it.fields[0])?;
+    let half_m = 0.5 * f.si(it.fields[1])?;
+    if left_m > 0.0 && left_m <= half_m * (1.0 + ROUNDING) {
+        return None;
+    }
+    let wider = || f.offer(it.fields[1], Bound::From, 2.0 * left_m);
+    Some(Broken {
+        figures: String::new(),
+        offers: (left_m > 0.0).then(wider).into_iter().collect(),
+        words: format!(
+            "the second value of `{}`, left of the middle, is allowed above 0 and up to {}, half of `{}`",
+            it.fields[0],
+            f.format(it.fields[0], half_m),
+            it.fields[1]
+        ),
+    })
 }
 
 /// Gravity points to the ground.

@@ -66,8 +66,8 @@ enum Rule {
     Law(fn(&Facts<'_>, &Relation) -> Option<Broken>),
     /// A law of the whole robot, checked if nothing else is wrong.
     Whole(fn(&Facts<'_>, &PlantParams) -> Option<Broken>),
-    /// The same for the robot at rest in its start pose.
-    AtRest(fn(&AtRest) -> Option<Broken>),
+    /// The same of the robot at rest in its start pose.
+    AtRest(fn(&Facts<'_>, &AtRest) -> Option<Broken>),
 }
 
 /// A relation that does not hold.
@@ -214,34 +214,47 @@ impl Relation {
                     offers(sets)
                 })
             }
-            Rule::BoardLimits(parameter) => board::within_limits(facts.axis?, parameter),
+            Rule::BoardLimits(parameter) => board::within_limits(facts, parameter),
             Rule::Law(law) => law(facts, self),
             Rule::Whole(_) | Rule::AtRest(_) => None,
         }
     }
 
-    /// Why it does not hold, and the allowed values.
-    fn message(&self, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) -> (String, String) {
+    /// Why it does not hold, and what is allowed: of what is left `untried`, which this relation alone
+    /// would allow.
+    fn message(
+        &self,
+        broken: &Broken,
+        accepted: &[Vec<Offer>],
+        untried: Option<&[Vec<Offer>]>,
+    ) -> (String, String) {
         let why = match broken.figures.as_str() {
             "" => self.broken.to_owned(),
             figures => format!("{}: {figures}", self.broken),
         };
-        let allowed = match (advice::text(accepted), broken.words.as_str()) {
-            (offers, "") if offers.is_empty() && untried => {
-                "what is allowed depends on other fields: correct the other errors first".to_owned()
+        let allowed = match (advice::text(accepted), broken.words.as_str(), untried) {
+            (offers, "", Some(untried)) if offers.is_empty() => {
+                let alone = match advice::text(untried).as_str() {
+                    "" => String::new(),
+                    alone => format!("as far as these fields go, {alone}; "),
+                };
+                format!(
+                    "{alone}what is allowed depends on other fields: correct the other errors first"
+                )
             }
-            (offers, "") if offers.is_empty() => {
+            (offers, "", None) if offers.is_empty() => {
                 "no value of a single field is enough: the rest of the file rules it out".to_owned()
             }
-            (offers, words) if offers.is_empty() => words.to_owned(),
-            (offers, "") => offers,
-            (offers, words) => format!("{offers}; {words}"),
+            (offers, words, _) if offers.is_empty() => words.to_owned(),
+            (offers, "", _) => offers,
+            (offers, words, _) => format!("{offers}; {words}"),
         };
         (why, allowed)
     }
 
     fn report(&self, r: &mut Reader, broken: &Broken, accepted: &[Vec<Offer>], untried: bool) {
-        let (why, allowed) = self.message(broken, accepted, untried);
+        let alone = untried.then(|| advice::within_ranges(&broken.offers, r.parameters()));
+        let (why, allowed) = self.message(broken, accepted, alone.as_deref());
         let mut fields = self.fields.to_vec();
         fields.retain(|path| r.parameters().iter().any(|p| p.path == *path));
         r.contradiction(&fields, &why, &allowed, advice::values(accepted));
@@ -265,7 +278,7 @@ fn broken_whole(facts: &Facts<'_>, robot: &PlantParams) -> Option<Found> {
     RELATIONS.iter().find_map(|relation| {
         let broken = match relation.rule {
             Rule::Whole(law) => law(facts, robot),
-            Rule::AtRest(law) => law(LazyCell::force(&at_rest).as_ref()?),
+            Rule::AtRest(law) => law(facts, LazyCell::force(&at_rest).as_ref()?),
             _ => None,
         }?;
         Some(Found { relation, broken })
@@ -326,14 +339,17 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
             // In the file's unit, if the field is in the file.
             let (factor, unit) = r.unit_of(&field).unwrap_or((1.0, "in SI units".to_owned()));
             let what = if value > max { "much" } else { "little" };
-            // The motion that the step must follow depends on the moving mass.
-            let moves = match field.split('.').next() {
-                Some("contact") => "link.vertical_rod.mass",
-                Some("wheel_contact") => "body.wheel_mass",
-                Some("chassis_contact") => "body.chassis_mass",
-                _ => "",
+            // What the step must follow hangs on what moves with it.
+            let moves: &[&str] = match field.split('.').next() {
+                Some("contact") => &["link.vertical_rod.mass"],
+                Some("wheel_contact") => {
+                    &["body.wheel_mass", "body.wheel_radius", "body.wheel_inertia"]
+                }
+                Some("chassis_contact") => &["body.chassis_mass"],
+                _ => &[],
             };
-            let mut fields = vec![field.as_str(), "numerics.step", moves];
+            let mut fields = vec![field.as_str(), "numerics.step"];
+            fields.extend(moves);
             fields
                 .retain(|path| *path == field || (!moves.is_empty() && r.span_of(path).is_some()));
             r.contradiction(
@@ -341,8 +357,8 @@ pub(crate) fn check_plant(r: &mut Reader, built: Result<(), PlantError>) {
                 &format!("with the other values {} is too {what}", brief(value / factor)),
                 &format!(
                     "allowed for `{field}` with the masses, sizes and step of this file: {} to {} {unit}",
-                    pretty(min / factor),
-                    pretty(max / factor)
+                    pretty(advice::written(min / factor, Bound::From)),
+                    pretty(advice::written(max / factor, Bound::UpTo))
                 ),
                 Vec::new(),
             );

@@ -135,6 +135,11 @@ pub(super) fn codes(f: &Facts<'_>, it: &Relation) -> Option<Broken> {
         if stroke_m > 0.0 {
             offers.push(vec![Offer::new(f, it.fields[3], Bound::UpTo, stroke_m)]);
         }
+        let offset_m = high * sensor.electrical_m - sensor.gain * sensor.stroke_m;
+        let offset_m = (offset_m * 1e4).floor() * 1e-4;
+        if offset_m >= low * sensor.electrical_m {
+            offers.push(vec![Offer::new(f, it.fields[1], Bound::UpTo, offset_m)]);
+        }
     }
     let [from, to] = [low, high].map(|share| brief(sensor.stroke_of(share) * 1e3));
     Some(Broken {

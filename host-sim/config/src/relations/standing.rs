@@ -5,8 +5,8 @@ use wheeleg_plant::dynamics::floating::state::FloatingState;
 use wheeleg_plant::robot::PlantState;
 use wheeleg_plant::{Plant, PlantError, PlantParams};
 
-use super::{Bound, Broken, Facts};
-use crate::quantity::brief;
+use super::{Bound, Broken, Facts, Offer};
+use crate::quantity::{brief, pretty};
 
 /// Field of the crank.
 const CRANK: &str = "body.crank";
@@ -110,6 +110,8 @@ pub(super) struct AtRest {
     robot: PlantParams,
     plant: Plant,
     state: Result<PlantState, PlantError>,
+    /// What the chassis bears \[N\]; nothing where it is clear of the ground.
+    chassis_n: f64,
 }
 
 impl AtRest {
@@ -120,58 +122,197 @@ impl AtRest {
         let (yaw_m, stroke_m, s5_m, s6_m) = (yaw?, stroke?, s5?, s6?);
         let mut robot = robot.clone();
         robot.initial_stroke_m = [yaw_m, 0.0, stroke_m, yaw_m, s5_m, s6_m];
+        Self::of(robot)
+    }
+
+    /// Of a robot in this pose.
+    fn of(robot: PlantParams) -> Option<Self> {
         let plant = Plant::new(&robot).ok()?;
         let state = plant.initial_state(0);
+        let chassis_n = match &state {
+            Ok(state) => {
+                let scene = plant.assembly.mechanics.scene(&state.core.motion).ok()?;
+                scene.loads.chassis_n
+            }
+            Err(PlantError::OnChassis { chassis_n, .. }) => *chassis_n,
+            Err(_) => 0.0,
+        };
         Some(Self {
             robot,
             plant,
             state,
+            chassis_n,
         })
+    }
+
+    /// Whether it falls, or lies on its chassis with its wheels in the air.
+    fn falls(&self) -> bool {
+        matches!(
+            self.state,
+            Err(PlantError::NotStanding | PlantError::OnChassis { .. })
+        )
+    }
+
+    /// Whether its chassis is on the ground, though its wheels may bear something, too.
+    fn lies(&self) -> bool {
+        self.chassis_n > 0.0
+    }
+
+    /// Whether it would stand with something else of the robot changed.
+    fn would_stand(&self, change: impl FnOnce(&mut PlantParams)) -> bool {
+        let mut robot = self.robot.clone();
+        change(&mut robot);
+        Self::of(robot).is_some_and(|other| other.state.is_ok() && !other.lies())
+    }
+
+    /// The centre of all masses and the left sole, from the middle of the axle \[m\].
+    fn centre_and_sole_m(&self) -> Option<[[f64; 2]; 2]> {
+        let robot = &self.robot;
+        let lengths_m = std::array::from_fn(|leg| {
+            std::array::from_fn(|i| {
+                robot.stroke_zero_m[3 * leg + i] + robot.initial_stroke_m[3 * leg + i]
+            })
+        });
+        let state = FloatingState::at_rest(lengths_m);
+        let dynamics = FloatingRobot::new(&robot.floating()).ok()?;
+        let gravity = robot.body.gravity_m_s2.into();
+        let kin = dynamics.prepare(&state, &gravity).ok()?;
+        let (com, [sole, ..]) = (kin.com_m(), kin.points_m());
+        Some([[com.x, com.z], [sole.x, sole.z]])
+    }
+
+    /// How it does not stand.
+    fn figures(&self) -> String {
+        match self.lies() {
+            true => format!(
+                "the robot lies on its chassis, which bears {} N of {} kg",
+                brief(self.chassis_n),
+                brief(self.robot.body.total_mass_kg())
+            ),
+            false => format!(
+                "the robot falls, with {} kg in all",
+                brief(self.robot.body.total_mass_kg())
+            ),
+        }
     }
 }
 
-/// The robot stands at its start.
-pub(super) fn stands(AtRest { robot, state, .. }: &AtRest) -> Option<Broken> {
-    let Err(PlantError::NotStanding | PlantError::OnChassis { .. }) = state else {
+/// The stiffness of a contact.
+type Stiffness = fn(&mut PlantParams) -> &mut f64;
+
+/// Stiffer than this is none tried, N/m.
+const STIFFEST: f64 = 1e8;
+/// A contact is soft that gives way by more than this under the whole weight, m.
+const SOFT_M: f64 = 0.02;
+
+/// A contact that is too soft is told the stiffness from which the robot stands.
+fn hard_enough(f: &Facts<'_>, at_rest: &AtRest, path: &str, of: Stiffness) -> Option<Broken> {
+    if !(at_rest.falls() || at_rest.lies()) {
         return None;
-    };
-    let lengths_m = std::array::from_fn(|leg| {
-        std::array::from_fn(|i| {
-            robot.stroke_zero_m[3 * leg + i] + robot.initial_stroke_m[3 * leg + i]
-        })
-    });
-    let state = FloatingState::at_rest(lengths_m);
-    let dynamics = FloatingRobot::new(&robot.floating()).ok()?;
-    let gravity = robot.body.gravity_m_s2.into();
-    let kin = dynamics.prepare(&state, &gravity).ok()?;
-    let (com, [sole, ..]) = (kin.com_m(), kin.points_m());
-    let mm = |metres: f64| brief(metres * 1e3);
+    }
+    let robot = &at_rest.robot;
+    let [forward, left, up] = robot.body.gravity_m_s2;
+    let weight_n = robot.body.total_mass_kg() * (forward * forward + left * left + up * up).sqrt();
+    if weight_n < SOFT_M * *of(&mut robot.clone()) {
+        return None;
+    }
+    let stands = |n_m: f64| at_rest.would_stand(|robot| *of(robot) = n_m);
+    let mut soft = *of(&mut robot.clone());
+    let mut stiff = 10.0 * soft;
+    while !stands(stiff) {
+        soft = stiff;
+        stiff *= 10.0;
+        if stiff > STIFFEST {
+            return None;
+        }
+    }
+    // To a hundredth, and then to three digits.
+    for _ in 0..8 {
+        let middle = (soft * stiff).sqrt();
+        match stands(middle) {
+            true => stiff = middle,
+            false => soft = middle,
+        }
+    }
+    let digit = 10_f64.powf(stiff.log10().floor() - 2.0);
+    let least = (stiff / digit).ceil() * digit;
     Some(Broken {
-        figures: format!(
-            "{} kg in all, their centre {} mm ahead of the axle and {} mm above it; the soles {} mm \
-             ahead of it and {} mm below, the wheels' rims {} mm below",
-            brief(robot.body.total_mass_kg()),
-            mm(com.x),
-            mm(com.z),
-            mm(sole.x),
-            mm(-sole.z),
-            mm(robot.body.wheel_radius_m)
-        ),
+        figures: at_rest.figures(),
+        offers: vec![vec![Offer::new(f, path, Bound::From, least)]],
+        words: String::new(),
+    })
+}
+
+pub(super) fn wheels_hard_enough(f: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
+    hard_enough(f, at_rest, "wheel_contact.stiffness", |robot| {
+        &mut robot.contacts.wheel.law.stiffness_n_m
+    })
+}
+
+pub(super) fn soles_hard_enough(f: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
+    hard_enough(f, at_rest, "contact.stiffness", |robot| {
+        &mut robot.contacts.foot.law.stiffness_n_m
+    })
+}
+
+/// A robot that falls has its feet ahead of its wheels.
+pub(super) fn feet_ahead(_: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
+    let [_, [sole_m, _]] = at_rest.centre_and_sole_m()?;
+    if !at_rest.falls() || sole_m >= 0.0 {
+        return None;
+    }
+    let [forward_m, left_m, up_m] = at_rest.robot.body.o4_m;
+    let ahead = at_rest.would_stand(|robot| robot.body.o4_m = [-forward_m, left_m, up_m]);
+    let such_as = match ahead {
+        true => format!(", such as {} m", pretty(-forward_m)),
+        false => String::new(),
+    };
+    Some(Broken {
+        figures: format!("the soles are {} mm behind the axle", brief(-sole_m * 1e3)),
         offers: Vec::new(),
         words: format!(
-            "the centre of all masses (`body.chassis_com`, `link.*.com`) is allowed from 0 to {} mm \
-             ahead of the axle; soles as low as the rims, and contacts that hold the weight",
-            mm(sole.x)
+            "the first value of `body.o4`, forward from the axle, is allowed above {} m{such_as}",
+            brief(forward_m - sole_m)
         ),
     })
 }
 
-/// Pistons under full pressure carry the robot at rest.
-pub(super) fn carried(at_rest: &AtRest) -> Option<Broken> {
+/// The robot stands where it starts.
+pub(super) fn stands(_: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
+    if !at_rest.falls() {
+        return None;
+    }
+    let robot = &at_rest.robot;
+    let [[com_x, com_z], [sole_x, sole_z]] = at_rest.centre_and_sole_m()?;
+    let mm = |metres: f64| brief(metres * 1e3);
+    Some(Broken {
+        figures: format!(
+            "{}; their centre {} mm ahead of the axle and {} mm above it; the soles {} mm \
+             ahead of it and {} mm below, the wheels' rims {} mm below",
+            at_rest.figures(),
+            mm(com_x),
+            mm(com_z),
+            mm(sole_x),
+            mm(-sole_z),
+            mm(robot.body.wheel_radius_m)
+        ),
+        offers: Vec::new(),
+        words: format!(
+            "the centre of all masses (`body.chassis_com`, `link.*.com`) is allowed from {} to {} mm \
+             ahead of the axle; soles as low as the rims, and contacts that hold the weight",
+            mm(sole_x.min(0.0)),
+            mm(sole_x.max(0.0))
+        ),
+    })
+}
+
+/// Pistons under full pressure hold what a robot at rest needs of them.
+pub(super) fn carried(_: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
     let AtRest {
         robot,
         plant,
         state,
+        ..
     } = at_rest;
     let motion = &state.as_ref().ok()?.core.motion;
     let needed_n = plant.assembly.mechanics.holding_forces_n(motion).ok()?;

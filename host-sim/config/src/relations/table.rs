@@ -57,6 +57,7 @@ const REGULATOR: &str = "a regulator lowers the pressure of its source, and rais
 const PRESSURE: &str = "a chamber has more pressure than its supply";
 const START: &str = "the piston starts beyond its stop";
 const IN_STOP: &str = "the gait would drive a piston into its stop";
+const TOO_SOFT: &str = "with so soft a contact the robot does not stand on its wheels and feet in its start pose, on level ground";
 const IN_ORDER: &str = "the gait is out of order";
 const SLIDES: &str = "what slides would hold more than what sticks";
 const NO_BODY: &str = "no body has these inertias";
@@ -154,6 +155,7 @@ pub const RELATIONS: &[Relation] = &[
     law("belly above the ground", &["chassis_contact.from", "body.wheel_radius"], "the chassis would begin below the ground that the wheels stand on", laws::belly),
     law("chassis between the wheels", &["spatial.track", "spatial.wheel_width", "chassis_contact.from", "chassis_contact.to", "body.wheel_radius"], "the wheels would be in the chassis", laws::between),
     law("drawn chassis between the wheels", &["spatial.track", "spatial.wheel_width", "spatial.chassis_size"], "the wheels would be in the chassis as it is drawn", laws::drawn),
+    law("hips between the wheels", &["body.o4", "spatial.track"], "a hip is on the other side, or farther out than the wheel of its side", laws::hips),
     law("ground below", &["body.gravity"], "the robot does not stand: its weight must point to the ground, at less than 45° from its normal", laws::gravity),
     // Readings of the boards.
     law("codes of the sensor", &["sensor.potentiometer.electrical_stroke", "sensor.potentiometer.offset", "sensor.potentiometer.gain", "cylinder.stroke", "node.joint.sensor_code_min", "node.joint.sensor_code_max", "sensor.potentiometer.nonlinearity", "sensor.adc.noise", "sensor.adc.bits"], "a joint board would take a piston in its stop for a broken wire", reading::codes),
@@ -176,6 +178,9 @@ pub const RELATIONS: &[Relation] = &[
     board_limits("board's band of rest", &["sensor.potentiometer.electrical_stroke", "sensor.adc.bits"], JointParam::RestBand),
     // The whole robot.
     relation("closed leg", &["body.crank", "body.p4", "body.stroke_zero", "start.yaw.stroke", "cylinder.stroke", "body.min_cos_theta3"], "they make no leg", Rule::Whole(standing::closes)),
+    relation("stiffness of the wheels", &["wheel_contact.stiffness", "chassis_contact.from", "body.wheel_radius", "body.chassis_mass", "body.gravity"], TOO_SOFT, Rule::AtRest(standing::wheels_hard_enough)),
+    relation("stiffness of the soles", &["contact.stiffness", "body.chassis_mass", "body.chassis_com", "body.gravity"], TOO_SOFT, Rule::AtRest(standing::soles_hard_enough)),
+    relation("feet ahead of the wheels", &["body.o4", "body.stroke_zero", "gait.held_leg_s5", "body.chassis_com"], "the robot does not stand in its start pose, on level ground", Rule::AtRest(standing::feet_ahead)),
     relation("standing", &["body.chassis_com", "body.chassis_mass", "body.o4", "body.foot_pad", "body.wheel_radius", "body.stroke_zero", "gait.stroke", "gait.held_leg_s5", "gait.held_leg_s6", "body.gravity", "contact.stiffness", "wheel_contact.stiffness"], "the robot does not stand on its wheels and feet in its start pose, on level ground", Rule::AtRest(standing::stands)),
     relation("carried by its air", &["supply.set_pressure", "cylinder.bore", "cylinder.rod", "body.chassis_mass", "body.chassis_com", "body.gravity"], "the cylinders cannot carry the robot", Rule::AtRest(standing::carried)),
 ];

@@ -2,7 +2,7 @@
 
 use crate::SimError;
 use wheeleg_config::faults::{FaultKind, FaultSpec, FaultTarget};
-use wheeleg_config::{RobotConfig, Scenario};
+use wheeleg_config::{RobotConfig, Scenario, brief};
 use wheeleg_plant::contact::ContactLaw;
 use wheeleg_protocol::Node;
 use wheeleg_remote_host::{NodeKind, Nodes};
@@ -44,6 +44,23 @@ fn check_alone(
                 scenario.name
             ),
             format!("choose a begin from 0 s to below {end_s} s"),
+        ));
+    }
+    let step_s = robot.plant.step_ns as f64 * 1e-9;
+    let lasts_s = fault.until_s.map(|until_s| until_s - fault.from_s);
+    // To the rounding of the difference.
+    if let Some(lasts_s) = lasts_s.filter(|lasts_s| *lasts_s < step_s * (1.0 - 1e-3)) {
+        return Err(SimError::simulation(
+            format!(
+                "the fault `{fault}` does nothing: it lasts {} us, and the robot is computed in steps of {} us",
+                brief(lasts_s * 1e6),
+                brief(step_s * 1e6)
+            ),
+            format!(
+                "let it last from {} s on, `numerics.step` of the robot {}",
+                brief(step_s),
+                robot.file
+            ),
         ));
     }
     Ok(())
@@ -337,6 +354,26 @@ mod tests {
         assert!(check(&scenario, &robot, &Nodes::default()).is_err());
         let seconds = begun.elapsed().as_secs_f64();
         assert!(seconds < 5.0, "{seconds} s");
+    }
+
+    /// A fault that ends before the next step of the plant could not act.
+    #[test]
+    fn a_fault_that_is_shorter_than_a_step_is_refused() {
+        let nodes = Nodes::default();
+        for fault in [
+            "bit-errors=0.1@0s..0.000001s",
+            "pot-frozen:joint3@1.4999s..1.49991s",
+        ] {
+            let error = admitted(&[fault], &nodes).expect_err(fault).to_string();
+            assert!(error.contains("does nothing: it lasts 1"), "{error}");
+            assert!(error.contains("steps of 100 us"), "{error}");
+        }
+        for fault in [
+            "bit-errors=0.1@0s..0.0001s",
+            "pot-frozen:joint3@1.4999s..1.5s",
+        ] {
+            admitted(&[fault], &nodes).expect(fault);
+        }
     }
 
     #[test]

@@ -137,13 +137,20 @@ impl Factors {
     }
 }
 
-/// Force of a plant at its supply pressure on the weaker side, less break-away friction \[N\].
+/// Force at the supply of a plant on the weaker side, less break-away friction under that pressure \[N\].
 #[must_use]
 pub fn force_left_n(p: &AxisParams) -> f64 {
+    let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
+    weaker_force_n(p) - p.cylinder.friction.under_pressure(gauge).static_n
+}
+
+/// Force at the supply of a plant on the weaker side \[N\].
+#[must_use]
+pub fn weaker_force_n(p: &AxisParams) -> f64 {
     let c = &p.cylinder;
     let area = std::f64::consts::FRAC_PI_4 * (c.bore_m * c.bore_m - c.rod_m * c.rod_m);
     let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
-    gauge * area - c.friction.static_n
+    gauge * area
 }
 
 /// Whether a controller finds the valves' delays before its first move.

@@ -145,6 +145,25 @@ fn ensure_starts(robot: &RobotConfig, options: &Options) -> Result<(), StudyErro
         ));
     }
     let most_n = scaling::most_load_n(&axis);
+    // Without force left there is none for a load.
+    if most_n < 0.0 {
+        let (most_n, bore_m) = scaling::most_friction_n(&axis);
+        return Err(StudyError::refused(
+            format!(
+                "`friction.static` = {:.1} N of {} is more than the cylinders of this study break away \
+                 from: allowed are up to {:.1} N",
+                axis.cylinder.friction.static_n,
+                robot.file,
+                (most_n * 10.0).floor() * 0.1
+            ),
+            format!(
+                "other bores are tried beside the robot's own, {} mm with this friction among them; \
+                 `supply.set_pressure` = {:.2} bar decides what moves them",
+                brief(bore_m * 1e3),
+                axis.supply.set_pressure_pa * 1e-5,
+            ),
+        ));
+    }
     if options.load_n <= most_n {
         return ensure_moves(&bores, options, &robot.file);
     }

@@ -8,7 +8,7 @@ use super::ablation::conductance;
 use super::trial::{Law, Outcome, Start, Trial};
 use super::{mean_delay, run_all};
 use crate::StudyError;
-use crate::axis_sim::suite::force_left_n;
+use crate::axis_sim::suite::{force_left_n, weaker_force_n};
 use crate::compare::MARGIN;
 use crate::study::{Ended, Progress};
 
@@ -137,6 +137,20 @@ pub(super) fn most_load_n(axis: &AxisParams) -> f64 {
         .into_iter()
         .map(|bored| force_left_n(&bored));
     left_n.fold(f64::INFINITY, f64::min) / MARGIN
+}
+
+/// The largest friction of the robot's cylinder with which every bore of the study starts, with a margin, and
+/// the bore that allows no more \[N, m\].
+pub(super) fn most_friction_n(axis: &AxisParams) -> (f64, f64) {
+    let own_n = axis.cylinder.friction.static_n;
+    let most = |at: &AxisParams| {
+        // Of a bore that scales its friction is a share of the robot's own.
+        let share = at.cylinder.friction.static_n / own_n;
+        (weaker_force_n(at) / share / MARGIN, at.cylinder.bore_m)
+    };
+    let all = all_bores(axis);
+    let least = all.iter().map(most).min_by(|a, b| a.0.total_cmp(&b.0));
+    least.unwrap_or((own_n, axis.cylinder.bore_m))
 }
 
 /// Mean delays of several trials, each under all seeds.

@@ -173,7 +173,7 @@ fn about(log: &Named) -> About {
         whole: content.end.whole,
         more_events: content.more_events,
         more_wrong: causes.len().saturating_sub(LISTED),
-        injected: injected.map(LoggedEvent::text).collect(),
+        injected: injected.map(|event| event.text()).collect(),
         wrong: listed(&causes, |t_s| t_s),
     }
 }

@@ -226,6 +226,7 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     let (plan, file) = plan_of(&args.plan)?;
     let cases = Cases::new(&plan)?;
     if args.list {
+        cases.ensure_possible()?;
         return Ok(print::list(&cases, args.first.unwrap_or(u64::MAX))?);
     }
     let variable = |name: &str| std::env::var(name).ok();

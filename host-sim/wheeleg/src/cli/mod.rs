@@ -184,9 +184,15 @@ fn colourless_if_asked() {
 
 /// Writes to stdout. A reader that has gone away (`| head`) is no error.
 fn print(text: &str) -> Result<ExitCode, StudyError> {
+    print_on(text).map(|_| ExitCode::SUCCESS)
+}
+
+/// Writes a part of what goes to stdout; whether there is still a reader.
+fn print_on(text: &str) -> Result<bool, StudyError> {
     match say(text) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(StudyError::Stdout(e)),
-        _ => Ok(ExitCode::SUCCESS),
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(false),
+        Err(e) => Err(StudyError::Stdout(e)),
     }
 }
 
@@ -312,10 +318,21 @@ fn place(report: &Path, width: usize) -> String {
 /// Tells what a study could not write; whether that is nothing.
 fn tell_unwritten(unwritten: Vec<StudyError>) -> bool {
     let whole = unwritten.is_empty();
+    // What a study refuses in its middle is no file.
+    let is_part = |error: &StudyError| matches!(error, StudyError::Refused { .. });
+    let (part, file) = (
+        unwritten.iter().any(is_part),
+        unwritten.iter().any(|error| !is_part(error)),
+    );
     for error in unwritten {
         tell_error(error);
     }
-    if !whole {
+    if part {
+        tell(
+            "the study ended there: its summary names this as `failure`; summary and report hold what was measured before",
+        );
+    }
+    if file {
         tell("the values above are valid; the files named here are missing or truncated");
     }
     whole

@@ -25,7 +25,9 @@ pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError>
         });
     let mut head = vec!["index".to_owned(), "case".to_owned(), "seed".to_owned()];
     head.extend(names);
-    super::super::print(&format!("{}\n", head.join("\t")))?;
+    if !super::super::print_on(&format!("{}\n", head.join("\t")))? {
+        return Ok(ExitCode::SUCCESS);
+    }
     for index in 0..plan.cases().min(most) {
         let case = cases.case(index);
         let mut line = format!("{index}\t{}\t{}", case.id, case.seed);
@@ -33,7 +35,10 @@ pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError>
             let _ = write!(line, "\t{value}");
         }
         line.push('\n');
-        super::super::print(&line)?;
+        // Each line takes a case to work out: nobody waits for the others.
+        if !super::super::print_on(&line)? {
+            break;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
