@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 25] = [
+const CHECKS: [Check; 30] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
