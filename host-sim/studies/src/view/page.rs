@@ -10,7 +10,6 @@ use wheeleg_report::{Picture, json, page, pictures};
 use wheeleg_telemetry::EventKind;
 
 use super::Named;
-use super::content::LoggedEvent;
 use super::difference::Difference;
 use super::signals::{Curve, Group, Plot};
 use crate::StudyError;
