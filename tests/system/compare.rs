@@ -526,7 +526,7 @@ fn an_axis_that_cannot_hold_its_load_is_refused() {
             contains("mine.toml")
                 .and(contains("`moving.load`"))
                 .and(contains("130 N"))
-                .and(contains("114.7 N"))
+                .and(contains("114.6 N"))
                 .and(contains("1.25")),
         );
     assert!(!out.exists());
