@@ -115,7 +115,7 @@ export function faultsView(ours, end, next) {
         "ol",
         {},
         !here.mine && step("Press Take control."),
-        cause && step("Remove the cause, as told above."),
+        cause && step("Remove the cause, as described above."),
         injected.map((fault) => step(`${ours(fault) ? "You have injected" : "Injected is"} `, html("code", {}, fault), ". ", html("button", { class: "btn", type: "button", onclick: () => end(fault) }, `End ${fault}`))),
         step("Press Clear fault."),
         step("Press Ready, which waits for the air."),

@@ -17,7 +17,7 @@ use wheeleg_config::timing::JOINT_TICK_NS;
 /// From power-up to the first tick edge, ns: a joint board's, and a wheel board's.
 /// Memory, clock, converter and parameters as the shipped images set them up, measured on
 /// emulated boards (tests/system/pil.rs). A crystal that is slow to swing makes it longer.
-pub const BOARD_START_UP_NS: [u64; 2] = [3_189_250, 2_248_000];
+pub const BOARD_START_UP_NS: [u64; 2] = [3_200_750, 2_248_000];
 /// Step of the master's first request number from start to start, so that no board takes its requests for
 /// repetitions; any odd number would do.
 const SEQUENCE_STEP: u16 = 0x2F35;
