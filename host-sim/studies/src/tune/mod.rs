@@ -335,11 +335,13 @@ impl Tuned {
         let stopped = self.stopped.clone();
         let summary = json(&self.summary(), stopped.as_ref());
         job.finish(self, summary, stopped, |job, tuned| {
+            let drawn = job.draw(page::figures(tuned));
+            let page = page::render(tuned, &drawn);
+            // Drawing takes time in which the folder may be removed: this is written with the rest.
             if tuned.is_accepted() {
                 job.keep(job.save(BOARD_PARAMETERS, &tuned.toml));
             }
-            let drawn = job.draw(page::figures(tuned));
-            (page::render(tuned, &drawn), drawn)
+            (page, drawn)
         })
     }
 }
