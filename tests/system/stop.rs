@@ -487,7 +487,8 @@ fn no_study_whose_folder_vanishes_leaves_a_report_without_a_summary() {
                 assert_valid(&summary(&out), study);
                 remade += 1;
             }
-            if study == "tune" && output.status.success() {
+            // A fast computer has ended before the folder goes: then nothing is left.
+            if study == "tune" && output.status.success() && out.exists() {
                 assert!(
                     left.iter().any(|file| file == "node-parameters.toml"),
                     "{told}"
