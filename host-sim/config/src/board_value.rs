@@ -7,6 +7,13 @@ use super::reader::range;
 /// Decimals that distinguish any two raw numbers: the finest format counts in 2^-30.
 const DECIMALS: i32 = 10;
 
+/// The raw number of a parameter among those stored in a board: its default if it is not one of them.
+#[must_use]
+pub fn stored_raw(info: &ParamInfo, stored: &[(u16, i32)]) -> i32 {
+    let own = stored.iter().find(|(id, _)| *id == info.id);
+    own.map_or(info.default, |(_, raw)| *raw)
+}
+
 /// The raw number nearest to a value in the parameter's unit. It saturates.
 #[must_use]
 pub fn raw_of(info: &ParamInfo, value: f64) -> i32 {

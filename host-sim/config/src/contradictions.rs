@@ -6,7 +6,7 @@ use wheeleg_node::acceptance::accepts;
 use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{JointParam, ParamInfo};
 
-use super::board_value::{raw_of, scale};
+use super::board_value::{raw_of, scale, stored_raw};
 use super::quantity::{pretty, suffix};
 use super::reader::Reader;
 use super::relations::Advised;
@@ -72,8 +72,7 @@ struct Limit {
 
 impl Board<'_> {
     fn raw(&self, parameter: JointParam) -> i32 {
-        let own = self.stored.iter().find(|(id, _)| *id == parameter.id());
-        own.map_or(parameter.info().default, |(_, raw)| *raw)
+        stored_raw(parameter.info(), self.stored)
     }
 
     /// Whether a rule holds, with another value of a parameter if one is given.

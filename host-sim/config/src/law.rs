@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use wheeleg_protocol::param::JointParam;
 
+use super::board_value::stored_raw;
 use super::node::set;
 use super::{RobotConfig, closest};
 
@@ -74,11 +75,9 @@ impl RobotConfig {
 
     /// The parameter `law` of each joint.
     fn laws(&self) -> impl Iterator<Item = i32> + '_ {
-        let law = JointParam::Law;
-        self.node.joints.iter().map(move |joint| {
-            let set = joint.iter().find(|(id, _)| *id == law.id());
-            set.map_or(law.info().default, |(_, raw)| *raw)
-        })
+        let law = JointParam::Law.info();
+        let joints = self.node.joints.iter();
+        joints.map(move |stored| stored_raw(law, stored))
     }
 }
 

@@ -48,7 +48,7 @@ pub mod timing;
 
 pub use axis::AxisConfig;
 pub use bars::{Bar, Measure};
-pub use board_value::{allowed_raw, allowed_values, in_unit, raw_of};
+pub use board_value::{allowed_raw, allowed_values, in_unit, raw_of, stored_raw};
 pub use command::{argument_dimension, command};
 pub use drawing::Drawing;
 pub use error::{ConfigError, Problem, plain_text, word};

@@ -8,7 +8,7 @@ use wheeleg_protocol::Node;
 use wheeleg_protocol::param::JointParam;
 
 use crate::RobotConfig;
-use crate::board_value::in_unit;
+use crate::board_value::{in_unit, stored_raw};
 use crate::derived::DERIVED;
 use crate::quantity::{brief, suffix};
 
@@ -53,13 +53,14 @@ impl RobotConfig {
     /// `node.*.conductance` = … where `fill_valve.conductance`, … say ….
     #[must_use]
     pub fn told_otherwise(&self) -> Vec<String> {
+        let axes = Node::JOINTS.map(|node| self.axis(node.index(), 1.0, 0.0));
         let mut all = Vec::new();
         for row in DERIVED.iter().filter(|row| TOLD.contains(&row.parameter)) {
             let info = row.parameter.info();
-            let off = Node::JOINTS.into_iter().find_map(|node| {
-                let stored = self.node.of(node).iter().find(|(id, _)| *id == info.id);
-                let told = in_unit(info, stored.map_or(info.default, |(_, raw)| *raw));
-                let is = row.value(&self.axis(node.index(), 1.0, 0.0));
+            let mut joints = axes.iter().zip(&self.node.joints);
+            let off = joints.find_map(|(axis, stored)| {
+                let told = in_unit(info, stored_raw(info, stored));
+                let is = row.value(axis);
                 let far = told > is * FAR || told * FAR < is;
                 far.then_some((told, is))
             });

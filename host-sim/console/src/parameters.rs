@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
-use wheeleg_config::{NodeParams, allowed_values, in_unit};
+use wheeleg_config::{NodeParams, allowed_values, in_unit, stored_raw};
 use wheeleg_protocol::Node;
 use wheeleg_protocol::param::{Format, JOINT_PARAMS, ParamInfo, WHEEL_PARAMS, params_at};
 
@@ -47,8 +47,7 @@ impl Parameters {
             let board = node.number();
             let stored = stored.of(node);
             params_at(board).iter().map(move |info| {
-                let set = stored.iter().find(|(id, _)| *id == info.id);
-                let raw = set.map_or(info.default, |(_, raw)| *raw);
+                let raw = stored_raw(info, stored);
                 let name = name(node, info);
                 let parameter = Parameter {
                     place: (board, info.id),

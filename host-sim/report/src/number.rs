@@ -9,10 +9,16 @@ pub const DASH: &str = "–";
 /// `value` with `digits` decimals.
 #[must_use]
 pub fn fixed(value: f64, digits: usize) -> String {
+    minus(&rounded(value, digits))
+}
+
+/// The same with the minus of a keyboard, for terminals.
+#[must_use]
+pub fn rounded(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     match text.strip_prefix('-') {
         Some(zero) if zero.bytes().all(|b| matches!(b, b'0' | b'.')) => zero.to_owned(),
-        _ => minus(&text),
+        _ => text,
     }
 }
 
@@ -166,6 +172,18 @@ mod tests {
             ["+3", "−3", "0"]
         );
         assert_eq!([or_dash(None, 1), or_dash(Some(-1.0), 1)], ["–", "−1.0"]);
+    }
+
+    #[test]
+    fn a_terminal_has_the_minus_of_a_keyboard() {
+        for (value, decimals, text) in [
+            (-0.4, 0, "0"),
+            (-0.04, 1, "0.0"),
+            (-0.06, 1, "-0.1"),
+            (-3.0, 0, "-3"),
+        ] {
+            assert_eq!(rounded(value, decimals), text);
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ use wheeleg_protocol::param::JOINT_PARAMS;
 
 use super::geometry::{Joint, Link, Motion, Shape, Solid, Source, Tree};
 use crate::SceneError;
-use wheeleg_config::RobotConfig;
+use wheeleg_config::{RobotConfig, stored_raw};
 use wheeleg_telemetry::channels;
 
 const SIDES: [&str; 2] = ["left", "right"];
@@ -189,8 +189,7 @@ fn cylinder(robot: &RobotConfig, i: usize) -> Motion {
     let gauge = robot.plant.supply.set_pressure_pa - robot.plant.gas.ambient_pressure_pa;
     let slew = JOINT_PARAMS.iter().find(|p| p.name == SLEW_RATE);
     let velocity = slew.map_or(0.0, |p| {
-        let own = robot.node.joints[i].iter().find(|(id, _)| *id == p.id);
-        let raw = own.map_or(p.default, |(_, raw)| *raw);
+        let raw = stored_raw(p, &robot.node.joints[i]);
         f64::from(raw) / f64::from(p.format.fraction_bits()).exp2() * 1e-3
     });
     Motion::Prismatic {

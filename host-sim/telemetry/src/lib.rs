@@ -57,7 +57,7 @@ pub use filter::LowPass2;
 pub use hash::TelemetryHash;
 pub use log_file::LogFile;
 pub use memory::{Keep, Memory, Recording, Row};
-pub use place::{PLACES, listed, placed};
+pub use place::{PLACES, SWITCHES, listed, placed};
 pub use read::{Logged, Read, Scalar, TakeDerived, part, parts, read, read_derived, read_from};
 pub use recorder::{PLOT_CUTOFF_HZ, Recorder};
 pub use recover::{Recovered, recover};

@@ -1,4 +1,4 @@
-//! Where the boards are on the robot, in the words of the page, of reports and of the command line.
+//! Where boards and switches are on the robot, in the words of the page, of reports and of the command line.
 
 use wheeleg_protocol::Address;
 
@@ -13,6 +13,9 @@ pub const PLACES: [&str; 8] = [
     "left",
     "right",
 ];
+
+/// Switches of a foot, by their bits.
+pub const SWITCHES: [&str; 4] = ["front", "back", "left", "right"];
 
 /// A board by its name in events, and its place: "joint 3 (left vertical)".
 #[must_use]

@@ -1,33 +1,44 @@
 //! The page says what the table says.
 
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use wheeleg_campaign::{Outcome, Status, merge, report};
+use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::Stop;
 
 use crate::common::{BASE, HEAD, computed, options, plan_of, run_in, spread};
+
+/// The table of a campaign in a folder, whose outcomes are changed by the index of their case.
+fn merged(
+    folder: &Path,
+    plan: &Plan,
+    changed: &(dyn Fn(u64, Outcome) -> Outcome + Sync),
+) -> PathBuf {
+    run_in(folder, plan, &options(2), &|case| {
+        Some(changed(case.place.index, computed(case)))
+    })
+    .0
+    .expect("it runs");
+    let table = folder.join("cases.parquet");
+    merge(&[folder.to_owned()], &table, &Stop::default()).expect("merged");
+    table
+}
 
 #[test]
 fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     let plan = spread(40);
     let folder = tempfile::tempdir().expect("a folder");
-    run_in(folder.path(), &plan, &options(2), &|case| {
-        let outcome = computed(case);
-        Some(match case.place.index {
-            4 => Outcome {
-                status: Status::Error,
-                error: Some("planted <b>".to_owned()),
-                passed: None,
-                targets: Vec::new(),
-                ..outcome
-            },
-            _ => outcome,
-        })
-    })
-    .0
-    .expect("it runs");
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let table = merged(folder.path(), &plan, &|index, outcome| match index {
+        4 => Outcome {
+            status: Status::Error,
+            error: Some("planted <b>".to_owned()),
+            passed: None,
+            targets: Vec::new(),
+            ..outcome
+        },
+        _ => outcome,
+    });
     let page = folder.path().join("cases.html");
     let report = report::Report::of(&table, Some(&table)).expect("a table");
     report.write(&page).expect("a page");
@@ -109,20 +120,13 @@ fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
          uniform = {{ min = 2000, max = 4000, unit = \"ms\" }}\n"
     ));
     let folder = tempfile::tempdir().expect("a folder");
-    run_in(folder.path(), &plan, &options(2), &|case| {
-        let outcome = computed(case);
-        Some(match case.place.index {
-            5 => Outcome {
-                targets: Vec::new(),
-                ..outcome
-            },
-            _ => outcome,
-        })
-    })
-    .0
-    .expect("it runs");
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let table = merged(folder.path(), &plan, &|index, outcome| match index {
+        5 => Outcome {
+            targets: Vec::new(),
+            ..outcome
+        },
+        _ => outcome,
+    });
     let report = report::Report::of(&table, None).expect("a table");
     assert_eq!(report.findings.shared, ["a", "b"]);
     let first = &report.findings.targets[0].cells[0];
@@ -151,17 +155,10 @@ fn the_page_begins_with_its_verdict_and_folds_what_is_long() {
         grid.join(", ")
     ));
     let folder = tempfile::tempdir().expect("a folder");
-    run_in(folder.path(), &plan, &options(2), &|case| {
-        let passed = Some(case.place.index != 7);
-        Some(Outcome {
-            passed,
-            ..computed(case)
-        })
-    })
-    .0
-    .expect("it runs");
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+    let table = merged(folder.path(), &plan, &|index, outcome| Outcome {
+        passed: Some(index != 7),
+        ..outcome
+    });
     let page = folder.path().join("cases.html");
     let report = report::Report::of(&table, None).expect("a table");
     report.write(&page).expect("a page");
@@ -191,8 +188,7 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
     let plan = spread(10);
     let folder = tempfile::tempdir().expect("a folder");
     let limit = std::sync::Mutex::new(None);
-    run_in(folder.path(), &plan, &options(2), &|case| {
-        let mut outcome = computed(case);
+    let table = merged(folder.path(), &plan, &|index, mut outcome| {
         outcome.passed = Some(true);
         for target in &mut outcome.targets {
             (target.value, target.pass) = (None, true);
@@ -204,14 +200,10 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
             .find(|target| target.min.is_none())
             .expect("a target with an upper limit");
         let max = target.max.expect("a limit");
-        target.value = Some(max * (0.5 + 0.02 * case.place.index as f64));
+        target.value = Some(max * (0.5 + 0.02 * index as f64));
         *limit.lock().expect("held by nobody") = Some(target.id.clone());
-        Some(outcome)
-    })
-    .0
-    .expect("it runs");
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+        outcome
+    });
     let findings = report::Report::of(&table, None).expect("a table").findings;
     let id = limit
         .into_inner()
@@ -230,19 +222,14 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
 fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
     let plan = spread(2);
     let folder = tempfile::tempdir().expect("a folder");
-    run_in(folder.path(), &plan, &options(1), &|case| {
-        let mut outcome = computed(case);
+    let table = merged(folder.path(), &plan, &|_, mut outcome| {
         let edges = outcome.targets.iter_mut().find(|target| target.id == "R1");
         let edges = edges.expect("a robot that stands is to switch no valve");
         assert_eq!(edges.max, Some(0.0));
         (edges.value, edges.pass) = (Some(132.0), false);
         outcome.passed = Some(false);
-        Some(outcome)
-    })
-    .0
-    .expect("it runs");
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
+        outcome
+    });
     let findings = report::Report::of(&table, None).expect("a table").findings;
     for worst in &findings.worst {
         assert!(worst.missed.contains(&"R1 by 132".to_owned()), "{worst:?}");

@@ -213,11 +213,11 @@ fn hard_enough(f: &Facts<'_>, at_rest: &AtRest, path: &str, of: Stiffness) -> Op
     let robot = &at_rest.robot;
     let [forward, left, up] = robot.body.gravity_m_s2;
     let weight_n = robot.body.total_mass_kg() * (forward * forward + left * left + up * up).sqrt();
-    if weight_n < SOFT_M * *of(&mut robot.clone()) {
+    let mut soft = *of(&mut robot.clone());
+    if weight_n < SOFT_M * soft {
         return None;
     }
     let stands = |n_m: f64| at_rest.would_stand(|robot| *of(robot) = n_m);
-    let mut soft = *of(&mut robot.clone());
     let mut stiff = 10.0 * soft;
     while !stands(stiff) {
         soft = stiff;
@@ -257,8 +257,11 @@ pub(super) fn soles_hard_enough(f: &Facts<'_>, at_rest: &AtRest) -> Option<Broke
 
 /// A robot that falls has its feet ahead of its wheels.
 pub(super) fn feet_ahead(_: &Facts<'_>, at_rest: &AtRest) -> Option<Broken> {
+    if !at_rest.falls() {
+        return None;
+    }
     let [_, [sole_m, _]] = at_rest.centre_and_sole_m()?;
-    if !at_rest.falls() || sole_m >= 0.0 {
+    if sole_m >= 0.0 {
         return None;
     }
     let [forward_m, left_m, up_m] = at_rest.robot.body.o4_m;

@@ -1,7 +1,7 @@
 //! Lifts and touchdowns, from the foot switches as the node reads them.
 
 use super::Target;
-use wheeleg_telemetry::FootSample;
+use wheeleg_telemetry::{FootSample, SWITCHES};
 
 /// A foot left the ground or met it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl ContactMeter {
 
 /// The switch that closes first must be that of the touching side.
 pub(super) fn side_targets(contacts: &[Contact], bit: u8) -> Vec<Target> {
-    let side = ["front", "back", "left", "right"][usize::from(bit.min(3))];
+    let side = SWITCHES[usize::from(bit.min(3))];
     let first = contacts.iter().find(|c| c.touchdown);
     let expected = f64::from(1_u8 << bit.min(3));
     vec![

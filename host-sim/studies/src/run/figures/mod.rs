@@ -7,7 +7,7 @@ mod walk;
 use crate::analysis::{Analysis, ReferencePoint};
 use wheeleg_config::{EventAction, LegChoice, RobotConfig, Scenario};
 use wheeleg_report::plot::{Content, Figure, Panel, RasterRow, Series, colour, line, runs};
-use wheeleg_telemetry::{JointSample, Recording, Row};
+use wheeleg_telemetry::{JointSample, Recording, Row, SWITCHES};
 
 type Points = Vec<(f64, f64)>;
 
@@ -394,7 +394,7 @@ fn feet(s: &Source<'_>) -> Figure {
     let range = (lo.max(-5.0), hi.min(120.0));
     let mut rows = Vec::new();
     for (foot, name) in [(0, "L"), (1, "R")] {
-        for (bit, side) in ["front", "back", "left", "right"].iter().enumerate() {
+        for (bit, side) in SWITCHES.iter().enumerate() {
             let samples = feet[foot]
                 .iter()
                 .filter(|r| s.regular(r))

@@ -8,11 +8,12 @@ use serde_json::{Map, Value, json};
 use wheeleg_access::Key as AccessKey;
 use wheeleg_console::client::{Client, Incoming};
 use wheeleg_protocol::Address;
+use wheeleg_report::number::rounded;
 use wheeleg_sim::unmeasured;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Suspend;
 use wheeleg_studies::view::plain;
-use wheeleg_telemetry::{PLACES, channels, listed};
+use wheeleg_telemetry::{PLACES, SWITCHES, channels, listed};
 
 use super::super::{no_handler, stop_on_signals};
 use super::reach::{Reach, ended};
@@ -21,8 +22,6 @@ use super::terminal::{Key, Line, Terminal};
 
 /// As it calls itself to others.
 const TOP: &str = "wheeleg ctl top";
-/// Switches of a foot, by their bits.
-const SWITCHES: [&str; 4] = ["front", "back", "left", "right"];
 /// Samples a second of each channel.
 const HZ: u32 = 10;
 /// How often the screen is drawn anew.
@@ -143,15 +142,6 @@ fn connect(reach: &Reach, key: &AccessKey) -> miette::Result<Client> {
     let frame = json!({ "op": "subscribe", "channels": topics, "hz": HZ });
     client.send(frame)?;
     Ok(client)
-}
-
-/// A number with fixed decimals; what is rounded to nothing has no sign.
-fn rounded(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
-        _ => text,
-    }
 }
 
 impl Seen {
@@ -446,18 +436,6 @@ mod tests {
         // Before anything has come, nothing is made up.
         let empty = text(&Seen::default().screen(Duration::ZERO, 24));
         assert!(!empty.contains("0.0 "), "{empty}");
-    }
-
-    #[test]
-    fn what_is_rounded_to_nothing_has_no_sign() {
-        for (value, decimals, text) in [
-            (-0.4, 0, "0"),
-            (-0.04, 1, "0.0"),
-            (-0.06, 1, "-0.1"),
-            (-3.0, 0, "-3"),
-        ] {
-            assert_eq!(rounded(value, decimals), text);
-        }
     }
 
     /// Whoever looks at it reads who has stopped the robot, and what to do.
