@@ -78,8 +78,22 @@ impl Surface for Shape {
         }
     }
 
+    #[inline]
+    fn is_clear_of_ball(&self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
+        matches!(self, Self::Ellipsoid(s) if s.is_clear_of_ball(centre_m, radius_m))
+    }
+
+    #[inline]
+    fn is_clear_of_wheel(&self, disc: &Disc, to_a_side_m: f64) -> bool {
+        matches!(self, Self::Ellipsoid(s) if s.is_clear_of_wheel(disc, to_a_side_m))
+    }
+
+    #[inline]
     fn top_m(&self) -> f64 {
-        self.surface().top_m()
+        match self {
+            Self::Ellipsoid(s) => s.top_m(),
+            _ => self.surface().top_m(),
+        }
     }
 
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {

@@ -93,8 +93,7 @@ impl Sum<'_> {
 }
 
 /// One sphere, disc or point against the hard parts near it.
-pub(super) struct Pressing<'a, 'n> {
-    pub(super) sum: &'a mut Sum<'n>,
+pub(super) struct Pressing<'a> {
     law: &'a ContactLaw,
     grips: &'a mut Grips,
     radius_m: f64,
@@ -103,16 +102,10 @@ pub(super) struct Pressing<'a, 'n> {
     deepest_m: f64,
 }
 
-impl<'a, 'n> Pressing<'a, 'n> {
+impl<'a> Pressing<'a> {
     #[inline]
-    pub(super) fn new(
-        sum: &'a mut Sum<'n>,
-        law: &'a ContactLaw,
-        grips: &'a mut Grips,
-        radius_m: f64,
-    ) -> Self {
+    pub(super) fn new(law: &'a ContactLaw, grips: &'a mut Grips, radius_m: f64) -> Self {
         Self {
-            sum,
             law,
             grips,
             radius_m,
@@ -123,13 +116,20 @@ impl<'a, 'n> Pressing<'a, 'n> {
 
     /// The closest place of one part, by its number from 1.
     #[inline]
-    pub(super) fn on(&mut self, number: u32, near: &Near, material: &Material) {
+    pub(super) fn on(&mut self, sum: &mut Sum<'_>, number: u32, near: &Near, material: &Material) {
         let law = self.law;
-        self.with(law, number, near, material);
+        self.with(law, sum, number, near, material);
     }
 
     #[inline]
-    pub(super) fn with(&mut self, law: &ContactLaw, number: u32, near: &Near, material: &Material) {
+    pub(super) fn with(
+        &mut self,
+        law: &ContactLaw,
+        sum: &mut Sum<'_>,
+        number: u32,
+        near: &Near,
+        material: &Material,
+    ) {
         let depth_m = self.radius_m - near.distance_m;
         if depth_m <= 0.0 {
             return;
@@ -141,7 +141,6 @@ impl<'a, 'n> Pressing<'a, 'n> {
         self.touched[slot] = true;
         grips[slot].part = number;
         self.deepest_m = self.deepest_m.max(depth_m);
-        let sum = &mut *self.sum;
         let point = near.point_m - self.radius_m * near.normal;
         let arm = point - sum.reference_m;
         let touch = Touch {

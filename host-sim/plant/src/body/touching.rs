@@ -14,7 +14,7 @@ use super::soft::{Patches, Soft};
 use super::sum::{Pressing, SECOND, Sum};
 use crate::contact::ContactLaw;
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
-use crate::terrain::{Disc, Index, Near, Rim, Shape, Surface, Terrain};
+use crate::terrain::{Disc, Index, Near, Part, Rim, Shape, Surface, Terrain};
 
 /// The search for a foot's height over the ground ignores rocks and solids farther than this \[m\].
 const SIGHT_M: f64 = 0.3;
@@ -213,67 +213,51 @@ impl Touching {
         self.index.top_near_m(&self.terrain.parts, place, reach_m)
     }
 
-    /// One sphere or point against the ground, ignoring parts farther than `reach_m`; returns its deepest
-    /// penetration into hard parts \[m\]. `soft` is called for each soft part, and returns false where that
-    /// part is hard.
+    /// Gives each part, by its number from 1, that a ball may touch.
     #[inline]
-    fn press_point(
-        &self,
-        mut pressing: Pressing<'_, '_>,
+    fn each_near<'a>(
+        &'a self,
         centre: &Vector3<f64>,
-        reach_m: f64,
-        mut soft: impl FnMut(&mut Sum<'_>, u32, &Near) -> bool,
-    ) -> f64 {
-        self.index.near(centre, reach_m, |number| {
-            let part = &self.terrain.parts[number as usize];
-            let near = part.shape.to_point(centre);
-            if part.material.soil.is_none() || !soft(pressing.sum, number + 1, &near) {
-                pressing.on(number + 1, &near, &part.material);
-            }
-        });
-        pressing.end()
+        radius_m: f64,
+        mut f: impl FnMut(u32, &'a Part),
+    ) {
+        self.index
+            .near(centre, Vector3::repeat(radius_m), |number| {
+                let part = &self.terrain.parts[number as usize];
+                if !part.shape.is_clear_of_ball(centre, radius_m) {
+                    f(number + 1, part);
+                }
+            });
     }
 
-    /// One disc against the ground; contacts with soft parts go to the patches.
+    /// One disc against one part, by its number from 1; contacts with soft parts go to the patches.
     #[inline]
     fn press_disc(
         &self,
-        mut pressing: Pressing<'_, '_>,
+        sum: &mut Sum<'_>,
+        pressing: &mut Pressing<'_>,
         patches: &mut Patches,
-        rim: &mut Rim,
-        disc: &Disc,
+        (rim, disc): (&mut Rim, &Disc),
+        (number, part): (u32, &Part),
     ) {
-        let step_s = pressing.sum.step_s;
-        let law = &self.laws[1];
-        self.index.near(&disc.centre_m, disc.radius_m, |number| {
-            let part = &self.terrain.parts[number as usize];
-            if let Shape::Ellipsoid(rock) = &part.shape
-                && rock.is_clear_of(disc)
-            {
-                return;
-            }
-            let mut is_soft = |near: &Near, share: f64| {
-                part.material.soil.is_some()
-                    && self
-                        .soft
-                        .disc(patches, number + 1, (near, share), &disc.axis)
-            };
-            if let Shape::HeightMap(map) = &part.shape {
-                let touches = rim.follow(map, disc, step_s);
-                for (touch, second) in touches.into_iter().zip([0, SECOND]) {
-                    let Some(touch) = touch else { continue };
-                    if !is_soft(&touch.near, touch.share) {
-                        let law = law.scaled(touch.share);
-                        pressing.with(&law, (number + 1) | second, &touch.near, &part.material);
-                    }
+        let mut is_soft = |near: &Near, share: f64| {
+            part.material.soil.is_some()
+                && self.soft.disc(patches, number, (near, share), &disc.axis)
+        };
+        if let Shape::HeightMap(map) = &part.shape {
+            let touches = rim.follow(map, disc, sum.step_s);
+            for (touch, second) in touches.into_iter().zip([0, SECOND]) {
+                let Some(touch) = touch else { continue };
+                if !is_soft(&touch.near, touch.share) {
+                    let law = self.laws[1].scaled(touch.share);
+                    pressing.with(&law, sum, number | second, &touch.near, &part.material);
                 }
-            } else if let Some(near) = part.shape.to_disc(disc)
-                && !is_soft(&near, 1.0)
-            {
-                pressing.on(number + 1, &near, &part.material);
             }
-        });
-        pressing.end();
+        } else if let Some(near) = part.shape.to_disc(disc)
+            && !is_soft(&near, 1.0)
+        {
+            pressing.on(sum, number, &near, &part.material);
+        }
     }
 
     /// Smallest height of a foot's spheres over the ground \[m\]; negative when pressed in.
@@ -391,24 +375,40 @@ impl Touching {
         }
         let mut sum = moving.sum(leg, reference);
         let axes = moving.kin.foot_axes(leg);
-        for (k, direction) in SOLE.into_iter().enumerate() {
-            let centre = self.sphere_m(sole, &axes, direction);
-            sum.toucher = Toucher::Foot(leg, k);
-            let radius_m = foot.sphere_radius_m;
-            let mut touched = [false; SOFT_SLOTS];
-            let mut soil_n = 0.0;
-            let pressing = Pressing::new(&mut sum, &self.laws[0], &mut grips[k], radius_m);
-            let soft = |sum: &mut Sum<'_>, part: u32, near: &Near| {
-                let at = (part, near, radius_m);
-                self.soft
-                    .sole(sum, &mut steps[k], &mut touched, at, &mut soil_n)
-            };
-            let depth = self.press_point(pressing, &centre, radius_m + nails, soft);
-            let left = steps[k].iter_mut().zip(touched).filter(|(_, t)| !t);
+        let radius_m = foot.sphere_radius_m;
+        let centres = SOLE.map(|direction| self.sphere_m(sole, &axes, direction));
+        let mut spheres = grips
+            .each_mut()
+            .map(|grips| Pressing::new(&self.laws[0], grips, radius_m));
+        let mut touched = [[false; SOFT_SLOTS]; SPHERES];
+        let mut soil_n = [0.0; SPHERES];
+        self.each_near(&reference, reach, |number, part| {
+            for (k, (centre, sphere)) in centres.iter().zip(&mut spheres).enumerate() {
+                if part.shape.is_clear_of_ball(centre, radius_m + nails) {
+                    continue;
+                }
+                sum.toucher = Toucher::Foot(leg, k);
+                let near = part.shape.to_point(centre);
+                let is_soft = part.material.soil.is_some()
+                    && self.soft.sole(
+                        &mut sum,
+                        &mut steps[k],
+                        &mut touched[k],
+                        (number, &near, radius_m),
+                        &mut soil_n[k],
+                    );
+                if !is_soft {
+                    sphere.on(&mut sum, number, &near, &part.material);
+                }
+            }
+        });
+        for (k, sphere) in spheres.into_iter().enumerate() {
+            let depth = sphere.end();
+            let left = steps[k].iter_mut().zip(touched[k]).filter(|(_, t)| !t);
             left.for_each(|(step, _)| lift(std::slice::from_mut(step)));
             if k > 0 {
                 load.depth_m[k - 1] = depth;
-                load.soil_n[k - 1] = soil_n;
+                load.soil_n[k - 1] = soil_n[k];
             }
         }
         if moving.step_s > 0.0 {
@@ -445,16 +445,34 @@ impl Touching {
         if centre.z - reach > self.top_near_m(centre, reach) {
             release(grips);
         } else {
-            let discs = grips.iter_mut().zip(rims).zip([1.0, 0.0, -1.0]);
-            for (k, ((grips, rim), across)) in discs.enumerate() {
-                sum.toucher = Toucher::Wheel(side, k);
-                let disc = Disc {
-                    centre_m: centre + across * wheel.width_m / DISCS as f64 * axis,
-                    axis,
-                    radius_m: r,
-                };
-                let pressing = Pressing::new(&mut sum, &self.laws[1], grips, 0.0);
-                self.press_disc(pressing, &mut patches, rim, &disc);
+            let apart = wheel.width_m / DISCS as f64;
+            let disc = |across: f64| Disc {
+                centre_m: centre + across * apart * axis,
+                axis,
+                radius_m: r,
+            };
+            let (middle, discs) = (disc(0.0), [1.0, 0.0, -1.0].map(disc));
+            let mut pressings = grips
+                .each_mut()
+                .map(|grips| Pressing::new(&self.laws[1], grips, 0.0));
+            let half_m = axis.map(|a| r * (1.0 - a * a).max(0.0).sqrt() + apart * a.abs());
+            self.index.near(centre, half_m, |number| {
+                let part = &self.terrain.parts[number as usize];
+                if part.shape.is_clear_of_wheel(&middle, apart) {
+                    return;
+                }
+                for (k, disc) in discs.iter().enumerate() {
+                    if part.shape.is_clear_of_wheel(disc, 0.0) {
+                        continue;
+                    }
+                    sum.toucher = Toucher::Wheel(side, k);
+                    let (pressing, rim) = (&mut pressings[k], &mut rims[k]);
+                    let part = (number + 1, part);
+                    self.press_disc(&mut sum, pressing, &mut patches, (rim, disc), part);
+                }
+            });
+            for disc in pressings {
+                disc.end();
             }
         }
         let hard_n = sum.normal_n;
@@ -490,18 +508,37 @@ impl Touching {
         let rotation = moving.kin.rotation();
         let (from, to) = (&self.params.chassis.from_m, &self.params.chassis.to_m);
         let deepest = |i: usize| (rotation[(2, i)] * from[i]).min(rotation[(2, i)] * to[i]);
+        let lowest = origin.z + deepest(0) + deepest(1) + deepest(2);
         let reach = self.chassis_reach_m;
-        if origin.z + deepest(0) + deepest(1) + deepest(2) > self.top_near_m(origin, reach) {
+        if lowest > self.top_near_m(origin, reach) {
             release(&mut states.chassis);
             return Wrench::ZERO;
         }
         let mut sum = moving.sum(4, *origin);
-        for (k, (grips, point)) in states.chassis.iter_mut().zip(&self.points_m).enumerate() {
-            sum.toucher = Toucher::Chassis(k);
-            let place = origin + rotation * point;
-            let pressing = Pressing::new(&mut sum, &self.laws[2], grips, 0.0);
-            // To the chassis every ground is hard.
-            self.press_point(pressing, &place, 0.0, |_, _, _| false);
+        let places = self.points_m.map(|point| origin + rotation * point);
+        let mut points = states
+            .chassis
+            .each_mut()
+            .map(|grips| Pressing::new(&self.laws[2], grips, 0.0));
+        self.each_near(origin, reach, |number, part| {
+            if part.shape.top_m() < lowest {
+                return;
+            }
+            for (k, (place, point)) in places.iter().zip(&mut points).enumerate() {
+                if !part.shape.is_clear_of_ball(place, 0.0) {
+                    sum.toucher = Toucher::Chassis(k);
+                    // To the chassis every ground is hard.
+                    point.on(
+                        &mut sum,
+                        number,
+                        &part.shape.to_point(place),
+                        &part.material,
+                    );
+                }
+            }
+        });
+        for point in points {
+            point.end();
         }
         *normal_n = sum.normal_n;
         sum.wrench

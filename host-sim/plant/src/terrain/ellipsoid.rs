@@ -22,6 +22,12 @@ use crate::hash::StateHasher;
 
 /// Relative accuracy of the roots.
 const CLOSE: f64 = 1e-13;
+/// Steps of Newton's method this small, relative, are the last: the error squares at each.
+const LAST: f64 = 1e-7;
+/// More than the relative rounding of a comparison.
+const ROUNDING: f64 = 1e-9;
+/// Steps to a root that only begins a search.
+const FIRST: usize = 1;
 /// Most steps to a root.
 const STEPS: usize = 40;
 /// Rim angles tried where Newton's method does not settle.
@@ -96,11 +102,11 @@ impl Ellipsoid {
         let least = -squares.min() * (1.0 - 1e-9);
         let mut t = 0.0_f64;
         for _ in 0..steps {
-            let under = squares.add_scalar(t);
-            let w = p.component_div(&under);
+            let per = squares.map(|square| 1.0 / (t + square));
+            let w = p.component_mul(&per);
             let shares = squares.component_mul(&w.component_mul(&w));
             let sum = shares.sum();
-            let slope = 2.0 * shares.component_div(&under).sum();
+            let slope = 2.0 * shares.dot(&per);
             if slope < 1e-30 {
                 return None;
             }
@@ -137,50 +143,37 @@ impl Ellipsoid {
         let squares = self.squares();
         let r = rim.radius_m;
         let mut out = start;
-        let mut t = self.root(&(rim.centre + r * out), &squares, 2)?;
+        let mut t = self.root(&(rim.centre + r * out), &squares, FIRST)?;
         for _ in 0..STEPS {
             let along = rim.axis.cross(&out);
             let p = rim.centre + r * out;
-            let under = squares.add_scalar(t);
-            let w = p.component_div(&under);
+            let per = squares.map(|square| 1.0 / (t + square));
+            let w = p.component_mul(&per);
             let shares = squares.component_mul(&w);
-            let flat = along.component_div(&under);
+            let flat = along.component_mul(&per);
             // On the surface, and along it; derivatives by θ and t.
             let g = shares.dot(&w) - 1.0;
             let h = w.dot(&along);
             let g_by_angle = 2.0 * r * shares.dot(&flat);
-            let g_by_t = -2.0 * shares.dot(&w.component_div(&under));
+            let g_by_t = -2.0 * shares.dot(&w.component_mul(&per));
             let h_by_angle = r * flat.dot(&along) - w.dot(&out);
             let h_by_t = -w.dot(&flat);
-            let det = g_by_angle * h_by_t - g_by_t * h_by_angle;
-            let turn = (g_by_t * h - h_by_t * g) / det;
-            let step = (h_by_angle * g - g_by_angle * h) / det;
+            let per_det = 1.0 / (g_by_angle * h_by_t - g_by_t * h_by_angle);
+            let turn = (g_by_t * h - h_by_t * g) * per_det;
+            let step = (h_by_angle * g - g_by_angle * h) * per_det;
             if !(turn.abs() < 1.0 && t + step > -squares.min()) {
                 return None;
             }
-            if turn.abs() < 1e-12 && step.abs() <= 1e-12 * (squares.min() + t.abs()) {
+            let is_last = turn.abs() < LAST && step.abs() <= LAST * (squares.min() + t.abs());
+            out = (out + turn * along) * (1.0 / (1.0 + turn * turn).sqrt());
+            t += step;
+            if is_last {
                 let least = h_by_angle - h_by_t * g_by_angle / g_by_t > 0.0;
+                let p = rim.centre + r * out;
                 return least.then(|| (Self::at_root(&p, &squares, t), p));
             }
-            out = (out + turn * along).normalize();
-            t += step;
         }
         None
-    }
-
-    /// Whether a plane square to the rock's surface towards the disc's centre separates the two. Most rocks
-    /// near a wheel need no more than this; where it is false, they may still be apart.
-    #[must_use]
-    #[inline]
-    pub fn is_clear_of(&self, disc: &Disc) -> bool {
-        let centre = self.own(&(disc.centre_m - self.centre_m));
-        let axis = self.own(&disc.axis);
-        let normal = centre.component_div(&self.squares());
-        let along = normal.dot(&axis);
-        let across = (normal.norm_squared() - along * along).max(0.0).sqrt();
-        // Both reach so far along the normal; the rock by the root of the centre's place on it.
-        let centre = normal.dot(&centre);
-        centre - disc.radius_m * across > centre.sqrt() * (1.0 + 1e-9)
     }
 
     /// The rim tried all round, then halved down.
@@ -232,6 +225,29 @@ impl Surface for Ellipsoid {
             normal: self.world(&normal),
             point_m: *point_m,
         }
+    }
+
+    /// Whether a plane square to the rock's surface towards the ball's centre separates the two: each reaches so
+    /// far along its normal, the rock by the root of the centre's place on it. Most rocks near a body need no
+    /// more than this.
+    #[inline]
+    fn is_clear_of_ball(&self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
+        let centre = self.own(&(centre_m - self.centre_m));
+        let normal = centre.component_div(&self.squares());
+        let along = normal.dot(&centre);
+        along - radius_m * normal.norm() > along.sqrt() * (1.0 + ROUNDING)
+    }
+
+    #[inline]
+    fn is_clear_of_wheel(&self, disc: &Disc, to_a_side_m: f64) -> bool {
+        let centre = self.own(&(disc.centre_m - self.centre_m));
+        let axis = self.own(&disc.axis);
+        let normal = centre.component_div(&self.squares());
+        let aside = normal.dot(&axis);
+        let across = (normal.norm_squared() - aside * aside).max(0.0).sqrt();
+        let wheel = disc.radius_m * across + to_a_side_m * aside.abs();
+        let along = normal.dot(&centre);
+        along - wheel > along.sqrt() * (1.0 + ROUNDING)
     }
 
     fn to_disc(&self, disc: &Disc) -> Option<Near> {

@@ -271,30 +271,42 @@ impl Index {
         }
     }
 
-    /// Gives every part that may be within `reach_m` of a place, each once, in an order that does
-    /// not depend on the place.
+    /// Gives every part that a box may touch, about its centre and with half its sides \[m\], each once, in an order
+    /// that does not depend on the place.
     #[inline]
-    pub fn near(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32)) {
-        self.nearest(centre_m, reach_m, |part| {
+    pub fn near(&self, centre_m: &Vector3<f64>, half_m: Vector3<f64>, mut f: impl FnMut(u32)) {
+        self.narrowing(centre_m, half_m, |part| {
             f(part);
-            reach_m
+            half_m
         });
     }
 
-    /// As [`Self::near`]; `f` returns the distance beyond which further parts do not matter \[m\], at most
-    /// the previous one.
+    /// Gives every part that may be within `reach_m` of a place; `f` returns the distance beyond which further parts
+    /// do not matter \[m\], at most the previous one.
     #[inline]
     pub fn nearest(&self, centre_m: &Vector3<f64>, reach_m: f64, mut f: impl FnMut(u32) -> f64) {
-        let mut reach_m = reach_m;
+        self.narrowing(centre_m, Vector3::repeat(reach_m), |part| {
+            Vector3::repeat(f(part))
+        });
+    }
+
+    /// Gives parts near a box that `f` may make smaller.
+    #[inline]
+    fn narrowing(
+        &self,
+        centre_m: &Vector3<f64>,
+        mut half_m: Vector3<f64>,
+        mut f: impl FnMut(u32) -> Vector3<f64>,
+    ) {
         for part in &self.everywhere {
-            reach_m = f(*part);
+            half_m = f(*part);
         }
         let mut grid = Some(self);
         while let Some(index) = grid {
-            index.near_in_grid(centre_m, &mut reach_m, &mut f);
+            index.near_in_grid(centre_m, &mut half_m, &mut f);
             grid = index.coarse.as_deref();
             for part in grid.iter().flat_map(|g| &g.everywhere) {
-                reach_m = f(*part);
+                half_m = f(*part);
             }
         }
     }
@@ -303,25 +315,25 @@ impl Index {
     fn near_in_grid(
         &self,
         centre_m: &Vector3<f64>,
-        reach_m: &mut f64,
-        f: &mut impl FnMut(u32) -> f64,
+        half_m: &mut Vector3<f64>,
+        f: &mut impl FnMut(u32) -> Vector3<f64>,
     ) {
         if self.items.is_empty() {
             return;
         }
-        let corner = |reach_m: f64| [centre_m.x + reach_m, centre_m.y + reach_m];
-        let Some([from, to]) = self.covered(corner(-*reach_m), corner(*reach_m)) else {
+        let (low, high) = (centre_m - *half_m, centre_m + *half_m);
+        let Some([from, to]) = self.covered([low.x, low.y], [high.x, high.y]) else {
             return;
         };
         // A part in several of these cells is reported in the first of them.
         let mut look = |item: &Item, cell: [u32; 2]| {
-            let first = [item.first[0].max(from[0]), item.first[1].max(from[1])];
+            let is_first = |i: usize| item.first[i] == cell[i] || cell[i] == from[i];
             let meets = |i: usize| {
-                item.bounds.low_m[i] <= centre_m[i] + *reach_m
-                    && item.bounds.high_m[i] >= centre_m[i] - *reach_m
+                item.bounds.low_m[i] <= centre_m[i] + half_m[i]
+                    && item.bounds.high_m[i] >= centre_m[i] - half_m[i]
             };
-            if first == cell && meets(0) && meets(1) && meets(2) {
-                *reach_m = f(item.part);
+            if is_first(0) && is_first(1) && meets(0) && meets(1) && meets(2) {
+                *half_m = f(item.part);
             }
         };
         for y in from[1]..=to[1] {
@@ -440,7 +452,9 @@ mod tests {
                 let looked: Vec<usize> = places
                     .map(|place| {
                         let mut found = Vec::new();
-                        index.near(&place, REACH_M, |part| found.push(part as usize));
+                        index.near(&place, Vector3::repeat(REACH_M), |part| {
+                            found.push(part as usize)
+                        });
                         found.sort_unstable();
                         let meets = |bounds: &Bounds| {
                             (0..3).all(|i| {

@@ -2,8 +2,8 @@
 //!
 //! The depth along the rim has as many peaks as the ground below it has bumps, and a wheel stands on two at
 //! most in its plane. The two highest are followed: one step of Newton's method in every step of the plant
-//! keeps a peak, which moves by some micrometres meanwhile. Every millisecond the whole lower rim is searched
-//! again, so that a bump which has come near is found before it touches.
+//! keeps a peak, which moves by some micrometres meanwhile. Every 4 ms the whole lower rim is searched
+//! again: a bump is found from 20 mm on, and would have to come nearer by 5 m/s to touch before.
 //!
 //! Two peaks that run into each other are one. Each then bears less, to half, so that the force
 //! does not jump.
@@ -29,7 +29,7 @@ static DIRECTIONS: LazyLock<[(f64, (f64, f64)); LOOKS]> = LazyLock::new(|| {
     })
 });
 /// Time until the next search \[s\].
-const AGAIN_S: f64 = 1e-3;
+const AGAIN_S: f64 = 4e-3;
 /// Peaks farther than this above the ground are dropped \[m\].
 const NEAR_M: f64 = 0.02;
 /// Peaks nearer to each other share the load \[rad\]: 15°.
@@ -116,6 +116,9 @@ impl Axes {
 
 /// The ground at one angle of a rim, and the next angle of Newton's method.
 struct Look {
+    /// Unit vectors outwards and along the rim.
+    out: Vector3<f64>,
+    along: Vector3<f64>,
     /// Slopes of the ground along X and Y, and how they change along the rim \[1/rad\].
     slope: [f64; 2],
     bend: [f64; 2],
@@ -143,6 +146,8 @@ fn look(map: &HeightMap, disc: &Disc, axes: &Axes, angle: f64) -> Look {
         STEP.copysign(rise)
     };
     Look {
+        out,
+        along,
         slope: [sx, sy],
         bend: bend.map(|b| r * b),
         over: [place.z - point.z, r * rise, r * fall],
@@ -272,12 +277,14 @@ const SMALL: f64 = 1e-3;
 /// The ground at the end of a step of Newton's method.
 #[inline]
 fn at_peak(map: &HeightMap, disc: &Disc, axes: &Axes, looked: &Look, angle: f64) -> Near {
-    let [out, _] = axes.at(angle);
-    let point = disc.centre_m + disc.radius_m * out;
     let d = looked.step;
     if d.abs() > SMALL {
-        return map.near(&point);
+        let [out, _] = axes.at(angle);
+        return map.near(&(disc.centre_m + disc.radius_m * out));
     }
+    // Sine and cosine of so small an angle by two terms each, which leaves 1e-14.
+    let out = (1.0 - 0.5 * d * d) * looked.out + d * (1.0 - d * d / 6.0) * looked.along;
+    let point = disc.centre_m + disc.radius_m * out;
     let ([x, y], [bx, by]) = (looked.slope, looked.bend);
     let [over, first, second] = looked.over;
     let over = over + d * (first + 0.5 * d * second);

@@ -43,6 +43,16 @@ pub trait Surface {
     /// Closest place to a disc; `None` if its plane does not meet the body.
     fn to_disc(&self, disc: &Disc) -> Option<Near>;
 
+    /// Whether a quick look tells that a ball does not touch; where it is false, they may still be apart.
+    fn is_clear_of_ball(&self, _centre_m: &Vector3<f64>, _radius_m: f64) -> bool {
+        false
+    }
+
+    /// The same of a wheel: a disc that reaches so far to both sides.
+    fn is_clear_of_wheel(&self, _disc: &Disc, _to_a_side_m: f64) -> bool {
+        false
+    }
+
     /// Height that no part of it exceeds \[m\].
     fn top_m(&self) -> f64;
 

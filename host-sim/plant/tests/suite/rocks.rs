@@ -52,6 +52,41 @@ fn the_closest_place_of_a_rock_is_the_foot_of_its_normal() {
     }
 }
 
+/// What a quick look calls clear does not touch, and it is so for most that do not.
+#[test]
+fn a_quick_look_misses_no_touch_and_tells_most_that_are_apart() {
+    let mut rng = Pcg64Mcg::seed_from_u64(3);
+    let (mut balls, mut wheels) = ([0; 2], [0; 2]);
+    for _ in 0..3000 {
+        let (rock, [centre, _], _) = rock(&mut rng);
+        let disc = Disc {
+            centre_m: centre + vector(&mut rng, -0.4, 0.4),
+            axis: vector(&mut rng, -1.0, 1.0).normalize(),
+            radius_m: 0.15,
+        };
+        let (place, radius_m) = (&disc.centre_m, disc.radius_m);
+        let apart = rock.to_point(place).distance_m > radius_m;
+        let clear = rock.is_clear_of_ball(place, radius_m);
+        assert!(apart || !clear, "{rock:?} {place:?}");
+        balls[0] += usize::from(apart);
+        balls[1] += usize::from(clear);
+        let side_m = 0.04;
+        let slices = (-8..=8).map(|k| Disc {
+            centre_m: place + f64::from(k) / 8.0 * side_m * disc.axis,
+            ..disc
+        });
+        let mut nears = slices.map(|slice| rock.to_disc(&slice));
+        let apart = nears.all(|near| near.is_none_or(|near| near.distance_m > 0.0));
+        let clear = rock.is_clear_of_wheel(&disc, side_m);
+        assert!(apart || !clear, "{rock:?} {disc:?}");
+        wheels[0] += usize::from(apart);
+        wheels[1] += usize::from(clear);
+    }
+    for [apart, clear] in [balls, wheels] {
+        assert!(10 * clear > 8 * apart, "{clear} of {apart}");
+    }
+}
+
 /// Against a fine walk over the disc, rim and side.
 #[test]
 fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
@@ -66,7 +101,7 @@ fn a_disc_is_as_near_to_a_rock_as_its_nearest_point() {
             radius_m: 0.15,
         };
         let near = rock.to_disc(&disc).unwrap();
-        if rock.is_clear_of(&disc) {
+        if rock.is_clear_of_wheel(&disc, 0.0) {
             assert!(near.distance_m > 0.0, "{near:?} {rock:?} {disc:?}");
             clear += 1;
         }
@@ -226,7 +261,7 @@ fn the_index_misses_nothing_and_gives_nothing_twice() {
     for _ in 0..5000 {
         let (at, reach) = (vector(&mut rng, -12.0, 12.0), rng.random_range(0.0..0.5));
         let mut given = Vec::new();
-        index.near(&at, reach, |number| given.push(number));
+        index.near(&at, Vector3::repeat(reach), |number| given.push(number));
         let mut once = given.clone();
         once.sort_unstable();
         once.dedup();
@@ -271,7 +306,7 @@ fn long_thin_and_far_parts_are_found() {
         for k in 0..400 {
             let at = Vector3::new(0.0137 * f64::from(k % 100), 0.0071 * f64::from(k), 0.02);
             let (mut given, mut above) = (Vec::new(), Vec::new());
-            index.near(&at, 0.1, |part| given.push(part));
+            index.near(&at, Vector3::repeat(0.1), |part| given.push(part));
             index.above([at.x, at.y], |part| above.push(part));
             for (place, part) in (0..).zip(parts) {
                 let times = given.iter().filter(|other| **other == place).count();
@@ -309,7 +344,7 @@ fn a_search_that_narrows_finds_the_nearest_part() {
         );
         let far = |number: u32| parts[number as usize].shape.to_point(&at).distance_m;
         let mut least = 0.3_f64;
-        index.near(&at, 0.3, |number| {
+        index.near(&at, Vector3::repeat(0.3), |number| {
             least = least.min(far(number));
             all += 1;
         });

@@ -19,8 +19,8 @@ impl Touching {
     pub(crate) fn ground_in_chassis(&self, state: &FloatingState) -> Option<(Vector3<f64>, f64)> {
         let (from, to) = (self.params.chassis.from_m, self.params.chassis.to_m);
         let mut shapes = Vec::new();
-        let reach_m = self.chassis_reach_m;
-        self.index.near(&state.position_m, reach_m, |part| {
+        let half_m = Vector3::repeat(self.chassis_reach_m);
+        self.index.near(&state.position_m, half_m, |part| {
             shapes.push(&self.terrain.parts[part as usize].shape);
         });
         let places = |i: usize| {
