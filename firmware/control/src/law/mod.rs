@@ -62,6 +62,10 @@
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | shows as load; what is fed forward beyond it makes a relay near the target: it is faded out there (`standstill`) |
 //!
+//! Tests stand at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
+//! `preload` are in `tests.rs` here and in `tests/preload.rs`. What all of it is worth in the closed loop:
+//! `tests/system/control_bars.rs`.
+//!
 //! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its
 //! error shows as load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction
 //! has to stop the piston.

@@ -11,9 +11,9 @@
 //!         the seat ends
 //! ```
 //!
-//! Worked out once a period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The valves are shut
-//! in CATCH, PAUSE and REST. All but REST and PRESS follow from the period alone: CATCH, if the piston is caught; if
-//! not, PAUSE, if one is under way; otherwise SERVO.
+//! Worked out once a period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The
+//! valves are shut in CATCH, PAUSE and REST. All but REST and PRESS follow from the period alone: CATCH, if the piston
+//! is caught; if not, PAUSE, if one is under way; otherwise SERVO.
 //!
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (|e| − band) < m v²/2 <
 //!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target; counted on within 12

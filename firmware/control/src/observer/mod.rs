@@ -30,8 +30,8 @@
 //! If the supply falls, nothing here notices. A chamber that is filled is taken for fuller than it is, which shows as
 //! load while the piston slides and not at all while it stands ([`pressure`], [`motion`], [`mass`] say what follows).
 //!
-//! State [`Observer`]. A board makes a new one, at rest and with unknown air, after a sensor's fault and with other
-//! axis data.
+//! Tests stand at the end of each file. State [`Observer`]. A board makes a new one, at rest and with unknown air,
+//! after a sensor's fault and with other axis data.
 
 pub mod flow;
 mod identification;
