@@ -1,7 +1,7 @@
 //! Dead-time predictor: the motion at the end of the dead time, where a pulse that begins now acts.
 //!
 //! ```text
-//! T_d = rest of the period + t_on + t_line
+//! T_d = rest of the period (1.5 ticks) + t_on + t_line
 //! F̄   = (F now + F expected) / 2                      expected: with the pulses that are under way
 //! v°  = v + (F̄ + load − d v) T_d / m
 //! v'  = v° − sgn(v°) min(|v°|, 0.92 Fc T_d / m)        friction turns nothing round

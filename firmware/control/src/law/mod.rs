@@ -24,7 +24,7 @@
 //! | `handover` | which part of the firmware commands the valves |
 //!
 //! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
-//! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond. The
+//! [`PERIOD_TICKS`] (4) ticks, whole in its last tick, and plan the pulses of the next period to the microsecond. The
 //! steps, in the order of the code:
 //!
 //! 1. [`Predictive::drive`] is called in every tick. In the last one of a period it does 2 to 9, in the others only 10.

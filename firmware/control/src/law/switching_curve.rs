@@ -11,12 +11,13 @@
 //! m_n   = 0.60 · ½ Ḟ / (a_b k)               with s = 1; Ḟ: how fast both valves change the force at mid stroke
 //!
 //! half of the acceleration is enough:  m D k band > F_1
+//! F_1   = n C ρ0 R T0 p_m AB/VB (t_off + margin)      the shortest opening of B's vent valve at mid stroke and mean pressure
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time,
 //! s; m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
-//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN: the shortest opening of B's vent valve at mid
-//! stroke ([`AxisModel`]); band: rest band, mm. `inverse_dynamics` may lower a_b under a load.
+//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN; band: rest band, mm. `inverse_dynamics` may lower
+//! a_b under a load.
 //!
 //! **Half is enough.** A piston that stands off its target by e is asked to move by the force m D k e
 //! (`inverse_dynamics`), with friction and ramp beside it. Two halves meet on its way to the valves: `allocation` gives

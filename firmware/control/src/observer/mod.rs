@@ -21,7 +21,9 @@
 //! 6. `mass`, where the axis learns it: one period more of the move under way. Where it has ended, mass and, by
 //!    `identification`, pressures are corrected; the load gives back what the pressures had wrong.
 //!
-//! The law in [`crate::law`] only reads it.
+//! The law in [`crate::law`] only reads it. All estimates hold at the **moment** of the period: between its last two
+//! ticks, whose strokes are averaged, 2.5 ticks after its begin. The expected pressures hold at the end of the dead
+//! time.
 //!
 //! Stroke and speed are raw I16F16 mm and mm/s, pressures 1/256 Pa absolute, forces and load mN, accelerations mm/s²,
 //! masses kg × 2^16, times µs or s × 2^32, shares × 2^16 unless stated. All are `i32`. Chamber A extends the piston;
