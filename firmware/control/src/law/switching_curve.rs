@@ -16,7 +16,8 @@
 //!
 //! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time,
 //! s; m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
-//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN; band: rest band, mm. `inverse_dynamics` may lower
+//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as there, p_m as in
+//! `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm. `inverse_dynamics` may lower
 //! a_b under a load.
 //!
 //! **Half is enough.** A piston that stands off its target by e is asked to move by the force m D k e
