@@ -1,66 +1,85 @@
 //! The robot on the predictive law, over several seeds, with the failure probability that they
 //! leave: one-sided 95 %, Clopper and Pearson.
+//!
+//! The seeds of the three steps begin at a hash of the law's sources, so that the law is not tuned to them. A few run here;
+//! `cargo xtask deep robot` runs as many as the bar needs.
 
 use crate::sil;
+use std::collections::BTreeMap;
 use wheeleg_config::builtin;
-use wheeleg_report::stats::failure_bound;
+use wheeleg_report::stats::{at_most, failure_bound};
 use wheeleg_studies::analysis::analyse;
+use wheeleg_studies::compare::judging_root;
 
-/// Seeds of the suite.
-const SEEDS: u32 = 8;
-/// Seeds of the three steps, of which some are known to switch valves at rest: 3 of 40, on
-/// 2026-11-25 (`docs/records/known-shortfalls.md`). More than this many of 24 would be another
-/// robot: with 7.5 % one such set of seeds in 200.
-const STEPS_SEEDS: u32 = 24;
-const STEPS_MISSES: usize = 5;
+/// Seeds of the three steps.
+const STEPS_VARIABLE: &str = "WHEELEG_THREE_STEP_SEEDS";
+/// Bar of the probability that the three steps miss a required target.
+const STEPS_BAR: f64 = 0.05;
+/// Measured upper bound of it: a rate clearly above is a regression.
+const STEPS_KNOWN: f64 = 0.03;
+/// The scenarios that must meet all targets, and their seeds, from 1 on.
+const OTHERS: [&str; 4] = ["stand", "sinusoid", "master-lost", "estop"];
+const OTHER_SEEDS: u64 = 8;
 
-/// The seeds that miss a required target, with the targets.
-fn misses(scenario: &str, seeds: u32) -> Vec<(u32, Vec<String>)> {
+/// How many of these seeds miss a required target, and how many miss each.
+fn misses(scenario: &str, seeds: impl Iterator<Item = u64>) -> (u64, BTreeMap<String, u32>) {
     let robot = builtin::robot("wheeleg").expect("built in");
     let scenario = builtin::scenario(scenario).expect("built in");
-    let mut missed = Vec::new();
-    for seed in 1..=seeds {
-        let recording = sil::run(&scenario, &robot, u64::from(seed));
+    let (mut missed, mut by_target) = (0, BTreeMap::new());
+    for seed in seeds {
+        let recording = sil::run(&scenario, &robot, seed);
         let analysis = analyse(&scenario, &robot, &recording);
         let failed = analysis.targets.iter().filter(|t| t.required && !t.pass);
         let failed: Vec<_> = failed.map(|t| t.id.clone()).collect();
-        if !failed.is_empty() {
-            missed.push((seed, failed));
+        missed += u64::from(!failed.is_empty());
+        for id in failed {
+            println!("{}, seed {seed}: misses {id}", scenario.name);
+            *by_target.entry(id).or_default() += 1;
         }
     }
-    let bound = failure_bound(missed.len() as u32, seeds);
+    (missed, by_target)
+}
+
+#[test]
+#[ignore = "long; `cargo xtask test` runs it"]
+fn the_three_steps_meet_their_targets() {
+    let seeds = std::env::var(STEPS_VARIABLE).map_or(32, |n| n.parse().expect("a number"));
+    let root = judging_root();
+    let (missed, by_target) = misses("three-step", root..root + seeds);
+    let bound = failure_bound(missed as u32, seeds as u32);
+    // One line: it goes into the record of long checks.
     println!(
-        "{}: {} of {seeds} seeds miss a target; failure probability at most {:.1} % (95 %)",
-        scenario.name,
-        missed.len(),
-        100.0 * bound
+        "robot, three steps from seed {root}: {missed} of {seeds} miss a target {by_target:?}, bound {:.1} % (bar {:.0} %, {})",
+        100.0 * bound,
+        100.0 * STEPS_BAR,
+        if bound <= STEPS_BAR {
+            "met"
+        } else if failure_bound(0, seeds as u32) > STEPS_BAR {
+            "for which these are too few"
+        } else {
+            "not met"
+        },
     );
-    missed
-}
-
-/// Every required target of every seed.
-fn all_targets(scenario: &str) {
-    let missed = misses(scenario, SEEDS);
-    assert!(missed.is_empty(), "{scenario}: {missed:?}");
-}
-
-#[test]
-#[ignore = "long; `cargo xtask test` runs it"]
-fn the_three_steps_meet_all_targets_but_at_times_that_of_rest() {
-    let missed = misses("three-step", STEPS_SEEDS);
-    let of_rest = missed.iter().all(|(_, targets)| *targets == ["R1"]);
-    assert!(of_rest && missed.len() <= STEPS_MISSES, "{missed:?}");
+    // So many misses at the known rate would be a chance of 1 in 1000.
+    let chance = 1.0
+        - missed
+            .checked_sub(1)
+            .map_or(0.0, |k| at_most(k, seeds, STEPS_KNOWN));
+    assert!(chance > 1e-3, "{missed} of {seeds}: {by_target:?}");
 }
 
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
-fn it_stands_without_a_valve_edge() {
-    all_targets("stand");
-}
-
-#[test]
-#[ignore = "long; `cargo xtask test` runs it"]
-fn the_safe_states_are_reached() {
-    all_targets("master-lost");
-    all_targets("estop");
+fn standing_the_sinusoid_and_the_safe_states_meet_all_targets() {
+    let mut told = Vec::new();
+    let mut all_targets = true;
+    for scenario in OTHERS {
+        let (missed, by_target) = misses(scenario, 1..=OTHER_SEEDS);
+        told.push(format!("{scenario} {missed} {by_target:?}"));
+        all_targets &= missed == 0;
+    }
+    // One line: it goes into the record of long checks.
+    let told = told.join(", ");
+    println!("robot, {OTHER_SEEDS} seeds each, of which miss a target: {told}");
+    assert!(all_targets, "{told}");
 }

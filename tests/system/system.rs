@@ -7,6 +7,7 @@ mod sil;
 
 mod axis_text;
 mod behaviours;
+mod bench_axis;
 mod bus_budget;
 mod check_vectors;
 mod cli;

@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 30] = [
+const CHECKS: [Check; 32] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -58,6 +58,18 @@ const CHECKS: [Check; 30] = [
         "the predictive law on the four axes, 5 000 and 2 000 combinations, vented and with unknown air",
         12,
         combinations,
+    ),
+    Check(
+        "robot",
+        "the robot on the predictive law: three steps on 300 seeds, and its other scenarios",
+        5,
+        robot,
+    ),
+    Check(
+        "bench-axis",
+        "the predictive law on the bench axis: 100 steps over the fastest possible, 300 S-curves",
+        2,
+        bench_axis,
     ),
     Check(
         "ablation",
@@ -307,6 +319,43 @@ fn combinations() -> StepResult<String> {
         &[("WHEELEG_COMBINATIONS", 5_000)],
         "combinations from number ",
     )
+}
+
+fn robot() -> StepResult<String> {
+    let steps = measured(
+        [
+            "system",
+            "predictive_robot::the_three_steps_meet_their_targets",
+        ],
+        &[("WHEELEG_THREE_STEP_SEEDS", 300)],
+        "robot, three steps from seed ",
+    )?;
+    let others = measured(
+        [
+            "system",
+            "predictive_robot::standing_the_sinusoid_and_the_safe_states_meet_all_targets",
+        ],
+        &[],
+        "robot, 8 seeds each",
+    )?;
+    Ok(format!("{steps}; {others}"))
+}
+
+fn bench_axis() -> StepResult<String> {
+    let steps = measured(
+        [
+            "system",
+            "bench_axis::a_step_takes_little_longer_than_the_fastest_possible",
+        ],
+        &[("WHEELEG_BENCH_STEPS", 100)],
+        "bench axis, 100 mm to 1 mm",
+    )?;
+    let curves = measured(
+        ["system", "bench_axis::an_s_curve_is_followed_closely"],
+        &[("WHEELEG_BENCH_CURVES", 300)],
+        "bench axis, S-curve",
+    )?;
+    Ok(format!("{steps}; {curves}"))
 }
 
 /// A build of its own: only it has a law whose parts can be taken out.

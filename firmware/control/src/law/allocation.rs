@@ -5,18 +5,22 @@
 //! pB = (pA AA − pa (AA − AB) − F) / AB          each limited to what valves can make; the other makes up for it
 //! ```
 //!
-//! F, N; p, Pa absolute; AA, AB: areas of bore and annulus, m². Valves can make 1.03 p_a to 0.985 p_s.
+//! F, N; p, Pa absolute; AA, AB: areas of bore and annulus, m². Valves can make 1.03 p_a to 0.985 p_s. F is limited
+//! before to what these make. Within the limits each chamber makes half of a change of F: AA dpA = dF/2, AB dpB =
+//! −dF/2.
 //!
 //! Two actuators and one force: the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
 //! Goldfarb 2007); about the mean of supply and atmosphere both chambers have as far to go up as down. It is
 //! neither the stiffest level, which is the highest, nor the one at which filling and venting are equally fast.
 //!
 //! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in one from an end
-//! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls:
-//! the force is there as soon as either chamber can make it. Source: this project (decision 38).
+//! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls: the
+//! force is there as soon as either chamber can make it. It ends once the counter chamber is expected to have at most
+//! 10 kPa too much. Source: this project (decision 38).
 //!
-//! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its pressure,
-//! and the force is less than asked for. For the swap: that the counter chamber's pressure is estimated to 10 kPa.
+//! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its
+//! pressure, and the force is less than asked for. For the swap: that the counter chamber's pressure is estimated to 10
+//! kPa.
 //!
 //! Config [`AxisModel`], state [`PressureSwap`], update [`PressureSwap::targets`].
 

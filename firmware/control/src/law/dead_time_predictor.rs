@@ -1,7 +1,7 @@
 //! Dead-time predictor: the motion at the end of the dead time, where a pulse that begins now acts.
 //!
 //! ```text
-//! T_d = rest of the period + t_on + t_line
+//! T_d = rest of the period (1.5 ticks) + t_on + t_line
 //! F̄   = (F now + F expected) / 2                      expected: with the pulses that are under way
 //! v°  = v + (F̄ + load − d v) T_d / m
 //! v'  = v° − sgn(v°) min(|v°|, 0.92 Fc T_d / m)        friction turns nothing round
@@ -9,13 +9,17 @@
 //! v'  = 0                                              stuck, and |F expected + load| < Fb
 //! ```
 //!
-//! F: pressure force, mN; load, Fc, Fb, mN; d, mN s/mm; m, kg; v, mm/s; x, mm; T_d, s: as in [`crate::observer::motion`].
+//! F: pressure force, mN; load, Fc, Fb, mN; d, mN s/mm; m, kg; v, mm/s; x, mm; T_d, s: as in
+//! [`crate::observer::motion`].
 //!
 //! Source: control of a plant with dead time by its predicted state (Smith 1957; Manitius and Olbrot 1979); one step of
 //! the trapezoidal rule.
 //!
-//! Assumes: valve delays, supply and friction as specified; the load that is estimated, unchanged in the dead time; a force
-//! that changes in proportion to time in it.
+//! Assumes: valve delays, supply and friction as specified; the load that is estimated, unchanged in the dead time; a
+//! force that changes in proportion to time in it. If the supply falls, a pulse that fills adds less to F expected than
+//! is counted.
+//!
+//! x', v' are what `inverse_dynamics` acts by; `standstill`, `seat` and `preload` act by the motion now.
 //!
 //! Config [`AxisModel`]; no state of its own; update [`PredictedState::new`].
 

@@ -4,8 +4,19 @@
 //! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
 //! that is cut counts as far as it was sent.
 //!
-//! Assumes: that whoever drives reports it in every tick. What is not reported is air that the observer does not know of, and
-//! the bounds of the pressures then hold no longer.
+//! | | what is left when another part drives |
+//! |---|---|
+//! | goes on | pressures with their bounds, motion, load, the mass in use with its gains, clock and period, a pressure swap that is under way |
+//! | begins anew, at the end of each period | standstill, with the present stroke as its target; break-away ramp; preload |
+//! | is dropped at once | the plan, as far as it was not sent: a coil that is on counts as off from the end of the tick |
+//!
+//! The law begins to plan again at the end of the first period in which it is called ([`Predictive::drive`]); until
+//! then all valves are shut. A new law, without any of this, is made by the board alone: `JointController::reset`,
+//! after a sensor's fault, damaged memory or other axis data.
+//!
+//! Assumes: that whoever drives reports it in every tick, and that this reaches the chamber: without supply the air
+//! that is counted never came. What is not reported is air that the observer does not know of. In both cases the bounds
+//! of the pressures hold no longer.
 
 use super::Predictive;
 use super::inverse_dynamics::BreakawayRamp;

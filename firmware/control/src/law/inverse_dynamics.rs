@@ -17,19 +17,21 @@
 //! | F_in, F_out | mN | largest force of the supply, retracting and extending: what can brake |
 //! | load, Fc, d, m | mN, mN, mN s/mm, kg | as in [`crate::observer::motion`]; Fb instead of Fc while \|v\| < 3 mm/s; faded by `standstill` |
 //! | sat(u) | 1 | u within ±1 |
-//! | ramp | mN | towards r, +5 Fb in a second while \|v\| < 3 mm/s or stuck, and r rests; −41 % a period above 10 mm/s; at most F_out |
+//! | ramp | mN | towards r, +5 Fb in a second while \|v\| < 3 mm/s or stuck, and r rests; −41 % a period above 10 mm/s; at most F_out; unchanged between, and while the valves are shut |
 //!
 //! Source: computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
-//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration that a load leaves,
-//! and the ramp, are this project's (decision 38). The fed-forward friction
-//! is faded out where the piston does not come to rest: more than there is makes a relay. The ramp is an integral that is
-//! forgotten with each new target. Half the acceleration where patience is over (`standstill`) is the reduction of the gain
-//! against a limit cycle (Slotine and Li, Applied Nonlinear Control, ch. 5): a heavy piston that sticks beside its target gives
-//! way to a pulse on the spring of its friction, faster than the curve allows, and with the full gain other pulses push it
-//! back. Whether half is enough says `switching_curve`.
+//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration that a load
+//! leaves, and the ramp, are this project's (decision 38). The fed-forward friction is faded out where the piston does
+//! not come to rest: more than there is makes a relay. The ramp is an integral that is forgotten with each target that
+//! is more than one band from the last one, and when another part drives. Half the acceleration where patience is over
+//! (`standstill`) is the reduction of the gain against a limit cycle (Slotine and Li, Applied Nonlinear Control, ch.
+//! 5): a heavy piston that sticks beside its target gives way to a pulse on the spring of its friction, faster than the
+//! curve allows, and with the full gain other pulses push it back. Whether half is enough says `switching_curve`.
 //!
-//! Assumes: friction and supply as specified: neither is learnt. Load and mass are those of the observer. The force that is
-//! asked for is there at the end of the dead time, as far as the pulses of one period can make it.
+//! Assumes: friction and supply as specified: neither is learnt. Load and mass are those of the observer. The force
+//! that is asked for is there at the end of the dead time, as far as the pulses of one period can make it. If the
+//! supply falls, F_in and F_out are taken for too large, so that the piston brakes too late under a load; what is
+//! missing in motion comes back as load, and in a piston that stands as ramp.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and
 //! [`ForceDemand::force`].

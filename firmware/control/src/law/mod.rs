@@ -24,29 +24,51 @@
 //! | `handover` | which part of the firmware commands the valves |
 //!
 //! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
-//! [`PERIOD_TICKS`] ticks, whole in its last tick, and plan the pulses of the next period to the microsecond.
-//! Gains and thresholds stand in [`crate::tuning`], all of them, each with its unit, its reason and the name of the test
-//! that guards it; what follows from them and from the axis data, in [`AxisModel`]. Formats are those of
-//! [`crate::observer`].
+//! [`PERIOD_TICKS`] (4) ticks, whole in its last tick, and plan the pulses of the next period to the microsecond. The
+//! steps, in the order of the code:
+//!
+//! 1. [`Predictive::drive`] is called in every tick. In the last one of a period it does 2 to 9, in the others only 10.
+//! 2. `observe_period` (`handover`): the observer takes what was sent, and the mean of the last two strokes
+//!    ([`crate::observer`] has its steps). A mass that it has learnt gives new gains (`switching_curve`).
+//! 3. `plan_period`: another target? Then patience begins anew (`standstill`), and the ramp is forgotten.
+//! 4. `preload`: does the piston rest, and is a move announced? Then its force, or no pulse where that stands already.
+//! 5. `seat`, if 4 has nothing to say: is the target an end stop, and the piston there? Then its force, or rest.
+//! 6. `standstill`, if 4 has nothing to say: its state follows from 5, or else from how the piston comes to the target.
+//! 7. `allocation`: the pressure swap begins with a preload, or where the piston stands at an end stop.
+//! 8. F\*: that of 4 or 5. No pulse, where 4 says so, or the state of 6 is PAUSE, CATCH or REST. Otherwise that of the
+//!    position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics` with `switching_curve` in it.
+//! 9. F\*, limited to what the supply can give, becomes two pressures (`allocation`) and these pulses
+//!    (`pulse_planner`).
+//! 10. The on-times of the next tick are cut out of the plan (`due`).
+//!
+//! Gains and thresholds stand in [`crate::tuning`], all of them, each with its unit, its reason, and file and name of
+//! the test that guards it; what follows from them and from the axis data, in [`AxisModel`]. Formats are those of
+//! [`crate::observer`]; beside them k and D 1/s × 2^8, a_b whole mm/s², the ramp mN × 2^8, on-times whole µs.
 //!
 //! The files have times as: T_t tick, T period, T_d dead time from the moment of the observer, T_r dead time from the
 //! tick that works; and the deceleration towards the target as a_b.
 //!
-//! Assumes: a stroke that is true, and delays of the valves that are as specified ([`crate::observer::valve_delay`] says how
-//! they are found). What else each part assumes is in its file. Where that does not hold:
+//! Assumes: a stroke that is true; delays of the valves that are as specified ([`crate::observer::valve_delay`] says
+//! how they are found); ticks of the length for which the [`AxisModel`] was made, none left out. What else each part
+//! assumes is in its file. Where that does not hold:
 //!
 //! | what happens | what follows |
 //! |---|---|
 //! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`): it hands over the last good stroke; two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the data, the air counts as unknown |
 //! | a frozen potentiometer | the node misses the motion (`no_motion_detector.rs` there) |
 //! | no new reference | the node lets the last one run on at its speed for one bus cycle, then stand; when it gives the master up it shuts the valves. The law comes to rest at what it is given |
-//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew |
-//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept, up to the force that is left. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
+//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew, all else goes on |
+//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | shows as load; what is fed forward beyond it makes a relay near the target: it is faded out there (`standstill`) |
 //!
-//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its error shows as
-//! load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction has to stop the piston.
+//! Tests stand at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
+//! `preload` are in `tests.rs` here and in `tests/preload.rs`. What all of it is worth in the closed loop:
+//! `tests/system/control_bars.rs`.
+//!
+//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its
+//! error shows as load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction
+//! has to stop the piston.
 
 mod allocation;
 mod dead_time_predictor;

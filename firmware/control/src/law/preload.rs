@@ -1,23 +1,37 @@
 //! Preload: ahead of an announced move the force stands at the edge of slipping in its direction.
 //!
 //! ```text
-//! F* = ½ Fc sgn(next − x) − load            Fc: Coulomb friction, N; load, N, and x, mm: observer
-//! acts  until |F* − F expected| ≤ Fc/8 and the counter chamber no longer lags; again from |F* − F expected| > Fc/2 on
+//! F* = ½ Fc sgn(next − x₀) − load           the edge of slipping, in the direction of the move
+//! acts  from |F* − F expected| > Fc/2 on, until it is ≤ Fc/8 and the counter chamber no longer lags
 //! ```
 //!
-//! Source: this project (decision 38).
+//! Fc: Coulomb friction, load: as in [`crate::observer::motion`], F expected: pressure force at the end of the dead
+//! time, mN; x₀: stroke at the announcement, next: the announced one, mm. Source: this project (decision 38).
 //!
 //! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
-//! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`). It ends with the announcement, or when
-//! the piston has moved by two bands. Once the force is there, and the counter chamber no longer lags, the valves
-//! stay shut until the force is half the friction off: a piston that rests is not kept at the edge by pulses. The
-//! force alone is not enough: by the pressure swap two full chambers make it, too, and one of them would have to vent
-//! when the move begins.
+//! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`).
 //!
-//! Assumes: at least half of the friction that is told, so that the piston stands; that the observer's load and
+//! **It begins** where a piston is in REST at its target and a move of more than one band is announced; also where one
+//! stands within a millimetre of an end stop, with a target that rests more than a millimetre behind the stop or, if
+//! patience is over, less than one before it. At first it does not act: more than Fc/2 must be missing, as later on.
+//! With the net force N = F expected + load, |½ Fc sgn(next − x₀) − N| is missing. So where N is zero, or points along
+//! the move and is not above Fc, no pulse is sent, and a full counter chamber stays full. An N that points the other
+//! way is turned round.
+//!
+//! **It pauses** once the force is there, and the counter chamber no longer lags: the valves stay shut until the force
+//! is more than half the friction off. A piston that rests is not kept at the edge by pulses. The force alone is not
+//! enough: by the pressure swap two full chambers make it, too, and one of them would have to vent when the move
+//! begins.
+//!
+//! **It ends** with the announcement, or with the rest, which a target ends that is more than one band from the old
+//! one; and for the rest of this announcement when the piston has moved by more than two bands. While it lasts,
+//! `standstill` is not worked out: REST stays REST. Of an announcement that is not followed nothing is left but the
+//! air.
+//!
+//! Assumes: at least half of the friction that is specified, so that the piston stands; that the observer's load and
 //! pressures are right to the other half; the move as announced. If the supply falls, the drive chamber has less than
 //! was estimated: the force is short of the edge, the piston stands, and the move begins later. The counter chamber
-//! vents as before. Of an announcement that is not followed nothing is left but the air.
+//! vents as before.
 //!
 //! Config [`AxisModel`], state [`Preload`], update [`Predictive::preload`].
 
@@ -35,7 +49,8 @@ use crate::tuning::{
 pub(super) struct Preload {
     /// Where the piston stood when it was announced, raw mm; `None` without one.
     place: Option<i32>,
-    /// The force is not there yet, or made by a counter chamber that lags.
+    /// Pulses are sent: more than half of the friction was missing, and the force is not there yet, or is made against a
+    /// counter chamber that lags.
     pub(super) acts: bool,
 }
 
@@ -44,13 +59,13 @@ pub(super) struct Preload {
 pub(super) enum Awaited {
     /// A force, mN.
     Force(i32),
-    /// Nothing: the force is there.
+    /// No pulse: the force is there, or was near enough from the begin.
     Ready,
 }
 
 impl Predictive {
-    /// What an announced move asks for, as it is awaited; `None` if there is none, the piston is on its way,
-    /// or it has begun to move.
+    /// What an announced move asks for, as it is awaited; `None` if there is none, or one of a band at most, and if the
+    /// piston is on its way or has begun to move.
     pub(super) fn preload(
         &mut self,
         model: &AxisModel,

@@ -5,18 +5,28 @@
 //! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
 //! ```
 //!
-//! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean of
-//! the pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project,
+//! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean
+//! of the pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project,
 //! decision 7; flow by ISO 6358-1.
 //!
-//! Pulses are timed to the microsecond and may outlast a period. An opening below the shortest is rounded to that or
-//! to nothing, whichever is nearer. The valve that would undo it shuts as soon as its own pulse allows, and a chamber's
-//! two valves are never on together. Near the target a pulse of one chamber alone: two may be too much of valves that
-//! cannot open for less. No vernier: two pulses are never set against each other for a force below that of the
-//! shortest, so a force is made to half of a shortest opening.
+//! Pulses are timed to the microsecond and may outlast a period: what is left of one is decided again in the next
+//! period, when it may be made longer, but not shorter than the shortest pulse. An opening below the shortest (the
+//! shortest on-time − t_on + t_off) is rounded to that or to nothing, whichever is nearer.
 //!
-//! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected one
-//! alone; delays of the valves as specified within their margin; supply and atmosphere as specified.
+//! Each chamber is planned by itself, for its own pressure. The coils of its two valves are never on together: the
+//! valve that would undo a change goes off as soon as its own pulse allows, and the other one waits for that. Near the
+//! target (`standstill`: within 24 bands for more than four periods), and with no pulse under way, only the longer of
+//! the two chambers' pulses is sent: both may be too much of valves that cannot open for less.
+//!
+//! **Grain.** A chamber has half of a force to make (`allocation`), and is left as it is if half of its shortest
+//! opening would be too much. So the least force that makes a pulse is that of one shortest opening, F_1 of
+//! `switching_curve`. There is no vernier: pulses of A and B whose forces oppose each other come about where both
+//! pressures are to rise, or both to fall, but are not chosen for the small difference of their forces.
+//!
+//! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected
+//! one alone; delays of the valves as specified within their margin; supply and atmosphere as specified. If the supply
+//! falls, a fill valve passes less than planned, the observer counts what was planned, and nothing makes up for it but
+//! the load; vent valves do what they should.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 
@@ -177,6 +187,9 @@ pub(super) fn shut(model: &AxisModel, observer: &Observer, next: u32) -> OnTimes
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::AxisData;
+    use crate::law::allocation::targets;
+    use wheeleg_units::Micros;
 
     const TIMES: ValveTimes = ValveTimes {
         tick: 1000,
@@ -209,6 +222,24 @@ mod tests {
     fn a_chamber_at_its_end_asks_for_a_pulse_that_ends() {
         let ms = opening(0, 1000 << 8, 1 << 20);
         assert!((ms - 20_000).abs() < 100, "{ms}");
+    }
+
+    /// Of a piston in balance at mid stroke the least force that makes a pulse is that of the finest one: each chamber has
+    /// half of it to make, and half of what its shortest opening makes is enough for a pulse.
+    #[test]
+    fn the_least_force_that_makes_a_pulse_is_that_of_the_finest() {
+        let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
+        let mut observer = Observer::new(&model, targets(&model, 0));
+        observer.start_at(model.stroke / 2);
+        for sign in [-1, 1] {
+            let makes_a_pulse = |force: &i32| {
+                let target = targets(&model, sign * force);
+                plan(&model, &observer, target, 0, true) != [0; 4]
+            };
+            let least = (0..5_000).find(makes_a_pulse).expect("a pulse");
+            let share = f64::from(least) / f64::from(model.pulse_force);
+            assert!((0.9..1.25).contains(&share), "{sign}: {share}");
+        }
     }
 
     #[test]

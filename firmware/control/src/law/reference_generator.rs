@@ -12,17 +12,27 @@
 //! r(i) = r(i−1) + v(i) T_t
 //! ```
 //!
-//! r, measured, target, d, e, ℓ in mm; v, v*, v_max in mm/s; a in mm/s². Source: the profile is text-book (Biagiotti and
-//! Melchiorri, Trajectory Planning for Automatic Machines and Robots); the governor is that of Gilbert and Kolmanovsky
-//! in its simplest form: only the pace is held back, never the target.
+//! r, measured, target, d, e, ℓ in mm; v, v*, v_max in mm/s; a in mm/s². Source: the profile is text-book (Biagiotti
+//! and Melchiorri, Trajectory Planning for Automatic Machines and Robots); the governor is that of Gilbert and
+//! Kolmanovsky in its simplest form: only the pace is held back, never the target.
 //!
-//! A reference that runs away from a piston that has not begun to move asks for a speed that no
-//! valve gives: the piston then overshoots. For a piston that is stuck the reference goes on braking from 2 ℓ on: it
-//! stops at most 2 ℓ + v²/(2 a) ahead, v being its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s,
-//! 1500 mm/s² and 4 mm). Where the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever watches
-//! the piston must compare it with the command.
+//! It ends, r = target and v = v_target, as soon as a step would reach the target; this last change of v may be more
+//! than a T_t. A new target, at any time, is gone for from the present r and v.
 //!
-//! Assumes: v_max and a that the axis can follow; a measured stroke that is true; a target that rests or moves evenly.
+//! A reference that runs away from a piston that has not begun to move asks for a speed that no valve gives: the piston
+//! then overshoots. For a piston that is stuck the reference goes on braking from 2 ℓ on: it stops at most 2 ℓ + v²/(2
+//! a) ahead, v being its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s, 1500 mm/s² and 4 mm). Where
+//! the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever watches the piston must
+//! compare it with the command.
+//!
+//! Assumes: a tick of 1 ms and a call in every tick, whatever tick the law is made for (the joint board has this tick,
+//! and calls it in `firmware/node/src/joint/reference.rs`); v_max and a that the axis can follow; a measured stroke
+//! that is true; a target that rests or moves evenly. If the supply falls, the piston lags, and the governor keeps the
+//! reference by it.
+//!
+//! Config [`GeneratorConfig`], state [`Reference`], update [`Reference::update`]; without an acceleration in the
+//! board's parameters it is left out, and the law follows the command. Guarded by the tests at the end of this file: it
+//! has no row in [`crate::tuning`], its numbers are parameters of the board.
 
 use crate::math::square_root;
 use wheeleg_units::{PositionMm, VelocityMmS};

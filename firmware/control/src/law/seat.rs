@@ -1,8 +1,9 @@
 //! The seat at an end stop: where the target is a stop, a force instead of a position.
 //!
 //! ```text
-//! F* = ±min(3 Fb, F_in)                  toward the stop; Fb: break-away friction, F_in: largest retracting force, N
-//! rest: |v| < 3 mm/s, within 1.5 mm of the target, and F expected > ¾ F* towards the stop
+//! seat: the target rests within 0.5 mm of the stop or behind it, the piston is within 3 mm of it and at most 60 mm/s fast
+//! F*  = ±min(3 Fb, F_in)                 toward the stop; Fb: break-away friction, F_in: largest retracting force, mN
+//! rest: within 1.5 mm of the target, |v| < 3 mm/s, and F expected > ¾ F* towards the stop
 //! ```
 //!
 //! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
@@ -10,14 +11,22 @@
 //! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then
 //! full, or the other empty: by the pulses that made the force, from which the observer follows the air as
 //! everywhere. It is not told that this is a stop. An axis without precharge has no seat: the air of it would make a
-//! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`). A piston at rest here is pressed
-//! again when it is 1.5 mm off its target; a new target ends the seat.
+//! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
+//!
+//! A piston that rests here is pressed again when it is 1.5 mm off its target, not before: what its force has become
+//! does not count. **The seat ends** as soon as its condition above does not hold: a target 0.5 mm or more from the
+//! stop, a reference faster than 1 mm/s, a piston 3 mm off or faster than 60 mm/s. A new target as near to the stop as
+//! the old one ends nothing. A preload goes before the seat. What was PRESS goes on as SERVO; what was REST, by the
+//! rules of REST (`standstill`).
 //!
 //! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
 //! and Craig 1981).
 //!
-//! Assumes: the length of the stroke, as specified, is right to 0.5 mm; break-away friction and supply as specified; chambers that a
-//! precharge has filled, so that the expected force is right to a quarter.
+//! Assumes: the length of the stroke, as specified, is right to 0.5 mm; break-away friction and supply as specified;
+//! chambers that a precharge has filled, so that the expected force is right to a quarter. If the supply falls, the
+//! expected force is too high, and the piston rests pressed by less than 3 Fb.
+//!
+//! Config [`AxisModel`]; no state of its own: PRESS and REST are those of `standstill`. Update [`Predictive::seat`].
 
 use super::Predictive;
 use crate::axis::AxisModel;

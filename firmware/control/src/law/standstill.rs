@@ -1,35 +1,55 @@
 //! Standstill: when the valves stay shut, a state machine.
 //!
 //! ```text
-//!           in the band and slow, or friction stops it there   for more than REST_PERIODS
+//!           in the band and slow, or friction stops it there   for more than 6 periods
 //!  SERVO ───────────────────────────────────────────────► CATCH ─────────────────► REST
-//!    ▲ │ ▲                                                  │                        │
-//!    │ │ └──────────────────────────────────────────────────┘                        │
-//!    │ └─► PAUSE   patience is over and it entered the band: one oscillation with the valves shut
-//!    └──────────────────────────────────────────────────── out of the release band ──┘
-//!  PRESS: at an end stop a force is controlled (`seat`); it ends in REST once the piston is pressed, in SERVO when
-//!         the target is no stop any more
+//!   │ ▲ ▲                                                   │                        │
+//!   │ │ └───────────── no longer so ────────────────────────┘                        │
+//!   │ └─────────────── released ─────────────────────────────────────────────────────┘
+//!   └─► PAUSE   patience is over and the piston enters the band: valves shut, for one oscillation at most
+//!  PRESS: at an end stop a force is controlled (`seat`): REST once the piston is pressed, otherwise as from SERVO when
+//!         the seat ends
 //! ```
 //!
-//! * **Stopping distance.** With shut valves friction alone stops the piston in the band if
-//!   F_s (|e| − band) < m v²/2 < F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target;
-//!   counted on within 12 bands of it and while F_s is at least Fc/4.
-//! * **Patience.** What does not come to rest near its target for long may do so in a wider band, up to 2.4 times
-//!   and 0.4 mm, the friction that is fed forward fades, and a heavy piston is asked for half the acceleration
-//!   (`inverse_dynamics`). Each time it enters that band the law waits with the
-//!   valves shut for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB): no limit
-//!   cycle lasts.
-//! * **Release.** At rest nothing switches until the error has left the band of release for some periods; at once with
-//!   a new target.
+//! Worked out once a period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The
+//! valves are shut in CATCH, PAUSE and REST. All but REST and PRESS follow from the period alone: CATCH, if the piston
+//! is caught; if not, PAUSE, if one is under way; otherwise SERVO.
 //!
-//! e: error, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m: mass, kg; n = 1.2; p, V:
-//! mean pressure, Pa, and volume of each chamber at mid stroke, m³; AA, AB: areas, m²; k_air: N/m; T_o: s.
+//! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (|e| − band) < m v²/2 <
+//!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target; counted on within 12
+//!   bands of it and while F_s is at least Fc/4.
+//! * **Patience** counts the periods within 24 bands of a target that rests, and down again otherwise; not in REST. It
+//!   is over after 100 (0.4 s). Then a heavy piston is asked for half the acceleration (`inverse_dynamics`); the
+//!   friction that is fed forward fades, between 132 and 260 periods; and from 220 on band and slow speed grow, up to
+//!   2.4 times at 400, the band to 0.4 mm at most. Each target more than one band from the last one begins with all of
+//!   its patience.
+//! * **Pause.** Where patience is over, the law waits with the valves shut each time the piston enters the band at 40
+//!   mm/s at most, for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB), 25
+//!   to 250 periods: no limit cycle lasts. The pause ends before that when the piston is faster than 40 mm/s, or more
+//!   than 2 mm off, with a new target, or when the reference moves; a period counts for eight while the piston stands
+//!   (|v| < 3 mm/s) beside the band. It goes on counting in CATCH.
+//! * **Release.** REST ends
+//!   - at once, when the reference moves (faster than 1 mm/s);
+//!   - at once, when it has gone more than one band from the target of this rest, if the stroke measured is also out of
+//!     the band of release there. A new target so near that it is not, ends no rest: it becomes the target of it;
+//!   - without a new target, in the fifth period in a row out of the band of release. Then patience goes on from 100
+//!     periods at least.
 //!
-//! Assumes: friction of at least 0.85 of the specified one, where it is counted on; that shut valves hold the air, so that a
-//! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
-//! rest stays there: nothing of it asks for air. One on its way may lack the force to arrive: it stays in SERVO, its
-//! band widens no further than 2.4 times, and supervision sees the error. REST learns nothing about the force: a load that
-//! grows beyond friction moves the piston out of the band of release, and SERVO acts again.
+//!   The band of release is the present band and one of the axis data more, but at most 0.45 mm or, where that is more,
+//!   the present band and half of that of the axis data. If the axis data's release is more, it counts, but not for a
+//!   new target.
+//! * A reference that moves faster than 1 mm/s is never rested at: SERVO.
+//!
+//! e: error of the estimated stroke, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m:
+//! mass in use, kg; n = 1.2; p: mean of supply and atmosphere, Pa; VA, VB: volume of each chamber at mid stroke, m³;
+//! AA, AB: areas, m²; k_air: N/m; T_o: s. Bands are those of the axis data, in raw mm; times in periods of 4 ms.
+//!
+//! Assumes: friction of at least 0.85 of the specified one, where it is counted on; that shut valves hold the air, so
+//! that a piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a
+//! piston at rest stays there: nothing of it asks for air. One on its way may lack the force to arrive: it stays in
+//! SERVO, its band widens no further than 2.4 times, and supervision sees the error. REST learns nothing about the
+//! force: a load that grows beyond friction moves the piston out of the band of release, and SERVO acts again, with the
+//! ramp as it was.
 //!
 //! Source: hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
 //! pause are our own, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
@@ -73,15 +93,15 @@ pub(super) struct Standstill {
     state: State,
     /// Raw mm.
     target: i32,
-    /// The target has changed since the piston came to rest.
+    /// The target has changed, and the piston has not come to rest at the new one.
     aimed: bool,
-    /// Periods near the target without coming to rest.
+    /// Periods near the target without coming to rest: patience is over beyond [`PATIENCE`].
     near: u16,
     /// In the band in the last period.
     inside: bool,
     /// Periods in [`State::Catch`].
     caught: u16,
-    /// What is left of the pause under way, periods.
+    /// What is left of the pause under way, periods; 0 without one.
     pause: u16,
     /// Periods outside the band of release.
     outside: u16,
@@ -121,7 +141,7 @@ impl Standstill {
         self.near > NEAR_PERIODS
     }
 
-    /// Takes over the reference; gives whether it is another target.
+    /// Takes over the reference; gives whether it is another target: more than one band from the last one.
     pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
         let other = reference.saturating_sub(self.target).saturating_abs() > model.band;
         if other {

@@ -11,26 +11,35 @@
 //! m_n   = 0.60 · ½ Ḟ / (a_b k)               with s = 1; Ḟ: how fast both valves change the force at mid stroke
 //!
 //! half of the acceleration is enough:  m D k band > F_1
+//! F_1   = n C ρ0 R T0 p_m AB/VB (t_off + margin)      the shortest opening of B's vent valve at mid stroke and mean pressure
 //! ```
 //!
-//! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time, s;
-//! m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
-//! [`crate::observer::pressure`]. `inverse_dynamics` may lower a_b under a load.
+//! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time,
+//! s; m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
+//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as there, p_m as in
+//! `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm. `inverse_dynamics` may lower
+//! a_b under a load.
 //!
-//! **Half is enough.** An error of the rest band asks for the force m D k band (`inverse_dynamics`, at rest), and half of
-//! the finest pulse, F_1 in mN, is what [`super::pulse_planner`] still sends a pulse for. So where the condition holds half of the
-//! acceleration still brings a piston into the band, and the rest only drives it on: `inverse_dynamics` does without it
-//! where patience is over. Where it does not hold, which is for light pistons, half of it would ask for no pulse at all.
+//! **Half is enough.** A piston that stands off its target by e is asked to move by the force m D k e
+//! (`inverse_dynamics`), with friction and ramp beside it. Two halves meet on its way to the valves: `allocation` gives
+//! half of a force to each chamber, and `pulse_planner` sends a pulse for more than half of what the shortest opening
+//! makes. So the least force that makes a pulse is ½ F_1 / ½ = F_1, not ½ F_1. Where the condition holds, all of the
+//! acceleration makes a pulse from one band on, and half of it from two bands on: there a piston at rest is released,
+//! too, and the band in which it may rest grows to 2.4 bands (`standstill`). More than that only drives a heavy piston
+//! on: `inverse_dynamics` takes half of it where patience is over. Where the condition does not hold, which is for
+//! light pistons, half of it would make no pulse within two bands.
 //!
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot
 //! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
 //! serves 1 and 400 mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are
 //! searched ([`crate::tuning`]). e_l does not depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as specified, the mass that is in use; and that a force can be built up within
-//! about a dead time, which the nimble mass stands for.
+//! Assumes: dead time, supply and conductance as specified, the mass that is in use; and that a force can be built up
+//! within about a dead time, which the nimble mass stands for. If the supply falls, the curve stays as it is: the force
+//! that it asks for comes later or not at all, and the piston falls behind it or runs past the target.
 //!
-//! Config [`AxisModel`] and [`SpeedGains`]; no state; update [`speed`].
+//! Config [`AxisModel`] and [`SpeedGains`], which is made anew with each mass that is learnt; no state; update
+//! [`SpeedGains::speed`].
 
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
@@ -48,7 +57,7 @@ pub(super) struct SpeedGains {
     pub(super) brake: i32,
     /// 1/(2 k²), s² × 2^32.
     linear: i32,
-    /// Half of the acceleration is enough near the target: it still makes a pulse where the rest band ends.
+    /// Half of the acceleration is enough near the target: it makes a pulse from two rest bands on.
     pub(super) half_is_enough: bool,
 }
 

@@ -6,12 +6,15 @@
 //!      = √(1 − ((r − b)/(1 − b))²)     otherwise
 //! ```
 //!
-//! q: mass flow, kg/s; p₁, p₂: pressure upstream and downstream, Pa absolute; C: sonic conductance, m³/(s Pa);
-//! b: critical pressure ratio, given by the axis data, as is C; ρ0 = 1.185 kg/m³: density of the reference atmosphere of
+//! q: mass flow, kg/s; p₁, p₂: pressure upstream and downstream, Pa absolute; C: sonic conductance, m³/(s Pa); b:
+//! critical pressure ratio, given by the axis data, as is C; ρ0 = 1.185 kg/m³: density of the reference atmosphere of
 //! ISO 8778 (20 °C, 1 bar, 65 %). Source: ISO 6358-1, with its factor √(T0/T1) taken as 1.
 //!
 //! Assumes: all air upstream at 293 K (20 K more are 3 % less flow); one C and one b for filling and venting; a valve
-//! that is open, or shut, and nothing between.
+//! that is open, or shut, and nothing between. The supply is that of the axis data: if it falls, less flows than is
+//! counted.
+//!
+//! Config [`FlowCurve`]; no state; update [`FlowCurve::choked_equivalent`].
 
 use crate::math::{mul_shr, square_root};
 

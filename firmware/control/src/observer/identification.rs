@@ -7,14 +7,21 @@
 //!   wA = AA (pA⁺ − pA⁻)      width of the bounds, as a force        u: error of the pressure as a share of it
 //! ```
 //!
-//! J in mN · periods, w in mN, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's error fades as a chamber is filled, is vented or grows, in the same way as the
-//! widths; that distinguishes it from mass and load. Normal equations of the four unknowns, with a ridge that holds
-//! the shares at zero where the move reveals little.
+//! J in mN · periods, w in mN, u within ±1, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's
+//! error fades as a chamber is filled, is vented or grows, in the same way as the widths; that distinguishes it from
+//! mass and load. Normal equations of the four unknowns, summed in every move, with a ridge that holds the shares at
+//! zero where the move reveals little.
+//!
+//! Solved once, when a move has ended that tells a mass ([`super::mass`]) and in which the bounds were far apart. Its
+//! mass replaces the one by three instants; the pressures are corrected by u times the width of their bounds, within
+//! these, and an eighth of the width on either side stays in doubt ([`super::pressure::Chamber::correct`]). Equations
+//! that do not tell the unknowns apart leave the mass by three instants, and the pressures.
 //!
 //! Source: Ljung, System Identification, ch. 7; ridge: Hoerl and Kennard 1970.
 //!
-//! Assumes: load and friction that are constant in the move. At a standstill nothing is learnt: then a pressure cannot be distinguished
-//! from a load (Pandian et al. 2002).
+//! Assumes: load and friction that are constant in the move, so none that ends in a cushion; bounds that hold the true
+//! pressures. If the supply has fallen, they may not ([`super::pressure`]), and what is found is limited to them. At a
+//! standstill nothing is learnt: then a pressure cannot be distinguished from a load (Pandian et al. 2002).
 //!
 //! Config [`AxisModel`], state [`Regression`], updates [`Regression::add`] and [`Regression::solve`].
 

@@ -8,23 +8,34 @@
 //! m    = T (J − J line) / (v − v line)                at the fastest; line: from the first to the last instant
 //! ```
 //!
-//! F: pressure force, mN; d: viscous friction, mN s/mm; v: speed, mm/s; m: mass, kg; c: Coulomb friction less load, mN;
-//! J in mN · periods.
-//! Three instants of the move tell m from c: where it begins to slide, where it is
-//! fastest, and where it ends. What lies on the straight line from the first to the last
-//! is due to c; what the fastest has above that line is due to m, in J as in v. Source: Newton's second law,
-//! integrated; the derivation is this project's.
+//! F: pressure force, mN; d: viscous friction, mN s/mm; v: speed, mm/s; m: mass, kg (× 2^16); c: Coulomb friction less
+//! load, mN; J in mN · periods. Three instants of the move tell m from c: where it begins to slide, where it is
+//! fastest, and where it ends. What lies on the straight line from the first to the last is due to c; what the fastest
+//! has above that line is due to m, in J as in v. Source: Newton's second law, integrated; the derivation is this
+//! project's.
 //!
-//! Where the bounds of the pressures are far apart, as after a power-up with air that nobody knows, the force is wrong by
-//! more than the mass needs: there the mass comes with the pressures from [`super::identification`].
+//! **A move** begins when |v| is above 20 mm/s. It ends when |v| is not any more, when v has changed its sign, or after
+//! 1 s. It tells a mass if it took at least 80 ms, was 200 mm/s fast, and 100 mm/s above the line; otherwise nothing
+//! changes.
+//!
+//! Where the bounds of the pressures are far apart in such a move (in the mean by more than a quarter of the largest
+//! force), as after a power-up with air that nobody knows, the force is wrong by more than the mass needs: there the
+//! mass comes with the pressures from [`super::identification`].
 //!
 //! **Doubt.** The peak above the line is a small difference of large impulses, and in a long move at nearly one speed a
 //! viscous friction or a pressure that is a little off passes for a mass of a quarter of the true one. A mass below the
-//! least that can be (0.6 of that specified: rod and carriage stay) is therefore ignored until the next move
-//! tells it, too; then that bound is taken. Believed at once, it makes the next move overshoot.
+//! least that can be (0.6 of that specified: rod and carriage stay) is therefore ignored, with the pressures found
+//! beside it, until the next move that tells a mass tells it, too; then that bound is taken. Believed at once, it makes
+//! the next move overshoot. The most that is taken is 12 times that specified.
+//!
+//! **Cushion and end stop** are not known here, other than in [`super::motion`]. A move that ends in one has been
+//! braked by an impulse that J lacks: so J line at the fastest is too high by a share of it, and the mass comes out too
+//! small. The same bound and doubt are all that holds against it.
 //!
 //! Assumes: the load does not come or go in the move; axes for which it does switch it off
 //! ([`crate::axis::AxisData::learns_mass`]). Viscous friction and supply as specified, within what doubt makes up for.
+//! If the supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J
+//! line: no more than the two bounds let through.
 //!
 //! Config [`AxisModel`], state [`MassEstimator`], update [`MassEstimator::update`].
 

@@ -10,11 +10,30 @@
 //! | [`mass`] | moving mass, from three instants of a move | pressure force, speed |
 //! | `identification` | mass and pressures from one move, where those are not known | the same, bounds |
 //!
-//! All of it once in a period of [`PERIOD_TICKS`] ticks, in this order ([`Observer::update`]). The law in
-//! [`crate::law`] only reads it.
+//! All of it once in a period of [`PERIOD_TICKS`] ticks, by [`Observer::update`], in this order:
 //!
-//! Stroke and speed are raw I16F16 mm and mm/s, pressures 1/256 Pa absolute, forces mN, accelerations mm/s²,
-//! times µs or s × 2^32. Chamber A extends the piston; positive forces and speeds extend.
+//! 1. Where the piston was in this period: `trajectory`, as foreseen at the end of the last one.
+//! 2. Chamber A, then B: what was sent becomes openings (`valve_delay`), these become flow (`flow`), and that the
+//!    pressure at the moment, the expected one at the end of the dead time, and the bounds (`pressure`).
+//! 3. The pressure force, and its mean over the period.
+//! 4. `motion`: stroke and speed predicted with that mean, then corrected with the measured stroke; with them the load.
+//! 5. `trajectory` of the next period.
+//! 6. `mass`, where the axis learns it: one period more of the move under way. Where it has ended, mass and, by
+//!    `identification`, pressures are corrected; the load gives back what the pressures had wrong.
+//!
+//! The law in [`crate::law`] only reads it. All estimates hold at the **moment** of the period: between its last two
+//! ticks, whose strokes are averaged, 2.5 ticks after its begin. The expected pressures hold at the end of the dead
+//! time.
+//!
+//! Stroke and speed are raw I16F16 mm and mm/s, pressures 1/256 Pa absolute, forces and load mN, accelerations mm/s²,
+//! masses kg × 2^16, times µs or s × 2^32, shares × 2^16 unless stated. All are `i32`. Chamber A extends the piston;
+//! positive forces and speeds extend.
+//!
+//! If the supply falls, nothing here notices. A chamber that is filled is taken for fuller than it is, which shows as
+//! load while the piston slides and not at all while it stands ([`pressure`], [`motion`], [`mass`] say what follows).
+//!
+//! Tests stand at the end of each file. State [`Observer`]. A board makes a new one, at rest and with unknown air,
+//! after a sensor's fault and with other axis data.
 
 pub mod flow;
 mod identification;

@@ -3,11 +3,11 @@
 //!
 //! ```text
 //! predict   m dv/dt = F + load − d v − 0.92 Fc sgn v        F = pA AA − pB AB − pa (AA − AB)
-//!           stuck: |v| small and |F + load| < Fb, or pressed against an end stop
+//!           stuck: |v| < 4 mm/s and |F + load| < Fb, or pressed against an end stop; then v ← 0.59 v instead
 //! correct   ε = x measured − x predicted                    θ: weight of a period against the next
 //!           x += (1 − θ³) ε
 //!           v += 3/2 (1 − θ)² (1 + θ) ε / T
-//!           load += c m (1 − θ)³ ε / T²                     not while stuck, nor in a cushion
+//!           load += c m (1 − θ)³ ε / T²                     not while stuck, nor on the way into a cushion
 //! ```
 //!
 //! Source: gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
@@ -24,8 +24,15 @@
 //! | m | kg | mass, as specified or learnt |
 //! | T | s | period |
 //!
+//! ε counts up to ±8 mm, the load up to the largest force of the supply. **Pressed against an end stop** is a piston
+//! within a millimetre of it with F + load toward it, unless it comes back from it at 20 mm/s or more. **In a cushion**
+//! is one within 6 mm of an end, on its way there: what brakes it there is no load. **Stuck ends** with the period in
+//! which its condition does not hold.
+//!
 //! Assumes: a load that is constant but for corrections, the mass of the estimator beside it, friction between half and
-//! twice the specified one. With these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load.
+//! twice the specified one. With these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as
+//! load. If the supply falls, F is wrong by what the filled chamber lacks; the load takes that off again, within some
+//! 20 ms of sliding. Of a piston that is stuck the load stays what it was: F + load is then wrong until it slides.
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 

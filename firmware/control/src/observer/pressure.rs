@@ -1,13 +1,16 @@
 //! Pressure observer: ISO 6358 flow into a polytropic chamber, with the bounds of what is known.
 //!
 //! ```text
-//! Δp = n (K p_s ψ(p/p_s) t_fill − K p ψ(p_a/p) t_vent − p v T) / L         K = C ρ0 R T0 / A
-//! Δp⁻, Δp⁺: the same, from the lowest and the highest pressure that can be
+//! Δp = n (K p_s ψ(p̄/p_s) t_fill − K p̄ ψ(p_a/p̄) t_vent − p v T) / L         K = C ρ0 R T0 / A
+//! p̄  = (p + p expected a period ago) / 2           for p, and for p expected, too
+//! Δp⁻, Δp⁺: the same with p⁻, p⁺ for both p and p̄
 //! ```
 //!
 //! | | unit | |
 //! |---|---|---|
-//! | p, p_s, p_a | Pa | pressure of the chamber, of the supply, of the atmosphere, absolute |
+//! | p, p_s, p_a | Pa | pressure of the chamber at the last moment, of the supply, of the atmosphere, absolute |
+//! | p⁻, p⁺ | Pa | bounds of p: at first p_a and p_s |
+//! | p expected | Pa | pressure at the end of the dead time |
 //! | t_fill, t_vent | s | for how long each valve was open at the chamber in the period |
 //! | T | s | the period |
 //! | v | mm/s | speed of the piston, positive where the chamber grows |
@@ -18,19 +21,20 @@
 //!
 //! Source: chamber of Bobrow and McDonell 1998 and Pandian et al. 2002; flow of ISO 6358-1.
 //!
-//! Open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber
-//! ends at the supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone
-//! in p, so both bounds keep their order, and their distance says how far the estimate can be off. Only the
-//! identification of a move uses the bounds (`identification`); they hold as long as the assumptions do.
+//! Open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber ends at the supply and a
+//! venting one at the atmosphere, whatever was assumed before. The flow is monotone in p, so both bounds keep their
+//! order, and their distance says how far the estimate can be off. The estimate itself is not held within them: its
+//! flow is that at p̄, so it may lie beside them by the error of a step. Only the identification of a move uses the
+//! bounds ([`super::mass`] by their distance, `identification`); they hold as long as the assumptions do.
 //!
 //! Assumes: supply and atmosphere as specified, tight seals, no flow but through the valves. If the supply is lower, a
 //! chamber that is filled ends below the estimate, and below p⁻, too: the bounds hold no longer. Venting brings
 //! both back.
 //!
-//! One explicit step a period and chamber, at the mean of the pressure and that expected a period ago; then one more over the
-//! dead time, with the pulses that are under way, for the expected pressure. No step goes beyond what valves and
-//! motion can do: the supply to fill, the atmosphere to vent, else half the atmosphere and 2.1 MPa. So a chamber however small
-//! is stable.
+//! One explicit step a period and chamber from moment to moment, with the mean length and speed of that time; then one
+//! over the dead time, with the pulses that are under way and the speed of the moment, for the expected pressure; and
+//! one for each bound. No step goes beyond what valves and motion can do: while a fill valve is open, the supply; while
+//! a vent valve is, the atmosphere; else half the atmosphere and 2.1 MPa. So a chamber however small is stable.
 //!
 //! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 

@@ -5,11 +5,16 @@
 //! end    = middle + (v + Δv/2) T/2 + v T_d     where the pulses of the next period act
 //! ```
 //!
-//! x: stroke, mm; v: speed, mm/s, both of the moment; Δv: what it gained in the last period; T: period, T_d: dead time, s.
-//! Source: this project, decision 7; a Taylor series of the motion, cut off.
+//! x: stroke, mm; v: speed, mm/s, both of the moment; Δv: what it gained in the last period; T: period, T_d: dead time,
+//! s. Source: this project, decision 7; a Taylor series of the motion, cut off.
 //!
-//! Assumes: the acceleration of the last period for one more, and constant speed beyond: it is not counted on for longer,
-//! because the air that is squeezed pushes back, the more the shorter a chamber is.
+//! Where the end would be beyond an end stop, it is the stop, and the speed in the dead time counts as 0.
+//!
+//! Assumes: the acceleration of the last period for one more, and constant speed beyond: it is not counted on for
+//! longer, because the air that is squeezed pushes back, the more the shorter a chamber is. The supply is not used.
+//!
+//! Config [`AxisModel`]; made anew in each period ([`PeriodTrajectory::of`]) from the corrected motion, used in the
+//! next.
 
 use super::motion::Motion;
 use crate::axis::AxisModel;

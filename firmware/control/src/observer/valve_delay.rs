@@ -4,19 +4,21 @@
 //! coil on at t       the valve opens at t + t_on, the chamber sees it at t + t_on + t_line
 //! coil off at t      it shuts at t + t_off, the chamber sees it at t + t_off + t_line
 //! on for < t_on      it never opens          off for < t_off    it never shuts
+//! opening            = on-time − t_on + t_off
 //! ```
 //!
 //! A pure dead time for each direction, and the wave's travel time through the line at the speed of sound.
 //! Source: data sheets of on/off valves, "response time" (SMC series VQ100, Festo series MHE2). Whole µs, on the
 //! on-times that are sent.
 //!
-//! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data is for
-//! what they differ by. A valve that is open, or shut, and nothing between.
+//! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data is
+//! for what they differ by. A valve that is open, or shut, and nothing between; no more than four changes of one valve
+//! under way. A supply that falls changes nothing here: times are counted, not air.
 //!
 //! Nothing here finds a delay: it is axis data. A search at start-up (`host-sim/studies/src/axis_sim/delay_probe.rs`,
-//! in `wheeleg compare` and `tune`) sends a fill valve pulses that grow by 50 µs until the piston moves: the shortest that
-//! moves it is t_on. t_off cannot be seen so; it is taken to differ from its data sheet by the same factor. What does not
-//! move, after a second search with empty chambers, keeps the data sheet's.
+//! in `wheeleg compare` and `tune`) sends a fill valve pulses that grow by 50 µs until the piston moves: the shortest
+//! that moves it is t_on. t_off cannot be seen so; it is taken to differ from its data sheet by the same factor. What
+//! does not move, after a second search with empty chambers, keeps the data sheet's.
 //!
 //! Config [`ValveTimes`], state [`ValveTrack`], updates [`ValveTrack::energise`] and [`ValveTrack::passes`].
 

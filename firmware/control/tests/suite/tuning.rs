@@ -1,4 +1,4 @@
-//! The table of gains and thresholds: every row is guarded by a test that exists.
+//! The table of gains and thresholds: every row is guarded by a test that stands where the row says.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,7 +17,7 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Names of the functions that follow a `#[test]` in this crate.
+/// `file::name` of the functions that follow a `#[test]` in this crate.
 fn tests() -> BTreeSet<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
@@ -26,20 +26,23 @@ fn tests() -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for path in paths {
         let text = fs::read_to_string(&path).expect("a file");
+        let file = path.strip_prefix(root).expect("below the root").display();
         for after in text.split("#[test]").skip(1) {
             let name = after
                 .split_once("fn ")
                 .and_then(|(_, rest)| rest.split_once('('));
-            names.extend(name.map(|(name, _)| name.to_owned()));
+            names.extend(name.map(|(name, _)| format!("{file}::{name}")));
         }
     }
     names
 }
 
 #[test]
-fn every_row_has_unit_reason_and_a_test_that_exists() {
+fn every_row_has_unit_reason_and_a_test_where_it_says() {
     let tests = tests();
-    assert!(tests.contains("every_row_has_unit_reason_and_a_test_that_exists"));
+    assert!(
+        tests.contains("tests/suite/tuning.rs::every_row_has_unit_reason_and_a_test_where_it_says")
+    );
     assert!(TABLE.len() > 50, "{} rows", TABLE.len());
     let names: BTreeSet<_> = TABLE.iter().map(|row| row.name).collect();
     assert_eq!(names.len(), TABLE.len(), "a name twice");

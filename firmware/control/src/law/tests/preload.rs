@@ -107,6 +107,24 @@ fn a_preload_is_there_once_the_counter_chamber_has_vented() {
     }
 }
 
+/// An announced move finds the piston in balance, or pushed along: half of the friction is missing at most, and no pulse
+/// is sent; pushed the other way by however little, it is turned round.
+#[test]
+fn a_preload_from_balance_sends_nothing() {
+    let awaited = |net: i32| {
+        let (model, mut law) = at_a_stop(900, 0, 5);
+        law.standstill.seat(true);
+        law.observer.motion.load = net - model.pressure_force(law.observer.expected());
+        law.preload(&model, &announced(150, 200, input(90, 90)), true)
+    };
+    for net in [0, 5_000, 10_000] {
+        assert_eq!(awaited(net), Some(Awaited::Ready), "{net}");
+    }
+    for net in [-1, -9_000, 10_001] {
+        assert!(matches!(awaited(net), Some(Awaited::Force(_))), "{net}");
+    }
+}
+
 /// One that acts goes on while more than an eighth of the 10 N of friction is missing.
 #[test]
 fn a_preload_acts_until_an_eighth_of_the_friction_is_missing() {
