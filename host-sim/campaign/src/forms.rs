@@ -40,6 +40,9 @@ pub struct StatusForm {
     pub missing_blocks: Vec<u64>,
     /// Parts that cannot be read or belong to another plan.
     pub bad_parts: Vec<BadPart>,
+    /// Files that nobody reads: of processes that were killed, and temporary ones of other computers, which may
+    /// be writing them.
+    pub leftovers: Vec<String>,
 }
 
 /// Why cases failed.
@@ -105,6 +108,9 @@ impl StatusForm {
             status: counts.map(|(status, n)| (status.name(), n)).collect(),
             missing_blocks: state.missing.clone(),
             bad_parts: bad.collect(),
+            leftovers: (state.leftovers.iter())
+                .map(|path| path.display().to_string())
+                .collect(),
         }
     }
 }

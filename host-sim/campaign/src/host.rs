@@ -25,7 +25,7 @@ pub(crate) fn processor() -> String {
     std::env::consts::ARCH.to_owned()
 }
 
-/// A part of a file's name that no other process has.
+/// A part of a file's name that no other process has: computer, [`scope`], number of the process, time, count.
 pub(crate) fn unique() -> String {
     use std::sync::atomic::{AtomicU64, Ordering};
     static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -34,5 +34,66 @@ pub(crate) fn unique() -> String {
     let ns = now.map_or(0, |t| t.as_nanos());
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
     let host: String = name().chars().map(plain).take(32).collect();
-    format!("{host}-{}-{ns:x}-{count}", std::process::id())
+    let scope = scope().unwrap_or_else(|| UNKNOWN.to_owned());
+    format!("{host}-{scope}-{}-{ns:x}-{count}", std::process::id())
+}
+
+/// The scope of a computer that does not say it.
+const UNKNOWN: &str = "unknown";
+
+/// Where a number means one process: this start of this kernel, and its namespace of processes. Computers may
+/// have one name, and so may containers of a computer, in which a number is another process.
+fn scope() -> Option<String> {
+    let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
+    let namespace = std::fs::read_link("/proc/self/ns/pid").ok()?;
+    let whole = format!("{} {}", boot.trim(), namespace.display());
+    Some(blake3::hash(whole.as_bytes()).to_hex()[..8].to_owned())
+}
+
+/// Whether the process that made a name by [`unique`] still lives. `None` where that cannot be known: of a
+/// process of another computer, or of this one before it was started again.
+pub(crate) fn lives(unique: &str) -> Option<bool> {
+    let mut fields = unique.rsplit('-').skip(2);
+    let (process, of) = (fields.next()?, fields.next()?);
+    if scope()? != of {
+        return None;
+    }
+    is_there(process.parse().ok()?)
+}
+
+#[cfg(unix)]
+fn is_there(process: i32) -> Option<bool> {
+    use rustix::io::Errno;
+    use rustix::process::{Pid, test_kill_process};
+    let process = Pid::from_raw(process).filter(|_| process > 0)?;
+    // A process of somebody else may not be signalled, and lives.
+    Some(test_kill_process(process) != Err(Errno::SRCH))
+}
+
+#[cfg(not(unix))]
+fn is_there(_: i32) -> Option<bool> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_of_a_process_of_this_computer_it_is_known_whether_it_lives() {
+        let own = unique();
+        let known = scope().map(|_| true);
+        assert_eq!(lives(&own), known);
+        let of = |scope: &str, process: u32| format!("a-host-{scope}-{process}-18ab-0");
+        assert_eq!(lives(&of(UNKNOWN, std::process::id())), None);
+        for other in ["0123abcd-77", "tmp", "", "--", "a-b-c-d-e"] {
+            assert_eq!(lives(other), None, "{other}");
+        }
+        if let Some(scope) = scope() {
+            let mut child = std::process::Command::new("true").spawn().expect("started");
+            child.wait().expect("ended");
+            assert_eq!(lives(&of(&scope, child.id())), Some(false));
+            assert_eq!(lives(&of(&scope, std::process::id())), Some(true));
+        }
+    }
 }

@@ -29,6 +29,7 @@ mod forms;
 mod host;
 mod identity;
 mod isolate;
+mod leftovers;
 mod merge;
 mod pages;
 mod panics;

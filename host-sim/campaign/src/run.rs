@@ -116,6 +116,7 @@ pub fn run(
         },
     };
     let result = work.run(blocks, options.threads);
+    store.tidy();
     live.tell(true);
     progress.clear();
     let (found, computed) = (

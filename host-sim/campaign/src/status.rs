@@ -34,6 +34,9 @@ pub struct State {
     pub missing: Vec<u64>,
     /// Parts that cannot be read or are foreign, and why.
     pub bad: Vec<(PathBuf, String)>,
+    /// Files of the whole folder that nobody reads: of processes that were killed, and temporary ones of other
+    /// computers, which may be writing them.
+    pub leftovers: Vec<PathBuf>,
 }
 
 /// Reads the parts of a shard.
@@ -52,6 +55,7 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
         by_status: [0; 5],
         missing: Vec::new(),
         bad: Vec::new(),
+        leftovers: store.leftovers(),
     };
     // Of a million blocks most may not be there: the folder is looked through once.
     let there = store.begun();

@@ -10,7 +10,8 @@
 //! | `aside/` | parts that could not be read or are foreign |
 //! | `logs/CASE.mcap` | logs that the plan keeps |
 //!
-//! A file appears under its name when it is whole: it is written under another one and renamed.
+//! A file appears under its name when it is whole: it is written under another one and renamed. What a killed
+//! process leaves is in `leftovers.rs`.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};

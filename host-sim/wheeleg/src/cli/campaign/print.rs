@@ -162,6 +162,14 @@ pub(super) fn state(state: &State, store: &Store) -> String {
         state.missing.len(),
         store.blocks()
     );
+    if !state.leftovers.is_empty() {
+        let _ = writeln!(
+            out,
+            "left    {} files of processes that were killed, or that write on other computers: the next `campaign run` \
+             on the computer of a killed one removes its files",
+            state.leftovers.len()
+        );
+    }
     out + &bad_parts(&state.bad)
 }
 
