@@ -142,7 +142,7 @@ tuning! {
     SEAT_SPEED: i32 = 60 << 16, "raw mm/s (60 mm/s)", "a faster one is still braked by the servo", "src/law/tests.rs::a_seat_has_its_target_zone_speed_and_force";
     SEATED_WITHIN: i32 = mm(150), "raw mm (1.5 mm)", "cushion and load of the robot's foot hold it that far off", "src/law/tests.rs::a_seat_has_its_target_zone_speed_and_force";
     SEAT_FORCE_BREAKAWAYS: i32 = 3, "break-away forces", "with 4 a start without notice was 30 ms later", "src/law/tests.rs::a_seat_has_its_target_zone_speed_and_force";
-    SEAT_PRESSED_SHIFT: u32 = 2, "log2 of the share of the force that may be missing", "resolution of the valves", "src/law/tests.rs::a_seat_has_its_target_zone_speed_and_force";
+    SEAT_PRESSED_SHIFT: u32 = 2, "log2 of the force over what of it may be missing", "resolution of the valves", "src/law/tests.rs::a_seat_has_its_target_zone_speed_and_force";
     PRELOAD_EDGE_SHIFT: u32 = 1, "log2 of the friction over the force", "half of the friction is left for what is not known", "src/law/tests/preload.rs::the_force_of_a_preload_is_half_the_friction";
     PRELOAD_AGAIN_SHIFT: u32 = 1, "log2 of the friction over what may be missing before pulses begin, and begin again", "hysteresis: the estimated load of a piston at rest wanders", "src/law/tests/preload.rs::a_preload_acts_again_where_half_the_friction_is_missing";
     PRELOAD_THERE_SHIFT: u32 = 3, "log2 of the friction over what may be missing", "resolution of the valves", "src/law/tests/preload.rs::a_preload_acts_until_an_eighth_of_the_friction_is_missing";

@@ -10,7 +10,7 @@
 //! −dF/2.
 //!
 //! Two actuators and one force: the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
-//! Goldfarb 2007); about the mean of supply and atmosphere both chambers have as far to go up as down. It is
+//! Goldfarb 2007); about the mean of supply and atmosphere A has as far to go up as down, and B nearly so behind a thin rod. It is
 //! neither the stiffest level, which is the highest, nor the one at which filling and venting are equally fast.
 //!
 //! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in one from an end

@@ -4,11 +4,14 @@
 //! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
 //! that is cut counts as far as it was sent.
 //!
-//! | | what is left when another part drives |
-//! |---|---|
-//! | goes on | pressures with their bounds, motion, load, the mass in use with its gains, clock and period, a pressure swap that is under way |
-//! | begins anew, at the end of each period | standstill, with the present stroke as its target; break-away ramp; preload |
-//! | is dropped at once | the plan, as far as it was not sent: a coil that is on counts as off from the end of the tick |
+//! | | what is left when another part drives | why |
+//! |---|---|---|
+//! | goes on | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
+//! | begins anew, if the other part has the last tick of a period, and at the end of each period of its own | standstill, with the present stroke as its target; break-away ramp; preload | they belong to a rest and to forces that the law has not made |
+//! | is dropped at once | the plan, as far as it was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
+//!
+//! A part that drives for less than a period, and not in its last tick, leaves rest, ramp and preload as they were. An
+//! axis that the node holds or has shut off for a fault is one where another part drives.
 //!
 //! The law begins to plan again at the end of the first period in which it is called ([`Predictive::drive`]); until
 //! then all valves are shut. A new law, without any of this, is made by the board alone: `JointController::reset`,
@@ -94,7 +97,7 @@ impl Predictive {
         self.external = [0; 4];
     }
 
-    /// Somebody else drives from the tick on that begins: what is planned for after it does not happen.
+    /// Somebody else drives from the end of this tick on: what is planned for after it does not happen.
     #[cold]
     fn release_valves(&mut self, model: &AxisModel) {
         let ticks = i32::from(self.tick_of_period).wrapping_add(1);

@@ -27,11 +27,11 @@
 //! [`PERIOD_TICKS`] (4) ticks, whole in its last tick, and plan the pulses of the next period to the microsecond. The
 //! steps, in the order of the code:
 //!
-//! 1. [`Predictive::drive`] is called in every tick. In the last one of a period it does 2 to 9, in the others only 10.
+//! 1. [`Predictive::drive`] is called in every tick. In the last one of a period it does 2 to 10, in the others 10 alone.
 //! 2. `observe_period` (`handover`): the observer takes what was sent, and the mean of the last two strokes
 //!    ([`crate::observer`] has its steps). A mass that it has learnt gives new gains (`switching_curve`).
 //! 3. `plan_period`: another target? Then patience begins anew (`standstill`), and the ramp is forgotten.
-//! 4. `preload`: does the piston rest, and is a move announced? Then its force, or no pulse where that stands already.
+//! 4. `preload`: does the piston rest (or stand at a stop), and is a move announced? Then its force, or no pulse where that stands already.
 //! 5. `seat`, if 4 has nothing to say: is the target an end stop, and the piston there? Then its force, or rest.
 //! 6. `standstill`, if 4 has nothing to say: its state follows from 5, or else from how the piston comes to the target.
 //! 7. `allocation`: the pressure swap begins with a preload, or where the piston stands at an end stop.
@@ -57,8 +57,8 @@
 //! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`): it hands over the last good stroke; two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the data, the air counts as unknown |
 //! | a frozen potentiometer | the node misses the motion (`no_motion_detector.rs` there) |
 //! | no new reference | the node lets the last one run on at its speed for one bus cycle, then stand; when it gives the master up it shuts the valves. The law comes to rest at what it is given |
-//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew, all else goes on |
-//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
+//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew (if the other part had the last tick of a period), all else goes on |
+//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept after some 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | shows as load; what is fed forward beyond it makes a relay near the target: it is faded out there (`standstill`) |
 //!
@@ -66,8 +66,8 @@
 //! `preload` are in `tests.rs` here and in `tests/preload.rs`. What all of it is worth in the closed loop:
 //! `tests/system/control_bars.rs`.
 //!
-//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, so that its
-//! error shows as load; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction
+//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, because counting
+//! more than there is would hide speed; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction
 //! has to stop the piston.
 
 mod allocation;

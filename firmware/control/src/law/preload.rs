@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Fc: Coulomb friction, load: as in [`crate::observer::motion`], F expected: pressure force at the end of the dead
-//! time, mN; x₀: stroke at the announcement, next: the announced one, mm. Source: this project (decision 38).
+//! time, mN; x₀: stroke when the preload began, next: the announced one, mm. Source: this project (decision 38).
 //!
 //! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
 //! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`).
@@ -23,9 +23,9 @@
 //! enough: by the pressure swap two full chambers make it, too, and one of them would have to vent when the move
 //! begins.
 //!
-//! **It ends** with the announcement, or with the rest, which a target ends that is more than one band from the old
-//! one; and for the rest of this announcement when the piston has moved by more than two bands. While it lasts,
-//! `standstill` is not worked out: REST stays REST. Of an announcement that is not followed nothing is left but the
+//! **It ends** with the announcement, with a target more than one band from the old one (where that does not end REST,
+//! a preload begins anew a period later), or with the rest; and while the piston is more than two bands from x₀. While it
+//! lasts, `standstill` is not worked out: REST stays REST. Of an announcement that is not followed nothing is left but the
 //! air.
 //!
 //! Assumes: at least half of the friction that is specified, so that the piston stands; that the observer's load and

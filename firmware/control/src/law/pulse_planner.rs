@@ -15,18 +15,21 @@
 //!
 //! Each chamber is planned by itself, for its own pressure. The coils of its two valves are never on together: the
 //! valve that would undo a change goes off as soon as its own pulse allows, and the other one waits for that. Near the
-//! target (`standstill`: within 24 bands for more than four periods), and with no pulse under way, only the longer of
-//! the two chambers' pulses is sent: both may be too much of valves that cannot open for less.
+//! target (`standstill` has counted more than four periods within 24 bands), and with no coil on, only the longer of the
+//! two chambers' pulses is sent: both may be too much of valves that cannot open for less. A preload sends both.
+//! A valve still shutting does not keep the other one's coil off: their openings overlap where t_off is longer than t_on.
 //!
 //! **Grain.** A chamber has half of a force to make (`allocation`), and is left as it is if half of its shortest
-//! opening would be too much. So the least force that makes a pulse is that of one shortest opening, F_1 of
-//! `switching_curve`. There is no vernier: pulses of A and B whose forces oppose each other come about where both
+//! opening would be too much. So the least force that makes a pulse is about that of one shortest opening,
+//! F_1 of `switching_curve`. A smaller one is not stored: the next period asks again, and in a piston that stands the
+//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. There is no vernier: pulses of A and B whose forces oppose each other come about where both
 //! pressures are to rise, or both to fall, but are not chosen for the small difference of their forces.
 //!
 //! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected
 //! one alone; delays of the valves as specified within their margin; supply and atmosphere as specified. If the supply
-//! falls, a fill valve passes less than planned, the observer counts what was planned, and nothing makes up for it but
-//! the load; vent valves do what they should.
+//! falls, a fill valve passes less than planned, the observer counts what was planned, and only what
+//! is seen of the motion makes up for it: the load where the piston slides, the ramp where it stands. Vent valves do what
+//! they should.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 

@@ -28,11 +28,11 @@
 //! Assumes: a tick of 1 ms and a call in every tick, whatever tick the law is made for (the joint board has this tick,
 //! and calls it in `firmware/node/src/joint/reference.rs`); v_max and a that the axis can follow; a measured stroke
 //! that is true; a target that rests or moves evenly. If the supply falls, the piston lags, and the governor keeps the
-//! reference by it.
+//! reference by it; of a target that moves it holds back only the approach, not v_target.
 //!
 //! Config [`GeneratorConfig`], state [`Reference`], update [`Reference::update`]; without an acceleration in the
 //! board's parameters it is left out, and the law follows the command. Guarded by the tests at the end of this file: it
-//! has no row in [`crate::tuning`], its numbers are parameters of the board.
+//! has no row in [`crate::tuning`], its limits are parameters of the board.
 
 use crate::math::square_root;
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -75,7 +75,7 @@ impl Reference {
     }
 
     /// The reference of the next tick towards `target`, which itself moves at its velocity, with
-    /// the piston at `measured`; and whether v_max holds it back.
+    /// the piston at `measured`; and whether it is so far from the target that v_max limits it.
     #[must_use]
     pub fn update(
         self,

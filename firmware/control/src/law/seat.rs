@@ -8,16 +8,16 @@
 //!
 //! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
 //! target at the very end of the stroke: beyond every rest band of a position law, which then
-//! pulses for ever. Pressed against its stop it may rest; and of its chambers one is then
-//! full, or the other empty: by the pulses that made the force, from which the observer follows the air as
-//! everywhere. It is not told that this is a stop. An axis without precharge has no seat: the air of it would make a
+//! pulses for ever. Pressed against its stop it may rest. Its chambers then make three
+//! break-away forces more than balance, by `allocation` as everywhere: only where F_in limits them is one full or the
+//! other empty. The observer follows the air from the pulses. It is not told that this is a stop. An axis without precharge has no seat: the air of it would make a
 //! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
 //!
 //! A piston that rests here is pressed again when it is 1.5 mm off its target, not before: what its force has become
 //! does not count. **The seat ends** as soon as its condition above does not hold: a target 0.5 mm or more from the
 //! stop, a reference faster than 1 mm/s, a piston 3 mm off or faster than 60 mm/s. A new target as near to the stop as
-//! the old one ends nothing. A preload goes before the seat. What was PRESS goes on as SERVO; what was REST, by the
-//! rules of REST (`standstill`).
+//! the old one ends nothing. A preload goes before the seat. What was PRESS goes on as from SERVO; what was REST,
+//! by the rules of REST (`standstill`). A target more than 1.5 mm behind the stop is pressed at for ever.
 //!
 //! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
 //! and Craig 1981).

@@ -16,8 +16,8 @@
 //! is caught; if not, PAUSE, if one is under way; otherwise SERVO.
 //!
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (|e| − band) < m v²/2 <
-//!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v, for a piston on its way to the target; counted on within 12
-//!   bands of it and while F_s is at least Fc/4.
+//!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v; counted on within 12 bands of the target and while F_s is at
+//!   least Fc/4.
 //! * **Patience** counts the periods within 24 bands of a target that rests, and down again otherwise; not in REST. It
 //!   is over after 100 (0.4 s). Then a heavy piston is asked for half the acceleration (`inverse_dynamics`); the
 //!   friction that is fed forward fades, between 132 and 260 periods; and from 220 on band and slow speed grow, up to
@@ -27,9 +27,10 @@
 //!   mm/s at most, for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB), 25
 //!   to 250 periods: no limit cycle lasts. The pause ends before that when the piston is faster than 40 mm/s, or more
 //!   than 2 mm off, with a new target, or when the reference moves; a period counts for eight while the piston stands
-//!   (|v| < 3 mm/s) beside the band. It goes on counting in CATCH.
+//!   (|v| < 3 mm/s) beside the band. It goes on counting in CATCH. REST and PRESS do not count: what is left of it goes on
+//!   after them, but not after a seat that was reached, which clears pause and patience.
 //! * **Release.** REST ends
-//!   - at once, when the reference moves (faster than 1 mm/s);
+//!   - at once, when the reference moves (faster than 1 mm/s), with the patience of the third case;
 //!   - at once, when it has gone more than one band from the target of this rest, if the stroke measured is also out of
 //!     the band of release there. A new target so near that it is not, ends no rest: it becomes the target of it;
 //!   - without a new target, in the fifth period in a row out of the band of release. Then patience goes on from 100
@@ -42,7 +43,9 @@
 //!
 //! e: error of the estimated stroke, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m:
 //! mass in use, kg; n = 1.2; p: mean of supply and atmosphere, Pa; VA, VB: volume of each chamber at mid stroke, m³;
-//! AA, AB: areas, m²; k_air: N/m; T_o: s. Bands are those of the axis data, in raw mm; times in periods of 4 ms.
+//! AA, AB: areas, m²; k_air: N/m; T_o: s. "The band", also in the stopping distance, is the present one,
+//! which patience widens; the 24 bands, and the one band of a new target, are those of the axis data (0.12 mm on the
+//! bench). Times are in periods of four ticks: 4 ms with ticks of 1 ms.
 //!
 //! Assumes: friction of at least 0.85 of the specified one, where it is counted on; that shut valves hold the air, so
 //! that a piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a
@@ -108,7 +111,7 @@ pub(super) struct Standstill {
 }
 
 impl Standstill {
-    /// Shut valves from power-up on, with the piston at `stroke`, raw mm.
+    /// As somebody else drives: the next target is one only beside `stroke`, raw mm.
     pub(super) fn at(stroke: i32) -> Self {
         Self {
             target: stroke,

@@ -3,12 +3,12 @@
 //! ```text
 //! e_l  = a_b / k²                            where straight line and parabola meet, with one slope
 //! v*   = k e                                 |e| ≤ e_l
-//!      = sgn(e) min(v_top, √(2 a_b (|e| − e_l/2)))   beyond
+//!      = sgn(e) √(2 a_b (|e| − e_l/2))       beyond; both at most v_top, which begins at e_l/2 + v_top²/(2 a_b)
 //!
-//! k = 0.36 s / T_d      D = 0.95 s / T_d      a_b = 0.60 (0.36 / T_d) v_top s²
-//! s = min(1, ∛(m_n / m))
+//! k = 0.36 σ / T_d, at least 1/s      D = 0.95 σ / T_d      a_b = 0.60 (0.36 / T_d) v_top σ², below 2^18 mm/s²
+//! σ = min(1, ∛(m_n / m))                     a heavy piston is given less of each
 //! v_top = min(v_B, 1.5 v_A)                  v = C ρ0 R T0 / area of the chamber: its choked speed
-//! m_n   = 0.60 · ½ Ḟ / (a_b k)               with s = 1; Ḟ: how fast both valves change the force at mid stroke
+//! m_n   = 0.60 · ½ Ḟ / (a_b k)               with σ = 1; Ḟ: how fast both valves change the force at mid stroke
 //!
 //! half of the acceleration is enough:  m D k band > F_1
 //! F_1   = n C ρ0 R T0 p_m AB/VB (t_off + margin)      the shortest opening of B's vent valve at mid stroke and mean pressure
@@ -23,7 +23,8 @@
 //! **Half is enough.** A piston that stands off its target by e is asked to move by the force m D k e
 //! (`inverse_dynamics`), with friction and ramp beside it. Two halves meet on its way to the valves: `allocation` gives
 //! half of a force to each chamber, and `pulse_planner` sends a pulse for more than half of what the shortest opening
-//! makes. So the least force that makes a pulse is ½ F_1 / ½ = F_1, not ½ F_1. Where the condition holds, all of the
+//! makes. So the least force that makes a pulse is ½ F_1 / ½ = F_1, not ½ F_1 (in balance at mid stroke 0.9
+//! to 1.25 F_1, by the other valve and the rod). Where the condition holds, all of the
 //! acceleration makes a pulse from one band on, and half of it from two bands on: there a piston at rest is released,
 //! too, and the band in which it may rest grows to 2.4 bands (`standstill`). More than that only drives a heavy piston
 //! on: `inverse_dynamics` takes half of it where patience is over. Where the condition does not hold, which is for
@@ -32,7 +33,7 @@
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot
 //! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
 //! serves 1 and 400 mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are
-//! searched ([`crate::tuning`]). e_l does not depend on the mass.
+//! searched ([`crate::tuning`]). Within the limits of k and a_b, e_l does not depend on the mass.
 //!
 //! Assumes: dead time, supply and conductance as specified, the mass that is in use; and that a force can be built up
 //! within about a dead time, which the nimble mass stands for. If the supply falls, the curve stays as it is: the force

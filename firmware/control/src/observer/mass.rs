@@ -15,11 +15,11 @@
 //! project's.
 //!
 //! **A move** begins when |v| is above 20 mm/s. It ends when |v| is not any more, when v has changed its sign, or after
-//! 1 s. It tells a mass if it took at least 80 ms, was 200 mm/s fast, and 100 mm/s above the line; otherwise nothing
+//! 1 s; a piston that is then still as fast begins another. Moves count whoever drives. It tells a mass if it took at least 80 ms, was 200 mm/s fast, and 100 mm/s above the line; otherwise nothing
 //! changes.
 //!
 //! Where the bounds of the pressures are far apart in such a move (in the mean by more than a quarter of the largest
-//! force), as after a power-up with air that nobody knows, the force is wrong by more than the mass needs: there the
+//! extending force), as after a power-up with air that nobody knows, the force is wrong by more than the mass needs: there the
 //! mass comes with the pressures from [`super::identification`].
 //!
 //! **Doubt.** The peak above the line is a small difference of large impulses, and in a long move at nearly one speed a

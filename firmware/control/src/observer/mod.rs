@@ -21,7 +21,7 @@
 //! 6. `mass`, where the axis learns it: one period more of the move under way. Where it has ended, mass and, by
 //!    `identification`, pressures are corrected; the load gives back what the pressures had wrong.
 //!
-//! The law in [`crate::law`] only reads it. All estimates hold at the **moment** of the period: between its last two
+//! The law in [`crate::law`] reads it; its `handover` tells it what others send, and what was cut. All estimates hold at the **moment** of the period: between its last two
 //! ticks, whose strokes are averaged, 2.5 ticks after its begin. The expected pressures hold at the end of the dead
 //! time.
 //!
@@ -33,7 +33,7 @@
 //! load while the piston slides and not at all while it stands ([`pressure`], [`motion`], [`mass`] say what follows).
 //!
 //! Tests stand at the end of each file. State [`Observer`]. A board makes a new one, at rest and with unknown air,
-//! after a sensor's fault and with other axis data.
+//! after a sensor's fault, damaged memory and with other axis data.
 
 pub mod flow;
 mod identification;

@@ -33,8 +33,8 @@
 //!
 //! One explicit step a period and chamber from moment to moment, with the mean length and speed of that time; then one
 //! over the dead time, with the pulses that are under way and the speed of the moment, for the expected pressure; and
-//! one for each bound. No step goes beyond what valves and motion can do: while a fill valve is open, the supply; while
-//! a vent valve is, the atmosphere; else half the atmosphere and 2.1 MPa. So a chamber however small is stable.
+//! one for each bound. No step goes beyond what valves and motion can do: while a fill valve is open or is to open, the
+//! supply; while a vent valve is, the atmosphere; else half the atmosphere and 2.1 MPa. So a chamber however small is stable.
 //!
 //! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 
