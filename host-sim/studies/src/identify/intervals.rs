@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::bench::UNKNOWNS;
-use super::fit::{Z95, trust};
 use super::free::{COUNT, FREE};
+use super::point::{Z95, trust};
 
 /// A parameter is determined if the data leave less than this share of the file's uncertainty.
 const DETERMINED: f64 = 0.5;

@@ -14,6 +14,7 @@ pub mod lab;
 pub mod map;
 mod noise;
 mod page;
+mod point;
 mod predict;
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
-use super::fit::ALL;
+use super::point::ALL;
 
 /// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
 const PRESSURE_PA: f64 = 2e3;

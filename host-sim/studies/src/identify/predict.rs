@@ -4,9 +4,9 @@ use wheeleg_plant::PlantError;
 use wheeleg_plant::axis::{Axis, AxisParams};
 
 use super::bench::{Start, start};
-use super::fit::Point;
 use super::free::applied;
 use super::lab::Lab;
+use super::point::Point;
 
 /// What the sensors show of the plant at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
