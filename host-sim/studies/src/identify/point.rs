@@ -4,7 +4,7 @@ use super::bench::{UNKNOWNS, Unknowns};
 use super::free::{COUNT, FREE, Logs};
 
 /// Everything that is fitted: factors, and unknowns of the measurement.
-pub const ALL: usize = COUNT + UNKNOWNS;
+pub(super) const ALL: usize = COUNT + UNKNOWNS;
 /// Two-sided 95 % of a normal distribution, in standard deviations.
 pub(super) const Z95: f64 = 1.959_964;
 
