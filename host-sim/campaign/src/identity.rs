@@ -55,37 +55,60 @@ pub(crate) fn identity(
     if plan.draws_from_lists_alone() {
         content["sample"] = json!(place.sample);
     }
-    let hash = blake3::hash(canonical(&content).as_bytes());
+    let mut whole = canonical(&content);
+    let hash = blake3::hash(&whole);
     let (half, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
     let case = CaseId(u128::from_be_bytes(*half));
-    for (factor, value) in plan.factors.iter().zip(values).filter(|(f, _)| f.paired) {
+    let paired = || plan.factors.iter().zip(values).filter(|(f, _)| f.paired);
+    for (factor, value) in paired() {
         remove(&mut content, &factor.name, &factor.sets, value);
+    }
+    if paired().next().is_some() {
+        whole = canonical(&content);
     }
     let mut hasher = blake3::Hasher::new_derive_key(SEED_KEY);
     hasher.update(&plan.root.to_le_bytes());
-    hasher.update(canonical(&content).as_bytes());
+    hasher.update(&whole);
     let hash = hasher.finalize();
     let (bits, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
     (case, u64::from_le_bytes(*bits) >> 1)
 }
 
 /// Canonical JSON: keys are sorted, floats have the fewest digits that give them back.
-fn canonical(json: &Json) -> String {
+fn canonical(json: &Json) -> Vec<u8> {
+    let mut text = Vec::new();
+    write_canonical(json, &mut text);
+    text
+}
+
+fn write_canonical(json: &Json, text: &mut Vec<u8>) {
     match json {
         Json::Object(fields) => {
             // Whatever order the map keeps.
             let mut fields: Vec<_> = fields.iter().collect();
             fields.sort_by_key(|(key, _)| *key);
-            let fields = fields
-                .into_iter()
-                .map(|(key, value)| format!("{}:{}", Json::from(key.as_str()), canonical(value)));
-            format!("{{{}}}", fields.collect::<Vec<_>>().join(","))
+            text.push(b'{');
+            for (k, (key, value)) in fields.into_iter().enumerate() {
+                if k > 0 {
+                    text.push(b',');
+                }
+                serde_json::to_writer(&mut *text, key).expect("memory takes it");
+                text.push(b':');
+                write_canonical(value, text);
+            }
+            text.push(b'}');
         }
         Json::Array(list) => {
-            let list: Vec<String> = list.iter().map(canonical).collect();
-            format!("[{}]", list.join(","))
+            text.push(b'[');
+            for (k, value) in list.iter().enumerate() {
+                if k > 0 {
+                    text.push(b',');
+                }
+                write_canonical(value, text);
+            }
+            text.push(b']');
         }
-        plain => plain.to_string(),
+        plain => serde_json::to_writer(text, plain).expect("memory takes it"),
     }
 }
 

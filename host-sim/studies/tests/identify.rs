@@ -6,7 +6,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::{Axis, AxisParams};
-use wheeleg_studies::identify::fit::{Problem, trust};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::identify::bench::ZERO_M;
+use wheeleg_studies::identify::fit::{Exact, Point, Problem, trust};
 use wheeleg_studies::identify::free::{COUNT, FREE, Logs, applied, limits};
 use wheeleg_studies::identify::intervals::{covers, undetermined};
 use wheeleg_studies::identify::lab::Lab;
@@ -50,6 +52,18 @@ fn measured(
     valves: fn(usize) -> [u16; 4],
     pressures: bool,
 ) -> String {
+    measured_with(|_| 0.0, axis, seed, ticks, valves, pressures)
+}
+
+/// The same with a sensor that is off by so many mm.
+fn measured_with(
+    off_mm: fn(usize) -> f64,
+    axis: &AxisParams,
+    seed: u64,
+    ticks: usize,
+    valves: fn(usize) -> [u16; 4],
+    pressures: bool,
+) -> String {
     let plant = Axis::new(axis).expect("a plant");
     let mut state = plant.initial_state(seed);
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
@@ -62,7 +76,8 @@ fn measured(
     for tick in 0..ticks {
         let sensor = &axis.potentiometer;
         let share = f64::from(plant.read_position(&mut state)) / 65_536.0;
-        let position_mm = (share * sensor.electrical_stroke_m - sensor.offset_m) * 1e3;
+        let position_mm =
+            (share * sensor.electrical_stroke_m - sensor.offset_m) * 1e3 + off_mm(tick);
         let on_us = valves(tick);
         let [fill_a, vent_a, fill_b, vent_b] = on_us;
         let time_s = tick as f64 * 1e-3;
@@ -79,6 +94,12 @@ fn measured(
         plant.tick(&mut state, on_us).expect("it plays");
     }
     text
+}
+
+/// What the converter takes off every position, in standard deviations of what is known of its zero: it rounds down.
+fn zero(axis: &AxisParams) -> f64 {
+    let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
+    -0.5 * lsb_m / ZERO_M
 }
 
 /// A cylinder that differs from its data sheet.
@@ -105,18 +126,19 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
     let text = measured(&applied(&config.axis, &truth), 1, 4800, rich, true);
     let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
     let progress = Progress::silent();
+    let fitted = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
     let Fitted {
         fit,
         intervals,
         information,
         stopped,
         ..
-    } = fitted(&problem(&config, &lab), 1, &progress).expect("a fit");
+    } = &fitted;
     assert!(stopped.is_none());
     let found = (0..COUNT).filter(|i| intervals[*i].determined).count();
     assert!(found >= 8, "{found} determined: {intervals:?}");
     for i in (0..COUNT).filter(|i| intervals[*i].determined) {
-        let off = (fit.logs[i] - truth[i]).abs();
+        let off = (fit.point.logs[i] - truth[i]).abs();
         let name = FREE[i].name;
         // Three standard deviations, with a separate bar for mistakes in the intervals.
         assert!(
@@ -127,9 +149,12 @@ fn a_cylinder_that_differs_from_its_sheet_is_found_within_its_intervals() {
         assert!(off < 0.25, "{name}: {off}");
     }
     // The truth is about as likely as the fit, unless the model is stuck in a local minimum.
-    let residuals = problem(&config, &lab).residuals(&truth).expect("a plant");
-    assert!(fit.residuals.norm() < 1.1 * residuals.norm());
-    assert!(undetermined(&information).len() <= COUNT - found);
+    let mut exact = Point::of(truth);
+    exact.unknowns[0] = zero(&config.axis);
+    let problem = fitted.problem;
+    let [fit, exact] = [fit.point, exact].map(|at| problem.residuals(&at).expect("a plant").norm());
+    assert!(fit < 1.02 * exact, "{fit} and {exact}");
+    assert!(undetermined(information).len() <= COUNT - found);
 }
 
 /// A valve that never shuts shows no closing delay.
@@ -148,7 +173,7 @@ fn what_the_valves_never_did_is_not_determined() {
         .iter()
         .position(|f| f.name == "closing_delay")
         .expect("one");
-    assert!(!intervals[closing].determined && fit.logs[closing].abs() < 1e-6);
+    assert!(!intervals[closing].determined && fit.point.logs[closing].abs() < 1e-6);
     let words = undetermined(&information);
     assert!(
         words.iter().any(|w| w.starts_with("closing delay")),
@@ -156,6 +181,28 @@ fn what_the_valves_never_did_is_not_determined() {
     );
     // One stroke: far from everything is determined, and the intervals say so.
     assert!(intervals.iter().filter(|t| t.determined).count() < COUNT - 2);
+}
+
+/// Without pressure sensors the air in the chambers at the start may be anything, whatever the file says. One
+/// stroke from a pressure that is not the file's: no interval may be sure of what is not so.
+#[test]
+fn air_that_nobody_has_measured_is_not_known_by_the_file() {
+    let config = config();
+    let truth = truth(5);
+    let mut real = applied(&config.axis, &truth);
+    // In balance.
+    real.cylinder.initial_pressure_a_pa = 3.0e5;
+    real.cylinder.initial_pressure_b_pa = 3.37e5;
+    let text = measured(&real, 1, 600, |t| if t < 100 { [0; 4] } else { OUT }, false);
+    let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
+    let Fitted { fit, intervals, .. } =
+        fitted(&problem(&config, &lab), 1, &Progress::silent()).expect("a fit");
+    assert!(intervals.iter().filter(|t| t.determined).count() < COUNT - 2);
+    for i in 0..COUNT {
+        let off = (fit.point.logs[i] - truth[i]).abs();
+        let (name, deviation) = (FREE[i].name, intervals[i].deviation);
+        assert!(off < 3.0 * deviation, "{name}: {off} of {deviation}");
+    }
 }
 
 fn study(text: &str, folder: &Path) -> Result<String, String> {
@@ -247,10 +294,30 @@ fn written_axis_says_what_is_found(summary: &str, out: &Path) -> usize {
     count
 }
 
-/// 0.6 s of the very axis of the file: the fit takes noise for friction, and predicts the held-out part worse
-/// than the file does. That says nothing new about the bench, and is no basis for further work.
+/// The sensor of the very axis of the file slips by 3 mm and back, in the fitted part: the fit takes that for the
+/// cylinder, and predicts the held-out part worse than the file does. It is no basis for further work.
 #[test]
 fn a_fit_that_is_worse_than_the_file_is_not_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let off_mm = |tick: usize| {
+        let share = (tick as f64 - 600.0) / 1200.0;
+        3.0 * (std::f64::consts::PI * share.clamp(0.0, 1.0)).sin()
+    };
+    let text = measured_with(off_mm, &config().axis, 2, 4800, rich, false);
+    let summary = study(&text, folder.path()).expect("it ends");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let off = |which: &str| summary[which]["held_out_mm"].as_f64().expect("a number");
+    assert!(off("before") < off("after"), "{summary}");
+    assert_eq!(summary["explained"], false, "{summary}");
+    assert_eq!(summary["worse_than_the_file"], true, "{summary}");
+    let out = folder.path().join("out");
+    assert!(out.join("report.html").exists() && !out.join("axis.toml").exists());
+}
+
+/// 0.6 s of the very axis of the file, which a converter has measured that rounds down. While its zero was taken
+/// for known, the fit took half a digit for friction, and was worse than the file.
+#[test]
+fn the_zero_of_the_sensor_is_not_taken_for_friction() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut text = config().source.text.clone();
     for (is, wanted) in [
@@ -270,10 +337,12 @@ fn a_fit_that_is_worse_than_the_file_is_not_written() {
     let summary = study_of(&lab, &axis.to_string_lossy(), &out).expect("it ends");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     let off = |which: &str| summary[which]["held_out_mm"].as_f64().expect("a number");
-    assert!(off("before") < off("after"), "{summary}");
-    assert_eq!(summary["explained"], false, "{summary}");
-    assert_eq!(summary["worse_than_the_file"], true, "{summary}");
-    assert!(out.join("report.html").exists() && !out.join("axis.toml").exists());
+    assert!(off("after") < off("before"), "{summary}");
+    assert_eq!(summary["explained"], true, "{summary}");
+    let mut all = summary["parameters"].as_array().expect("a list").iter();
+    let friction = all.find(|p| p["name"] == "friction").expect("one");
+    let factor = friction["factor"].as_f64().expect("a number");
+    assert!((0.95..1.05).contains(&factor), "{friction}");
 }
 
 /// A single stroke shuts no valve: the file's value for that delay is given beside the assumed one.
@@ -355,9 +424,9 @@ fn a_fit_that_is_stopped_ends_within_a_step_and_is_told_as_stopped() {
         calls.set(calls.get() + 1);
         calls.get() < 3
     };
-    let start = [0.0; COUNT];
-    let fit = problem.fit(&start, &go_on).expect("a plant");
-    assert!(fit.logs == start && calls.get() < 5, "{:?}", fit.logs);
+    let start = Point::of([0.0; COUNT]);
+    let fit = problem.fit(&start, Exact::Fully, &go_on).expect("a plant");
+    assert!(fit.point == start && calls.get() < 5, "{:?}", fit.point);
 
     // All starts are under way or not begun when it comes: none of them is done.
     let stop = Stop::default();
@@ -640,34 +709,48 @@ fn semicolons_decimal_commas_and_a_jittering_clock_are_read() {
     );
 }
 
-/// Random cylinders, and how often an interval contains the truth: one in the suite, 100 in `cargo xtask deep
-/// identify`. For few cylinders the share means nothing.
+/// How often an interval contains the truth: of one random cylinder in the suite, of 100 in `cargo xtask deep identify`.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn intervals_have_the_truth_about_as_often_as_they_say() {
     let count = std::env::var("WHEELEG_IDENTIFY_CYLINDERS").ok();
     let count: u64 = count.and_then(|n| n.parse().ok()).unwrap_or(1);
     let config = config();
-    let (mut covered, mut all, mut close) = (0, 0, 0);
-    for seed in 0..count {
+    let progress = Progress::silent();
+    let of = |seed: &u64| {
         let truth = truth(1000 + seed);
-        let text = measured(&applied(&config.axis, &truth), seed, 4800, rich, true);
+        let text = measured(&applied(&config.axis, &truth), *seed, 4800, rich, true);
         let lab = Lab::parse("lab.csv", &text, &config.axis, &[]).expect("a measurement");
-        let Fitted { fit, intervals, .. } =
-            fitted(&problem(&config, &lab), seed, &Progress::silent()).expect("a fit");
-        let which = (0..COUNT).filter(|i| intervals[*i].determined);
+        let Fitted { fit, intervals, .. } = fitted(&problem(&config, &lab), *seed, &progress)?;
+        let off: [f64; COUNT] = std::array::from_fn(|i| fit.point.logs[i] - truth[i]);
+        let over: Vec<String> = (off.iter().zip(&intervals))
+            .map(|(off, interval)| format!("{:.2}", off / interval.deviation))
+            .collect();
+        println!("cylinder {seed}, deviations off: {}", over.join(" "));
+        Ok::<_, StudyError>((off, intervals))
+    };
+    let seeds: Vec<u64> = (0..count).collect();
+    let found = progress.map(&seeds, of).expect("fits");
+    let (mut covered, mut all, mut close) = ([0; COUNT], [0; COUNT], 0);
+    for (off, intervals) in found.into_iter().flatten() {
         let mut within = true;
-        for i in which {
-            all += 1;
-            covered += u32::from(covers(&intervals[i], fit.logs[i], truth[i]));
-            within &= (fit.logs[i] - truth[i]).abs() < 0.05;
+        for i in (0..COUNT).filter(|i| intervals[*i].determined) {
+            all[i] += 1;
+            covered[i] += u32::from(covers(&intervals[i], off[i], 0.0));
+            within &= off[i].abs() < 0.05;
         }
         close += u64::from(within);
     }
+    let each = FREE.iter().zip(covered.iter().zip(all));
+    let each: Vec<String> = each
+        .map(|(free, (covered, all))| format!("{} {covered} of {all}", free.name))
+        .collect();
+    let [covered, all] = [covered, all].map(|each| each.iter().sum::<u32>());
     let share = f64::from(covered) / f64::from(all.max(1));
     println!(
-        "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); determined within 5 % in {close} of {count} cylinders (bar 95 %)",
-        100.0 * share
+        "identify: {covered} of {all} intervals of 95 % have the truth ({:.1} %); determined within 5 % in {close} of {count} cylinders (bar 95 %); {}",
+        100.0 * share,
+        each.join(", ")
     );
     assert!(count < 20 || (0.90..=0.99).contains(&share), "{share}");
     assert!(20 * close >= 19 * count, "{close} of {count}");

@@ -1,7 +1,6 @@
 //! The next experiment: of some valve sequences, the one that reveals most of the unknowns.
 
-use super::fit::Problem;
-use super::free::Logs;
+use super::fit::{Point, Problem};
 use super::intervals::{ignorance, information};
 use super::lab::{Lab, Sample};
 
@@ -83,13 +82,12 @@ const SEQUENCES: [(&str, &str, Valves); 6] = [
 ];
 
 /// All sequences, the most informative first: each after the measurements so far, which have `known` as their
-/// information. Positions are measured every ms, pressures if they were before.
+/// information. Positions are measured every ms, pressures if they were before. Its own unknowns are new.
 #[must_use]
 pub fn ranked(
     problem: &Problem<'_>,
-    logs: &Logs,
+    point: &Point,
     known: &nalgebra::DMatrix<f64>,
-    variance: f64,
 ) -> Vec<Experiment> {
     let pressures = problem.lab.samples.first().and_then(|s| s.pressure_pa);
     let position_m = problem.lab.samples.first().map_or(0.0, |s| s.position_m);
@@ -111,7 +109,7 @@ pub fn ranked(
             ticks: TICKS,
             ..*problem
         };
-        let more = information(&next.jacobian(logs)?, variance);
+        let more = information(&next.jacobian(point)?);
         Some(Experiment {
             name,
             words,

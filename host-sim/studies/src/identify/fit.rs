@@ -1,32 +1,47 @@
 //! Least squares: the factors that bring the plant closest to the measurement.
 //!
 //! Levenberg–Marquardt in Marquardt's form (Nocedal, Wright: Numerical Optimization, ch. 10), on logarithms
-//! of the factors. The file counts as a measurement, too: each logarithm has its trust as a standard
-//! deviation, so that parameters that the data does not determine stay close to the file's value.
+//! of the factors and on what is not known of the measurement ([`bench`]). The file counts as a measurement,
+//! too: each logarithm has its trust as a standard deviation, so that parameters that the data does not determine
+//! stay close to the file's value.
 
 use nalgebra::{DMatrix, DVector};
 use wheeleg_plant::axis::AxisParams;
 
-use super::free::{COUNT, FREE, Logs, applied};
+use super::bench::{self, UNKNOWNS};
+use super::free::COUNT;
 use super::lab::Lab;
+use super::noise::Noise;
+use super::point::ALL;
+pub use super::point::{Point, trust};
 use super::predict::{Predicted, predict};
 
-/// Step of the differences, in logarithms.
+/// Step of the differences, in logarithms and standard deviations.
 const DIFFERENCE: f64 = 2e-3;
 /// Most steps.
 const STEPS: usize = 60;
+
 /// A step that lowers the cost by less than this share is the last.
 const ENOUGH: f64 = 1e-7;
-/// Two-sided 95 % of a normal distribution, in standard deviations.
-pub(super) const Z95: f64 = 1.959_964;
 
-/// Standard deviations of the measurements.
-#[derive(Debug, Clone, Copy)]
-pub struct Noise {
-    /// Of positions \[m\].
-    pub position_m: f64,
-    /// Of pressures \[Pa\].
-    pub pressure_pa: f64,
+/// How exact a fit is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exact {
+    /// With the start as it was measured: to compare starts, and for the noise that it leaves. Far from the truth
+    /// the unknowns of the measurement lead into local minima.
+    Roughly,
+    /// With everything that is unknown.
+    Fully,
+}
+
+impl Exact {
+    /// Steps down and up of the differences. One side is not exact in directions that the data hardly determine.
+    fn sides(self) -> [f64; 2] {
+        match self {
+            Self::Roughly => [0.0, DIFFERENCE],
+            Self::Fully => [DIFFERENCE; 2],
+        }
+    }
 }
 
 /// A measurement to be fitted: the axis of its file, and the number of ticks that count.
@@ -49,26 +64,32 @@ pub struct Problem<'a> {
 /// A fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Logarithms of the factors.
-    pub logs: Logs,
+    /// Where it is.
+    pub point: Point,
     /// Half the sum of the squares, trust included.
     pub cost: f64,
     /// Residuals of the data over their standard deviation.
     pub residuals: DVector<f64>,
 }
 
-/// Standard deviation of a file's value by its trust, logarithm.
-#[must_use]
-pub fn trust(index: usize) -> f64 {
-    FREE[index].trust.ln() / Z95
-}
-
 impl Problem<'_> {
     /// Residuals over their standard deviation; `None` if the plant is impossible.
     #[must_use]
-    pub fn residuals(&self, logs: &Logs) -> Option<DVector<f64>> {
-        let predicted = predict(&applied(self.axis, logs), self.lab, self.ticks).ok()?;
+    pub fn residuals(&self, point: &Point) -> Option<DVector<f64>> {
+        let predicted = predict(self.axis, self.lab, point, self.ticks).ok()?;
         Some(self.compared(&predicted))
+    }
+
+    /// Smallest and largest value of everything that is fitted.
+    fn all_limits(&self, exact: Exact) -> [[f64; 2]; ALL] {
+        let unknowns = match exact {
+            Exact::Roughly => [[0.0; 2]; UNKNOWNS],
+            Exact::Fully => bench::limits(self.axis, self.lab),
+        };
+        std::array::from_fn(|i| match i.checked_sub(COUNT) {
+            None => self.limits[i],
+            Some(unknown) => unknowns[unknown],
+        })
     }
 
     fn compared(&self, predicted: &[Predicted]) -> DVector<f64> {
@@ -86,31 +107,48 @@ impl Problem<'_> {
         DVector::from_vec(all)
     }
 
-    /// Derivatives of the residuals by each logarithm; `None` if the plant is impossible.
+    /// Derivatives of the residuals by each logarithm and each unknown; `None` if the plant is impossible.
     #[must_use]
-    pub fn jacobian(&self, logs: &Logs) -> Option<DMatrix<f64>> {
-        self.jacobian_while(logs, &|| true)
+    pub fn jacobian(&self, point: &Point) -> Option<DMatrix<f64>> {
+        let residuals = self.residuals(point)?;
+        self.jacobian_while(point, &residuals, Exact::Fully, &|| true)
     }
 
     /// The same, `None` also if `go_on` ends it early.
-    fn jacobian_while(&self, logs: &Logs, go_on: &dyn Fn() -> bool) -> Option<DMatrix<f64>> {
-        let columns = (0..COUNT).map(|i| {
+    fn jacobian_while(
+        &self,
+        point: &Point,
+        residuals: &DVector<f64>,
+        exact: Exact,
+        go_on: &dyn Fn() -> bool,
+    ) -> Option<DMatrix<f64>> {
+        let limits = self.all_limits(exact);
+        let columns = (0..ALL).map(|i| {
             if !go_on() {
                 return None;
             }
             let at = |by: f64| {
-                let mut moved = *logs;
-                moved[i] += by;
+                let mut moved = *point;
+                *moved.value(i) += by;
                 self.residuals(&moved)
             };
-            let [low, high] = self.limits[i];
+            let [low, high] = limits[i];
             if low >= high {
-                return Some(self.residuals(logs)? * 0.0);
+                return Some(residuals * 0.0);
             }
             // Within the limits on both sides.
-            let up = DIFFERENCE.min(high - logs[i]).max(0.0);
-            let down = DIFFERENCE.min(logs[i] - low).max(0.0);
-            Some((at(up)? - at(-down)?) / (up + down))
+            let value = *point.clone().value(i);
+            let [down, up] = exact.sides();
+            let up = up.min(high - value).max(0.0);
+            let down = down.min(value - low).max(0.0);
+            match (down > 0.0, up > 0.0) {
+                (true, true) => Some((at(up)? - at(-down)?) / (up + down)),
+                (false, true) => Some((at(up)? - residuals) / up),
+                _ => {
+                    let down = DIFFERENCE.min(value - low);
+                    Some((residuals - at(-down)?) / down)
+                }
+            }
         });
         let columns: Vec<DVector<f64>> = columns.collect::<Option<_>>()?;
         Some(DMatrix::from_columns(&columns))
@@ -119,7 +157,7 @@ impl Problem<'_> {
     /// The smallest cost from a start with some factors held at the file's value.
     pub(super) fn held(
         &self,
-        start: &Logs,
+        start: &Point,
         held: &[usize],
         go_on: &dyn Fn() -> bool,
     ) -> Option<Fit> {
@@ -127,22 +165,24 @@ impl Problem<'_> {
         for i in held {
             problem.limits[*i] = [0.0; 2];
         }
-        let start =
-            std::array::from_fn(|i| start[i].clamp(problem.limits[i][0], problem.limits[i][1]));
-        problem.fit(&start, go_on)
+        let mut start = *start;
+        for (log, [low, high]) in start.logs.iter_mut().zip(problem.limits) {
+            *log = log.clamp(low, high);
+        }
+        problem.fit(&start, Exact::Fully, go_on)
     }
 
-    fn cost(&self, residuals: &DVector<f64>, logs: &Logs) -> f64 {
-        let trusted: f64 = (0..COUNT).map(|i| (logs[i] / trust(i)).powi(2)).sum();
+    fn cost(&self, residuals: &DVector<f64>, point: &Point) -> f64 {
+        let trusted: f64 = point.expected().map(|value| value * value).sum();
         0.5 * (residuals.norm_squared() + trusted)
     }
 
     /// The smallest cost from a start; `None` if the plant is impossible there. `go_on` ends it early.
     #[must_use]
-    pub fn fit(&self, start: &Logs, go_on: &dyn Fn() -> bool) -> Option<Fit> {
+    pub fn fit(&self, start: &Point, exact: Exact, go_on: &dyn Fn() -> bool) -> Option<Fit> {
         let residuals = self.residuals(start)?;
         let mut now = Fit {
-            logs: *start,
+            point: *start,
             cost: self.cost(&residuals, start),
             residuals,
         };
@@ -151,20 +191,20 @@ impl Problem<'_> {
             if !go_on() {
                 break;
             }
-            let Some(jacobian) = self.jacobian_while(&now.logs, go_on) else {
+            let jacobian = self.jacobian_while(&now.point, &now.residuals, exact, go_on);
+            let Some(jacobian) = jacobian else {
                 break;
             };
             let mut normal = jacobian.tr_mul(&jacobian);
             let mut gradient = jacobian.tr_mul(&now.residuals);
-            for i in 0..COUNT {
-                let weight = trust(i).powi(-2);
-                normal[(i, i)] += weight;
-                gradient[i] += weight * now.logs[i];
+            for (i, expected) in now.point.expected().enumerate() {
+                normal[(i, i)] += trust(i).powi(-2);
+                gradient[i] += expected / trust(i);
             }
             let before = now.cost;
             let mut better = None;
             while better.is_none() && damping < 1e8 && go_on() {
-                better = self.step(&now, &normal, &gradient, damping);
+                better = self.step(&now, &normal, &gradient, damping, exact);
                 damping *= if better.is_some() { 0.2 } else { 5.0 };
             }
             match better {
@@ -186,35 +226,24 @@ impl Problem<'_> {
         normal: &DMatrix<f64>,
         gradient: &DVector<f64>,
         damping: f64,
+        exact: Exact,
     ) -> Option<Fit> {
         let mut damped = normal.clone();
-        for i in 0..COUNT {
+        for i in 0..ALL {
             damped[(i, i)] *= 1.0 + damping;
         }
         let step = damped.cholesky()?.solve(gradient);
-        let mut logs = now.logs;
-        for ((log, by), [low, high]) in logs.iter_mut().zip(&step).zip(self.limits) {
-            *log = (*log - by).clamp(low, high);
+        let mut point = now.point;
+        for (i, (by, [low, high])) in step.iter().zip(self.all_limits(exact)).enumerate() {
+            let value = point.value(i);
+            *value = (*value - by).clamp(low, high);
         }
-        let residuals = self.residuals(&logs)?;
-        let cost = self.cost(&residuals, &logs);
+        let residuals = self.residuals(&point)?;
+        let cost = self.cost(&residuals, &point);
         (cost < now.cost).then_some(Fit {
-            logs,
+            point,
             cost,
             residuals,
         })
     }
-}
-
-/// Standard deviation and correlation of neighbouring position residuals of a fit, relative.
-#[must_use]
-pub fn scatter(residuals: &DVector<f64>) -> (f64, f64) {
-    let n = residuals.len().max(2) as f64;
-    let square = residuals.norm_squared() / n;
-    let pairs = residuals.as_slice().windows(2).map(|w| w[0] * w[1]);
-    let neighbours = pairs.sum::<f64>() / (n - 1.0);
-    (
-        square.sqrt(),
-        (neighbours / square.max(1e-300)).clamp(0.0, 0.99),
-    )
 }

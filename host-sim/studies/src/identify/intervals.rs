@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::fit::{Z95, trust};
+use super::bench::UNKNOWNS;
 use super::free::{COUNT, FREE};
+use super::point::{Z95, trust};
 
 /// A parameter is determined if the data leave less than this share of the file's uncertainty.
 const DETERMINED: f64 = 0.5;
@@ -27,10 +28,19 @@ impl Interval {
     }
 }
 
-/// Information of data about the logarithms: J'J over the variance of a residual that counts.
+/// Information of data about the logarithms: J'J of residuals over the noise that counts, less what the
+/// unknowns of the measurement take of it (Schur's complement).
 #[must_use]
-pub fn information(jacobian: &DMatrix<f64>, variance: f64) -> DMatrix<f64> {
-    jacobian.tr_mul(jacobian) / variance
+pub fn information(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let all = jacobian.tr_mul(jacobian);
+    let factors = all.view((0, 0), (COUNT, COUNT));
+    let both = all.view((COUNT, 0), (UNKNOWNS, COUNT));
+    let unknowns =
+        all.view((COUNT, COUNT), (UNKNOWNS, UNKNOWNS)) + DMatrix::identity(UNKNOWNS, UNKNOWNS);
+    match unknowns.cholesky() {
+        Some(unknowns) => factors - both.tr_mul(&unknowns.solve(&both)),
+        None => factors * 0.0,
+    }
 }
 
 /// Intervals under the information of data and file.

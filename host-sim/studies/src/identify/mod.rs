@@ -5,13 +5,16 @@
 //! rest. Every parameter gets an interval; parameters that the data does not determine are reported
 //! ([`intervals`]), with the valve sequence that would determine most of them ([`experiment`]).
 
+pub mod bench;
 pub mod experiment;
 pub mod fit;
 pub mod free;
 pub mod intervals;
 pub mod lab;
 pub mod map;
+mod noise;
 mod page;
+mod point;
 mod predict;
 
 use std::path::Path;
@@ -23,15 +26,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use wheeleg_config::axis::Change;
 use wheeleg_config::{AxisConfig, ParameterInfo};
-use wheeleg_plant::axis::AxisParams;
-use wheeleg_plant::sensors::AdcNoise;
 
 use self::experiment::Experiment;
-use self::fit::{Fit, Noise, Problem, scatter, trust};
-use self::free::{COUNT, FREE, Logs, applied};
+use self::fit::{Exact, Fit, Point, Problem, trust};
+use self::free::{COUNT, FREE, Logs};
 use self::intervals::Interval;
 use self::lab::Lab;
 use self::map::Mapped;
+pub use self::noise::{Noise, noise};
 use self::predict::{Predicted, predict};
 use crate::StudyError;
 use crate::study::schema::json;
@@ -39,10 +41,9 @@ use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 
 /// Starts of the fit: the file, and others around it.
 const STARTS: usize = 4;
-/// Number of fits: the starts, and one with the noise that they leave.
-const FITS: u64 = STARTS as u64 + 1;
-/// Noise of a pressure before it is known \[Pa\] (ASSUMED: a sensor of 10 bar with 0.2 %).
-const PRESSURE_PA: f64 = 2e3;
+/// Number of fits: the starts, the best of them with the unknowns of the measurement, and that with the noise
+/// that it leaves.
+const FITS: u64 = STARTS as u64 + 2;
 /// If the rest of the measurement is missed by more than this many times the sensor's noise, the model does
 /// not explain it.
 const EXPLAINED: f64 = 3.0;
@@ -195,31 +196,15 @@ pub fn identify(
     Ok(Identified { toml, ..identified }.write(job))
 }
 
-/// Noise of the position by the axis file, and a guess for pressures.
-#[must_use]
-pub fn noise(axis: &AxisParams) -> Noise {
-    let lsb_m = axis.potentiometer.electrical_stroke_m / f64::from(1_u32 << axis.adc.bits);
-    let each = match axis.adc.noise {
-        AdcNoise::None => 0.0,
-        AdcNoise::Uniform { half_width_lsb } => half_width_lsb.powi(2) / 3.0,
-        AdcNoise::Gaussian { sigma_lsb } => sigma_lsb.powi(2),
-    };
-    let mean = each / f64::from(axis.adc.oversampling.max(1));
-    Noise {
-        position_m: lsb_m * (mean + 1.0 / 12.0).sqrt(),
-        pressure_pa: PRESSURE_PA,
-    }
-}
-
 /// Starts of the fit.
-fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
+fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Point> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut all = vec![[0.0; COUNT]];
+    let mut all = vec![Point::of([0.0; COUNT])];
     all.extend((1..STARTS).map(|_| {
-        std::array::from_fn(|i| {
+        Point::of(std::array::from_fn(|i| {
             let [low, high] = limits[i];
             (trust(i) * rng.random_range(-1.0..1.0)).clamp(low, high)
-        })
+        }))
     }));
     all
 }
@@ -230,12 +215,12 @@ fn starts(limits: &[[f64; 2]; COUNT], seed: u64) -> Vec<Logs> {
 /// [`StudyError::Refused`] if the plant can play the measurement from none of the starts.
 pub fn best(
     problem: &Problem<'_>,
-    starts: &[Logs],
+    starts: &[Point],
     progress: &Progress,
 ) -> Result<(Fit, Option<Stopped>), StudyError> {
     let go_on = || !progress.is_stopped();
     let fits = progress.each("starts", starts, |start| {
-        let fit = problem.fit(start, &go_on);
+        let fit = problem.fit(start, Exact::Roughly, &go_on);
         // A fit under way when the study was stopped has not come to its end.
         Ok::<_, StudyError>((fit, go_on()))
     })?;
@@ -244,7 +229,11 @@ pub fn best(
     let fits = fits.into_iter().flatten().filter_map(|(fit, _)| fit);
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
     // Stopped before the first: only the file's values are there.
-    let file = || starts.first().and_then(|start| problem.fit(start, &go_on));
+    let file = || {
+        starts
+            .first()
+            .and_then(|start| problem.fit(start, Exact::Roughly, &go_on))
+    };
     let best = best
         .or_else(file)
         .ok_or_else(|| unplayed(problem, "the measurement", ""))?;
@@ -258,19 +247,6 @@ fn unplayed(problem: &Problem<'_>, what: &str, why: &str) -> StudyError {
         format!("the plant of {file} cannot follow {what} {}{why}", lab.file),
         format!("check stroke, mass, load and supply in {file} against the bench"),
     )
-}
-
-/// Variance of an effective residual: correlated residuals count for fewer.
-fn variance(fit: &Fit, channels: usize) -> f64 {
-    let of = |first: usize| {
-        let residuals = fit.residuals.iter().skip(first).step_by(channels);
-        let (deviation, neighbours) = scatter(&nalgebra::DVector::from_iterator(
-            fit.residuals.len() / channels,
-            residuals.copied(),
-        ));
-        deviation.powi(2) * (1.0 + neighbours) / (1.0 - neighbours)
-    };
-    (0..channels).map(of).fold(1.0, f64::max)
 }
 
 fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
@@ -314,27 +290,34 @@ pub fn fitted<'a>(
     seed: u64,
     progress: &Progress,
 ) -> Result<Fitted<'a>, StudyError> {
-    let pressures = problem.lab.samples.iter().any(|s| s.pressure_pa.is_some());
-    let channels = if pressures { 3 } else { 1 };
+    let channels = if bench::has_pressures(problem.lab) {
+        3
+    } else {
+        1
+    };
     let (first, stopped) = best(problem, &starts(&problem.limits, seed), progress)?;
+    let go_on = || !progress.is_stopped();
+    let refined =
+        |of: &Problem<'_>, fit: Fit| of.fit(&fit.point, Exact::Fully, &go_on).unwrap_or(fit);
+    let free = refined(problem, first);
     // The model's errors are noise to the fit: they do not overrule the file.
-    let share = variance(&first, channels).sqrt();
+    let left = |of: &Problem<'_>, fit: &Fit| of.noise.left(fit.residuals.as_slice(), channels);
     let second = Problem {
-        noise: Noise {
-            position_m: problem.noise.position_m * share,
-            pressure_pa: problem.noise.pressure_pa * share,
-        },
+        noise: left(problem, &free),
         ..*problem
     };
-    let go_on = || !progress.is_stopped();
-    let fit = second.fit(&first.logs, &go_on).unwrap_or(first);
+    let fit = refined(&second, free);
     let why = ": it leaves its range close to the best fit";
     let leaves = || unplayed(problem, "the measurement", why);
-    let jacobian = second.jacobian(&fit.logs).ok_or_else(leaves)?;
-    let information = intervals::information(&jacobian, variance(&fit, channels).max(1.0));
+    let known = Problem {
+        noise: left(&second, &fit),
+        ..second
+    };
+    let jacobian = known.jacobian(&fit.point).ok_or_else(leaves)?;
+    let information = intervals::information(&jacobian);
     let intervals = intervals::intervals(&information);
     Ok(Fitted {
-        problem: second,
+        problem: known,
         fit,
         intervals,
         information,
@@ -379,19 +362,20 @@ fn accepted(
     };
     let mut fit = fitted.fit.clone();
     let mut refused = Vec::new();
-    while !is_sound(&fit.logs) {
-        let moved: Vec<usize> = (0..COUNT).filter(|i| fit.logs[*i].abs() > 0.0).collect();
+    while !is_sound(&fit.point.logs) {
+        let found = fit.point.logs;
+        let moved: Vec<usize> = (0..COUNT).filter(|i| found[*i].abs() > 0.0).collect();
         if moved.is_empty() {
             break;
         }
         let alone = |i: &usize| {
             let mut logs = [0.0; COUNT];
-            logs[*i] = fit.logs[*i];
+            logs[*i] = found[*i];
             !is_sound(&logs)
         };
         let wrong: Vec<usize> = moved.iter().copied().filter(alone).collect();
         let mends = |i: &usize| {
-            let mut logs = fit.logs;
+            let mut logs = found;
             logs[*i] = 0.0;
             is_sound(&logs)
         };
@@ -400,7 +384,7 @@ fn accepted(
         refused.extend(if wrong.is_empty() { vec![one()] } else { wrong });
         fit = fitted
             .problem
-            .held(&fit.logs, &refused, &|| !progress.is_stopped())?;
+            .held(&fit.point, &refused, &|| !progress.is_stopped())?;
     }
     Some((fit, refused))
 }
@@ -478,21 +462,21 @@ impl Identified {
         let (kept, refused) = accepted(&fitted, &config, progress)
             .ok_or_else(|| unplayed(&problem, "the measurement", ""))?;
         let Fitted {
+            problem: measured,
             fit,
             intervals,
             information,
             stopped,
-            ..
         } = fitted;
         let stopped = stopped.or_else(|| progress.stopped(FITS - 1, FITS, "fits"));
-        let play = |axis: &AxisParams| {
-            predict(axis, &lab, lab.on_us.len())
+        let play = |point: &Point| {
+            predict(axis, &lab, point, lab.on_us.len())
                 .map_err(|e| unplayed(&problem, "the rest of the measurement", &format!(": {e}")))
         };
-        let played = [play(axis)?, play(&applied(axis, &kept.logs))?];
+        let played = [play(&Point::of([0.0; COUNT]))?, play(&kept.point)?];
         let parameters = FREE.iter().enumerate().map(|(i, free)| {
-            let factor = kept.logs[i].exp();
-            let [low, high] = intervals[i].factors(fit.logs[i]);
+            let factor = kept.point.logs[i].exp();
+            let [low, high] = intervals[i].factors(fit.point.logs[i]);
             Parameter {
                 name: free.name,
                 words: free.words,
@@ -515,7 +499,7 @@ impl Identified {
             experiments: if stopped.is_some() {
                 Vec::new()
             } else {
-                experiment::ranked(&problem, &kept.logs, &information, 1.0)
+                experiment::ranked(&measured, &kept.point, &information)
             },
             ticks,
             fit: kept,
@@ -547,7 +531,7 @@ impl Identified {
     fn rewritten(&self, options: &Options<'_>) -> Result<String, StudyError> {
         let lab = options.lab.file_name().map(|name| name.to_string_lossy());
         let lab = lab.unwrap_or_default();
-        let changes = changes(&self.config, &self.fit.logs, |i, info| {
+        let changes = changes(&self.config, &self.fit.point.logs, |i, info| {
             let parameter = &self.parameters[i];
             let in_unit = |factor: f64| {
                 let value = info.value.first().map_or(0.0, |v| v * factor);
