@@ -71,6 +71,9 @@ pub struct InCell {
     pub quantiles: Vec<Quantile>,
     /// Rank correlation with each factor that is drawn.
     pub spearman: Vec<Option<f64>>,
+    /// Least and largest value of each of these factors in the cases that missed the target; none of fewer than two
+    /// such cases. An effect within a narrow range of a factor is no correlation.
+    pub missed_between: Vec<Option<[f64; 2]>>,
     /// Shares of the variance that the factors of [`Findings::shared`] cause; empty where there are none.
     pub shares: Vec<Shares>,
 }
@@ -87,19 +90,34 @@ pub struct Shares {
 /// A share of a variance. Noise may make it less than 0 or more than 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// Its estimate.
-    pub value: f64,
-    /// Its interval, 95 %, by drawing from the samples; none of too many.
+    /// Its estimate; none where the interval is wider than all of the variance: these samples do not tell it.
+    pub value: Option<f64>,
+    /// Its interval, 95 %, by drawing from the samples; none of too many, and none beside no estimate.
     pub interval: Option<[f64; 2]>,
+}
+
+impl From<stats::Share> for Share {
+    fn from(share: stats::Share) -> Self {
+        let is_told = |[low, high]: &[f64; 2]| high - low <= 1.0;
+        match share.interval {
+            Some(interval) if !is_told(&interval) => Self {
+                value: None,
+                interval: None,
+            },
+            interval => Self {
+                value: Some(share.value),
+                interval,
+            },
+        }
+    }
 }
 
 impl From<stats::Shares> for Shares {
     fn from(shares: stats::Shares) -> Self {
-        let [first, total] = [shares.first, shares.total].map(|share| Share {
-            value: share.value,
-            interval: share.interval,
-        });
-        Self { first, total }
+        Self {
+            first: shares.first.into(),
+            total: shares.total.into(),
+        }
     }
 }
 
@@ -134,6 +152,8 @@ pub struct Findings {
     pub factors: Vec<String>,
     /// Names of the factors that are drawn and have numbers.
     pub drawn: Vec<String>,
+    /// Least and largest value of each of these in the table.
+    pub drawn_between: Vec<Option<[f64; 2]>>,
     /// Names of the factors that cause shares of the variance: those that Saltelli's design draws.
     pub shared: Vec<String>,
     /// Each target.
@@ -165,7 +185,7 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
         .columns
         .factors
         .iter()
-        .filter(|name| !grid.contains(name) && !table.numbers(&format!("f.{name}")).is_empty())
+        .filter(|name| !grid.contains(name) && !table.numbers(&of_factor(name)).is_empty())
         .cloned()
         .collect();
     let columns = merged.columns.all.iter();
@@ -188,6 +208,10 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
             .collect(),
         factors: merged.columns.factors.clone(),
         targets: targets.collect(),
+        drawn_between: drawn
+            .iter()
+            .map(|name| between(table.numbers(&of_factor(name)).iter().flatten()))
+            .collect(),
         drawn,
         shared,
         errors: errors(merged),
@@ -195,6 +219,20 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
         worst: worst(merged),
         paired: pairs::within(merged, &plan, &cells),
     })
+}
+
+/// The column of a factor.
+fn of_factor(name: &str) -> String {
+    format!("f.{name}")
+}
+
+/// Least and largest of at least two values.
+fn between<'a>(values: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
+    let none = (0, [f64::INFINITY, f64::NEG_INFINITY]);
+    let (count, between) = values.fold(none, |(count, [low, high]), value| {
+        (count + 1, [low.min(*value), high.max(*value)])
+    });
+    (count > 1).then_some(between)
 }
 
 /// Grounds that are listed.
@@ -252,14 +290,24 @@ fn of_target(
         };
         let y = of_rows(values);
         let spearman = drawn.iter().map(|factor| {
-            let x = of_rows(table.numbers(&format!("f.{factor}")));
+            let x = of_rows(table.numbers(&of_factor(factor)));
             stats::spearman(&x, &y)
+        });
+        let missed = || {
+            cell.rows
+                .iter()
+                .filter(|row| verdicts[**row] == Some(false))
+        };
+        let missed_between = drawn.iter().map(|factor| {
+            let x = table.numbers(&of_factor(factor));
+            between(missed().filter_map(|row| x[*row].as_ref()))
         });
         InCell {
             cell: cell.name.clone(),
             rate: Rate::of(met, of),
             quantiles: quantiles.collect(),
             spearman: spearman.collect(),
+            missed_between: missed_between.collect(),
             shares: match shared {
                 0 => Vec::new(),
                 factors => shares(table, cell, values, factors),

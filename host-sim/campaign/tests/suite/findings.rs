@@ -80,6 +80,24 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
         "{:?}",
         first.spearman
     );
+    // Where the misses lie, of what was drawn.
+    let target = &findings.targets[0];
+    let flags = read.flags(&format!("{}.pass", target.column.name));
+    for (place, name) in findings.drawn.iter().enumerate() {
+        let values = read.numbers(&format!("f.{name}")).iter().zip(flags);
+        let missed = values.filter(|(_, pass)| **pass == Some(false));
+        let [low, high] = missed
+            .filter_map(|(value, _)| *value)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                [low.min(value), high.max(value)]
+            });
+        let told = target.cells.iter().filter_map(|c| c.missed_between[place]);
+        let told: Vec<[f64; 2]> = told.collect();
+        assert!(told.iter().any(|ends| ends[0] == low), "{told:?} {low}");
+        assert!(told.iter().any(|ends| ends[1] == high), "{told:?} {high}");
+        let [least, most] = findings.drawn_between[place].expect("80 values");
+        assert!(least <= low && high <= most);
+    }
     let pairs = pairs.expect("compared");
     assert_eq!(
         (pairs.paired.pairs, pairs.same_log, pairs.only_here),
@@ -132,9 +150,10 @@ fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
     let first = &report.findings.targets[0].cells[0];
     for (found, wanted) in first.shares.iter().zip([0.2, 0.8]) {
         for share in [&found.first, &found.total] {
-            assert!((share.value - wanted).abs() < 0.1, "{found:?}");
+            let value = share.value.expect("told");
+            assert!((value - wanted).abs() < 0.1, "{found:?}");
             let [low, high] = share.interval.expect("drawn");
-            assert!(low < share.value && share.value < high, "{found:?}");
+            assert!(low < value && value < high, "{found:?}");
         }
     }
     assert_eq!(first.shares.len(), 2);
@@ -144,6 +163,46 @@ fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
     for words in ["Shares of the variance", "b, in all"] {
         assert!(html.contains(words), "{words}");
     }
+}
+
+/// One value of eight sets of samples is not 0: drawing from the sets gives anything, and the page says that they do
+/// not tell.
+#[test]
+fn shares_that_so_few_samples_do_not_tell_are_not_told() {
+    let plan = plan_of(&format!(
+        "samples = 32\nsampler = \"saltelli\"\n{HEAD}{BASE}\
+         [factor.a]\nparameter = \"robot.supply.droop\"\n\
+         uniform = {{ min = 20000, max = 21000, unit = \"Pa\" }}\n\
+         [factor.b]\nparameter = \"scenario.duration\"\n\
+         uniform = {{ min = 2000, max = 4000, unit = \"ms\" }}\n"
+    ));
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = merged(folder.path(), &plan, &|index, mut outcome| {
+        for target in &mut outcome.targets {
+            let value = if index == 1 {
+                1.0
+            } else {
+                1e-15 * (index % 3) as f64
+            };
+            target.value = target.value.map(|_| value);
+        }
+        outcome
+    });
+    let report = report::Report::of(&table, None).expect("a table");
+    let shares = &report.findings.targets[0].cells[0].shares;
+    let all = shares.iter().flat_map(|s| [&s.first, &s.total]);
+    assert!(all.clone().any(|share| share.value.is_none()), "{shares:?}");
+    for share in all {
+        let [low, high] = share.interval.unwrap_or([0.0, 0.0]);
+        assert!(high - low <= 1.0, "{share:?}");
+    }
+    let page = folder.path().join("cases.html");
+    report.write(&page).expect("a page");
+    assert!(
+        fs::read_to_string(&page)
+            .expect("there")
+            .contains("not told")
+    );
 }
 
 /// The page begins with what came of it; of very many cells it shows the first twenty, and folds the others.

@@ -58,6 +58,13 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -
     if shard != Shard::ALL {
         let _ = write!(out, " in shard {shard}");
     }
+    if ran.of == 0 {
+        let _ = write!(
+            out,
+            ": it has no block, the campaign has {}",
+            store.blocks()
+        );
+    }
     if ran.found > 0 {
         let _ = write!(out, ", {} of them found", ran.found);
     }
