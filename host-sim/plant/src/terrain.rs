@@ -80,12 +80,20 @@ impl Surface for Shape {
 
     #[inline]
     fn is_clear_of_ball(&self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
-        matches!(self, Self::Ellipsoid(s) if s.is_clear_of_ball(centre_m, radius_m))
+        match self {
+            Self::Solid(s) => s.is_clear_of_ball(centre_m, radius_m),
+            Self::Ellipsoid(s) => s.is_clear_of_ball(centre_m, radius_m),
+            Self::Plane(_) | Self::HeightMap(_) => false,
+        }
     }
 
     #[inline]
     fn is_clear_of_wheel(&self, disc: &Disc, to_a_side_m: f64) -> bool {
-        matches!(self, Self::Ellipsoid(s) if s.is_clear_of_wheel(disc, to_a_side_m))
+        match self {
+            Self::Solid(s) => s.is_clear_of_wheel(disc, to_a_side_m),
+            Self::Ellipsoid(s) => s.is_clear_of_wheel(disc, to_a_side_m),
+            Self::Plane(_) | Self::HeightMap(_) => false,
+        }
     }
 
     #[inline]

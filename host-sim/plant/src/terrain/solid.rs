@@ -215,6 +215,24 @@ impl Surface for Solid {
         }
     }
 
+    /// One face separates the two. Most bodies near a robot need no more than this.
+    #[inline]
+    fn is_clear_of_ball(&self, centre_m: &Vector3<f64>, radius_m: f64) -> bool {
+        let mut faces = self.faces.iter();
+        faces.any(|f| f.normal.dot(centre_m) - f.offset_m > radius_m + ON_M)
+    }
+
+    #[inline]
+    fn is_clear_of_wheel(&self, disc: &Disc, to_a_side_m: f64) -> bool {
+        let mut faces = self.faces.iter();
+        faces.any(|f| {
+            let aside = f.normal.dot(&disc.axis).abs();
+            let across = (1.0 - aside * aside).max(0.0).sqrt();
+            let reach_m = disc.radius_m * across + to_a_side_m * aside;
+            f.normal.dot(&disc.centre_m) - f.offset_m > reach_m + ON_M
+        })
+    }
+
     fn to_disc(&self, disc: &Disc) -> Option<Near> {
         let from_centre = disc.centre_m - self.centre_m;
         let reach = self.radius_m + disc.radius_m;

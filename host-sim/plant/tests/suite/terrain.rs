@@ -183,3 +183,41 @@ fn a_disc_is_as_deep_in_a_block_as_its_rim() {
     }
     assert!(met > 50, "{met}");
 }
+
+/// What a quick look at a block calls clear does not touch, and it is so for most that do not.
+#[test]
+fn a_quick_look_at_a_block_misses_no_touch_and_tells_most_that_are_apart() {
+    let mut rng = Pcg64Mcg::seed_from_u64(5);
+    let (mut balls, mut wheels) = ([0; 2], [0; 2]);
+    for _ in 0..3000 {
+        let mut within = |from: f64, to: f64| rng.random_range(from..to);
+        let half_m = [within(0.05, 0.3), within(0.05, 0.3)];
+        let block = Solid::block([0.0; 2], half_m, within(0.0, 6.0), [-0.5, 0.1]);
+        let axis = Vector3::new(within(-1.0, 1.0), within(-1.0, 1.0), within(-0.5, 0.5));
+        let disc = Disc {
+            centre_m: Vector3::new(within(-0.6, 0.6), within(-0.6, 0.6), within(0.0, 0.4)),
+            axis: axis.normalize(),
+            radius_m: 0.15,
+        };
+        let (place, radius_m, side_m) = (&disc.centre_m, 0.02, 0.04);
+        let apart = block.to_point(place).distance_m > radius_m;
+        let clear = block.is_clear_of_ball(place, radius_m);
+        assert!(apart || !clear, "{block:?} {place:?}");
+        balls[0] += usize::from(apart);
+        balls[1] += usize::from(clear);
+        let mut nears = (-8..=8).map(|k| {
+            block.to_disc(&Disc {
+                centre_m: place + f64::from(k) / 8.0 * side_m * disc.axis,
+                ..disc
+            })
+        });
+        let apart = nears.all(|near| near.is_none_or(|near| near.distance_m > 0.0));
+        let clear = block.is_clear_of_wheel(&disc, side_m);
+        assert!(apart || !clear, "{block:?} {disc:?}");
+        wheels[0] += usize::from(apart);
+        wheels[1] += usize::from(clear);
+    }
+    for [apart, clear] in [balls, wheels] {
+        assert!(10 * clear > 7 * apart, "{clear} of {apart}");
+    }
+}
