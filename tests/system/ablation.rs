@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
+use crate::long_checks::number;
 use wheeleg_config::AxisConfig;
 use wheeleg_control::ablation::{Part, take_out};
 use wheeleg_report::stats::{failure_bound, mcnemar, quantile};
@@ -48,10 +49,6 @@ struct Outcome {
     keeps: bool,
     /// Until within 1 mm for good, s; infinite if never.
     settle_s: f64,
-}
-
-fn number(variable: &str, default: u64) -> u64 {
-    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
 }
 
 /// Every combination of an axis, with the delays of its valves as a board finds them.

@@ -4,6 +4,7 @@
 //! The seeds begin at a hash of the law's sources, so that the law is not tuned to them. A few run here;
 //! `cargo xtask deep bench-axis` runs as many as the bars need.
 
+use crate::long_checks::number;
 use wheeleg_config::AxisConfig;
 use wheeleg_report::stats::bounded_quantile;
 use wheeleg_studies::axis_sim::suite::TestRig;
@@ -24,10 +25,6 @@ const RATIOS_MOST: [f64; 2] = [1.35, 1.35];
 /// 2026-11-29.
 const CURVE_BAR_MM: f64 = 1.0;
 const CURVE_MOST_MM: f64 = 1.5;
-
-fn number(variable: &str, default: u64) -> u64 {
-    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
-}
 
 fn met(value: f64, bar: f64) -> &'static str {
     if value <= bar { "met" } else { "not met" }

@@ -5,8 +5,9 @@
 //! moves after the first one from power-up. A hash of the law's sources selects the combinations, so that the
 //! law is not tuned to them. A few run here; `cargo xtask deep combinations` runs as many as a bar needs.
 
+use crate::long_checks::{is_no_step_back, number};
 use wheeleg_config::AxisConfig;
-use wheeleg_report::stats::{at_most, bounded_quantile, failure_bound};
+use wheeleg_report::stats::{bounded_quantile, failure_bound};
 use wheeleg_studies::axis_sim::Kind;
 use wheeleg_studies::compare::{Case, Move, Row, Variation, judging_root};
 
@@ -27,10 +28,6 @@ const CASES: [(&str, bool, f64, f64); 8] = [
     ("heavy-40x250", true, 0.025, 0.1),
     ("heavy-40x250", false, 0.025, 0.05),
 ];
-
-fn number(variable: &str, default: u64) -> u64 {
-    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
-}
 
 fn played(axis: &str, drawn: bool, root: u64, count: u64) -> Vec<Row> {
     let sheet = AxisConfig::load(axis).expect("built in").axis;
@@ -97,12 +94,8 @@ fn few_combinations_miss_on_the_four_axes() {
             p99(|r| r.figures.steady_error_mm.map(f64::abs)),
             p99(|r| r.figures.overshoot_mm),
         ));
-        // So many misses at the known rate would be a chance of 1 in 1000.
-        let chance = 1.0
-            - misses
-                .checked_sub(1)
-                .map_or(0.0, |k| at_most(k, count, known));
-        assert!(chance > 1e-3, "{}", told[told.len() - 1]);
+        let told = &told[told.len() - 1];
+        assert!(is_no_step_back(misses, count, known), "{told}");
     }
     // One line: it goes into the record of long checks.
     println!("combinations from number {root}: {}", told.join("; "));

@@ -5,11 +5,12 @@
 //! from any tick of the law's period. A hash of the law's sources selects the cylinders, so that the law is
 //! not tuned to them. 1,000 here; `cargo xtask deep cylinders` draws as many as a bar needs.
 
+use crate::long_checks::{is_no_step_back, number};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_report::stats::{at_most, failure_bound};
+use wheeleg_report::stats::failure_bound;
 use wheeleg_studies::axis_sim::suite::{Factors, StartUp, TestRig, designed};
 use wheeleg_studies::axis_sim::valve_resolution::{COARSE, ValveResolution};
 use wheeleg_studies::axis_sim::{Kind, Metrics, Trace};
@@ -74,10 +75,6 @@ fn drawn(number: u64) -> AxisParams {
     p
 }
 
-fn number(variable: &str, default: u64) -> u64 {
-    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
-}
-
 /// A learning move and two that are measured, of a cylinder off its data.
 fn played(sheet: &AxisParams, which: u64) -> Vec<Trace> {
     let (middle, span) = (
@@ -121,14 +118,6 @@ impl Tally {
             self.faults,
             bound(self.faults)
         )
-    }
-
-    /// Whether this count is no regression from a rate: a chance of more than 1 in 1000.
-    fn is_no_step_back(&self, count: u64, rate: f64) -> bool {
-        let fewer = count
-            .checked_sub(1)
-            .map_or(0.0, |k| at_most(k, self.cylinders, rate));
-        1.0 - fewer > 1e-3
     }
 }
 
@@ -175,8 +164,16 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
         share(50),
         share(90)
     );
-    assert!(fine.is_no_step_back(fine.missed, FINE_MISSED));
-    assert!(fine.is_no_step_back(fine.faults, FINE_FAULTS));
-    assert!(coarse.is_no_step_back(coarse.missed, COARSE_MISSED));
-    assert!(coarse.is_no_step_back(coarse.faults, COARSE_FAULTS));
+    assert!(is_no_step_back(fine.missed, fine.cylinders, FINE_MISSED));
+    assert!(is_no_step_back(fine.faults, fine.cylinders, FINE_FAULTS));
+    assert!(is_no_step_back(
+        coarse.missed,
+        coarse.cylinders,
+        COARSE_MISSED
+    ));
+    assert!(is_no_step_back(
+        coarse.faults,
+        coarse.cylinders,
+        COARSE_FAULTS
+    ));
 }

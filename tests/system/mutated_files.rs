@@ -13,6 +13,7 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 use std::{fmt, fs, thread};
 
+use crate::long_checks::number;
 use miette::Diagnostic;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
@@ -348,10 +349,6 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-fn variable(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |n| n.parse().expect("a number"))
-}
-
 /// How often each came.
 #[derive(Default)]
 struct Tally {
@@ -411,8 +408,8 @@ fn a_few_are_run_or_refused_in_words() {
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn each_is_run_or_refused_in_words() {
-    let first = variable(FIRST_VARIABLE, 1);
-    are_run_or_refused_in_words(first, variable(FILES_VARIABLE, FILES));
+    let first = number(FIRST_VARIABLE, 1);
+    are_run_or_refused_in_words(first, number(FILES_VARIABLE, FILES));
 }
 
 fn are_run_or_refused_in_words(first: u64, count: u64) {

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use crate::long_checks::number;
 use crate::sil::{robot, scenario};
 use wheeleg_config::{Motion, RobotConfig, Scenario, builtin};
 use wheeleg_node::joint::MotionAccount;
@@ -179,10 +180,6 @@ fn fault_free() -> Vec<Scenario> {
         fault_free.len()
     );
     fault_free
-}
-
-fn number(variable: &str, default: u64) -> u64 {
-    std::env::var(variable).map_or(default, |n| n.parse().expect("a number"))
 }
 
 #[test]

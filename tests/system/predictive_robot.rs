@@ -4,10 +4,11 @@
 //! The seeds of the three steps begin at a hash of the law's sources, so that the law is not tuned to them. A few run here;
 //! `cargo xtask deep robot` runs as many as the bar needs.
 
+use crate::long_checks::{is_no_step_back, number};
 use crate::sil;
 use std::collections::BTreeMap;
 use wheeleg_config::builtin;
-use wheeleg_report::stats::{at_most, failure_bound};
+use wheeleg_report::stats::failure_bound;
 use wheeleg_studies::analysis::analyse;
 use wheeleg_studies::compare::judging_root;
 
@@ -43,7 +44,7 @@ fn misses(scenario: &str, seeds: impl Iterator<Item = u64>) -> (u64, BTreeMap<St
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn the_three_steps_meet_their_targets() {
-    let seeds = std::env::var(STEPS_VARIABLE).map_or(32, |n| n.parse().expect("a number"));
+    let seeds = number(STEPS_VARIABLE, 32);
     let root = judging_root();
     let (missed, by_target) = misses("three-step", root..root + seeds);
     let bound = failure_bound(missed as u32, seeds as u32);
@@ -60,12 +61,10 @@ fn the_three_steps_meet_their_targets() {
             "not met"
         },
     );
-    // So many misses at the known rate would be a chance of 1 in 1000.
-    let chance = 1.0
-        - missed
-            .checked_sub(1)
-            .map_or(0.0, |k| at_most(k, seeds, STEPS_KNOWN));
-    assert!(chance > 1e-3, "{missed} of {seeds}: {by_target:?}");
+    assert!(
+        is_no_step_back(missed, seeds, STEPS_KNOWN),
+        "{missed} of {seeds}: {by_target:?}"
+    );
 }
 
 #[test]

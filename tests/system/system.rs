@@ -2,6 +2,7 @@
 //! the whole simulator once more. `hil` has its own for its real time, `determinism` for
 //! its working directory, which is the process's.
 
+mod long_checks;
 mod program;
 mod sil;
 

@@ -92,7 +92,7 @@ impl CampaignError {
         Self::Unreadable {
             path: path.into(),
             reason: reason.to_string(),
-            help: "give a file that `wheeleg campaign` has written; `wheeleg campaign merge` makes a table of a folder".to_owned(),
+            help: "give a file that `wheeleg campaign` has written".to_owned(),
         }
     }
 

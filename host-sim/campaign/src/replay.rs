@@ -120,7 +120,12 @@ pub fn replay(
 
 /// The plan in a merged table.
 pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
-    let file = open_file(path).map_err(|e| CampaignError::unreadable(path, e))?;
+    let file = open_file(path).map_err(|e| CampaignError::Unreadable {
+        path: path.to_owned(),
+        reason: e.to_string(),
+        help: "give a table that `wheeleg campaign merge` has made of a campaign's folder"
+            .to_owned(),
+    })?;
     let reader = TableReader::new(file).map_err(|e| CampaignError::unreadable(path, e))?;
     // A part has the hash of its plan alone.
     let text = reader.fact(PLAN).filter(|text| text.starts_with('{'));

@@ -96,12 +96,8 @@ impl Surface for Shape {
         }
     }
 
-    #[inline]
     fn top_m(&self) -> f64 {
-        match self {
-            Self::Ellipsoid(s) => s.top_m(),
-            _ => self.surface().top_m(),
-        }
+        self.surface().top_m()
     }
 
     fn height_m(&self, x_m: f64, y_m: f64) -> Option<f64> {

@@ -125,18 +125,23 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     assert!(html.len() < 10_000_000);
 }
 
-/// A sum of two factors of which the second has four times the variance of the first: shares of 0.2 and 0.8.
-/// A set of samples without a value is left out.
-#[test]
-fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
+/// A plan by Saltelli of two factors.
+fn by_saltelli(samples: u32) -> Plan {
     let head = HEAD.replace("block = 4", "block = 256");
-    let plan = plan_of(&format!(
-        "samples = 512\nsampler = \"saltelli\"\n{head}{BASE}\
+    plan_of(&format!(
+        "samples = {samples}\nsampler = \"saltelli\"\n{head}{BASE}\
          [factor.a]\nparameter = \"robot.supply.droop\"\n\
          uniform = {{ min = 20000, max = 21000, unit = \"Pa\" }}\n\
          [factor.b]\nparameter = \"scenario.duration\"\n\
          uniform = {{ min = 2000, max = 4000, unit = \"ms\" }}\n"
-    ));
+    ))
+}
+
+/// A sum of two factors of which the second has four times the variance of the first: shares of 0.2 and 0.8.
+/// A set of samples without a value is left out.
+#[test]
+fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
+    let plan = by_saltelli(512);
     let folder = tempfile::tempdir().expect("a folder");
     let table = merged(folder.path(), &plan, &|index, outcome| match index {
         5 => Outcome {
@@ -169,13 +174,7 @@ fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
 /// not tell.
 #[test]
 fn shares_that_so_few_samples_do_not_tell_are_not_told() {
-    let plan = plan_of(&format!(
-        "samples = 32\nsampler = \"saltelli\"\n{HEAD}{BASE}\
-         [factor.a]\nparameter = \"robot.supply.droop\"\n\
-         uniform = {{ min = 20000, max = 21000, unit = \"Pa\" }}\n\
-         [factor.b]\nparameter = \"scenario.duration\"\n\
-         uniform = {{ min = 2000, max = 4000, unit = \"ms\" }}\n"
-    ));
+    let plan = by_saltelli(32);
     let folder = tempfile::tempdir().expect("a folder");
     let table = merged(folder.path(), &plan, &|index, mut outcome| {
         for target in &mut outcome.targets {

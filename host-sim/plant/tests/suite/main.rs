@@ -14,6 +14,7 @@ mod kinematic_laws;
 mod never_nan;
 mod noc;
 mod odd;
+mod quick_look;
 mod rigid_ground;
 mod rk4;
 mod robot;
