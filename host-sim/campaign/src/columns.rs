@@ -65,7 +65,8 @@ impl Column {
     /// The limits of a target in words, after a comma; empty where it has none.
     pub(crate) fn limits(&self) -> String {
         let unit = match self.unit.as_str() {
-            "" => String::new(),
+            // A number without a unit.
+            "" | "1" => String::new(),
             unit => format!(" {unit}"),
         };
         match (self.min, self.max) {

@@ -444,8 +444,8 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
             vec!["factor.x", "`{}`"],
         ),
         (
-            "[factor.x]\nparameter = \"plant.mass\"\ngrid = [1.0]\n".to_owned(),
-            vec!["plant.mass", "`robot.`", "`scenario.`"],
+            "[factor.x]\nparameter = \"body.mass\"\ngrid = [1.0]\n".to_owned(),
+            vec!["body.mass", "`robot.`", "`scenario.`"],
         ),
     ] {
         let found = refused(&factors);

@@ -133,7 +133,8 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
         true => format!("`factor.{name}` sets `{path}` twice"),
         false => format!("`factor.{other}` and `factor.{name}` both set `{path}`"),
     };
-    let help = "of two factors of one field the later one would win: take one of them out".to_owned();
+    let help =
+        "of two factors of one field the later one would win: take one of them out".to_owned();
     r.problem(span, message, "set twice", Some(help));
 }
 
