@@ -440,7 +440,7 @@ fn a_cylinder_goes_from_the_plan_to_its_page() {
     assert_eq!(refused.status.code(), Some(2));
     let told = text(&refused.stderr);
     assert!(
-        told.contains("bench.toml:6") && told.contains("both given"),
+        told.contains("bench.toml:7") && told.contains("both given"),
         "{told}"
     );
 }
