@@ -31,6 +31,15 @@ def check_steep(rows, failed, climbed, ends) -> None:
         assert sum(reasons) >= lost, ends
 
 
+def check_cylinder(rows, failed, axes, thirds, pairs, worst) -> None:
+    assert sum(row[2] for row in axes) == sum(row[3] for row in thirds) == rows, axes
+    assert failed == rows - sum(row[3] for row in axes), axes
+    assert all(row[5] is None or row[5] > 0 for row in axes), axes
+    assert {row[1] for row in thirds} <= {0, 1, 2} >= {row[2] for row in thirds}, thirds
+    assert sum(row[2] for row in pairs) == rows // 2, pairs
+    assert len(worst) <= min(5, failed), worst
+
+
 def check_leg(rows, failed, *answers) -> None:
     # Macros and views answer nothing.
     *_, legs, sets, ratios, terrains, told = answers
@@ -91,6 +100,7 @@ def main() -> int:
         "three-step-spread": check_spread,
         "how-steep": check_steep,
         "leg-design": check_leg,
+        "cylinder-spread": check_cylinder,
     }[Path(sql).stem]
     check(rows, failed, *answers)
     print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {answers[0]}")

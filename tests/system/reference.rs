@@ -2,14 +2,19 @@
 //!
 //! `UPDATE_REFERENCE=1 cargo test -p wheeleg-tests --test system reference` rewrites them.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
 use crate::program;
+use wheeleg_campaign::{Column, Columns};
+use wheeleg_config::bench::Move;
 use wheeleg_config::faults::{KINDS, NOT_IMPLEMENTED};
 use wheeleg_config::keys::{self, Key};
 use wheeleg_config::{Measure, TARGETS, builtin};
+use wheeleg_studies::analysis::{Analyser, Target};
+use wheeleg_studies::bench::unmeasured;
 use wheeleg_telemetry::{channels, derived};
 
 /// Compares a page with the committed one, or writes it.
@@ -183,6 +188,77 @@ fn scenarios_page() {
     body.push_str("\n### [[terrain]]\n\nIts kinds and fields are in [Choose the terrain](../guide/terrain.md).\n");
     let intro = "The scenarios that are part of the program, `wheeleg run NAME`, and the keys of scenario files.";
     page("scenarios.md", "Scenarios", intro, &body);
+}
+
+/// A row for each target, each once.
+fn target_rows(body: &mut String, targets: Vec<Target>, known: &mut BTreeSet<String>) {
+    for target in targets {
+        if known.insert(target.id.clone()) {
+            let name = format!("`{}`", target.id);
+            let limits = match target.required {
+                true => target.band_text(),
+                false => String::new(),
+            };
+            row(body, &[&name, target.unit, &target.description, &limits]);
+        }
+    }
+}
+
+#[test]
+fn campaign_table_page() {
+    let mut body = String::from("## Columns of every table\n\n");
+    let [before, between] = Columns::of_every_table();
+    head(&mut body, &["column", "unit", "what"]);
+    let rows = |body: &mut String, columns: &[Column]| {
+        for column in columns {
+            let name = format!("`{}`", column.name);
+            row(body, &[&name, &column.unit, &column.meaning]);
+        }
+    };
+    rows(&mut body, &before);
+    row(
+        &mut body,
+        &[
+            "`f.NAME`",
+            "that of the factor",
+            "value of the factor `NAME`",
+        ],
+    );
+    rows(&mut body, &between);
+    row(
+        &mut body,
+        &[
+            "`ID`",
+            "that of the target",
+            "value of the target `ID`; empty if the case has none",
+        ],
+    );
+    row(
+        &mut body,
+        &["`ID.pass`", "", "whether it lies within its limits"],
+    );
+    const HEAD: [&str; 4] = ["target", "unit", "what", "required"];
+    body.push_str("\n## Targets of a cylinder on the bench\n\n");
+    head(&mut body, &HEAD);
+    let mut known = BTreeSet::new();
+    for motion in Move::ALL {
+        target_rows(&mut body, unmeasured(motion), &mut known);
+    }
+    body.push_str(
+        "\n## Targets of the built-in scenarios\n\nA scenario has some of them. Limits are those of the first that has \
+         the target.\n\n",
+    );
+    head(&mut body, &HEAD);
+    let mut known = BTreeSet::new();
+    for (name, ..) in builtin::SCENARIOS {
+        let scenario = builtin::scenario(name).expect("built in");
+        let robot = builtin::robot_of(&scenario, name).expect("built in");
+        let targets = Analyser::new(&scenario, &robot).finish().targets;
+        target_rows(&mut body, targets, &mut known);
+    }
+    let intro = "Columns of the table that `wheeleg campaign merge` makes. The table holds the same facts as \
+                 JSON, under `wheeleg.columns` of its file metadata.";
+    page("campaign-table.md", "Table of a campaign", intro, &body);
 }
 
 #[test]

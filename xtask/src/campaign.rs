@@ -4,6 +4,7 @@ mod slurm;
 
 use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use serde_json::Value;
@@ -20,7 +21,7 @@ struct Shipped {
     rows: u32,
 }
 
-const SHIPPED: [Shipped; 3] = [
+const SHIPPED: [Shipped; 4] = [
     Shipped {
         plan: "three-step-spread",
         cuts: &[("samples = 100", "samples = 5")],
@@ -58,6 +59,11 @@ const SHIPPED: [Shipped; 3] = [
             ("grid = [1.0, 0.8, 1.25]", "grid = [1.0, 0.8]"),
         ],
         rows: 16,
+    },
+    Shipped {
+        plan: "cylinder-spread",
+        cuts: &[("samples = 250", "samples = 4")],
+        rows: 32,
     },
 ];
 
@@ -179,6 +185,73 @@ pub(crate) fn pairs() -> StepResult<String> {
         pair["gained"],
         pair["p"].as_f64().unwrap_or(f64::NAN),
         hash.trim()
+    ))
+}
+
+/// Rows of cylinders, unless the environment asks for another number.
+const ROWS: u64 = 1_000_000;
+const ROWS_VARIABLE: &str = "WHEELEG_CYLINDER_ROWS";
+
+/// The shipped spread of cylinders, with more samples: run, merged and told. Its folder is kept: stopped or killed,
+/// the same command goes on, with the same program and number.
+pub(crate) fn cylinder_rows() -> StepResult<String> {
+    let rows = match std::env::var(ROWS_VARIABLE) {
+        Ok(text) => text
+            .parse::<u64>()
+            .ok()
+            .filter(|rows| *rows > 0)
+            .with_context(|| {
+                format!("{ROWS_VARIABLE} = {text}: allowed are whole numbers from 1")
+            })?,
+        Err(_) => ROWS,
+    };
+    let wheeleg = rust::build_wheeleg()?;
+    let folder = step_folder("cylinder-rows");
+    fs::create_dir_all(&folder).context("the folder of the campaign")?;
+    let shipped = root().join("host-sim/campaigns/cylinder-spread.toml");
+    let plan = fs::read_to_string(shipped).context("the shipped plan")?;
+    // Four axes and two controllers to each sample.
+    let samples = rows.div_ceil(8);
+    let rows = 8 * samples;
+    let plan = plan.replace("samples = 250", &format!("samples = {samples}"));
+    let name = |what: &str| folder.join(format!("{rows}{what}"));
+    let [file, parts, table] = [name(".toml"), name(""), name(".parquet")];
+    fs::write(&file, plan).context("the plan")?;
+    let campaign = |words: &[&str]| {
+        let mut command = command(&wheeleg);
+        command.arg("campaign").args(words);
+        command
+    };
+    let timed = |mut command: std::process::Command| -> anyhow::Result<(String, f64)> {
+        let begun = Instant::now();
+        let printed = output(&mut command)?;
+        Ok((printed, begun.elapsed().as_secs_f64()))
+    };
+    let mut command = campaign(&["run"]);
+    command.arg(&file).arg("--out").arg(&parts);
+    let (ran, run_s) = timed(command)?;
+    let mut command = campaign(&["merge"]);
+    command.arg(&parts).arg("--out").arg(&table);
+    let (merged, merge_s) = timed(command)?;
+    let mut command = campaign(&["report"]);
+    command.arg(&table);
+    let (_, report_s) = timed(command)?;
+    let line = |text: &str, word: &str| -> String {
+        let found = text.lines().find_map(|line| line.strip_prefix(word));
+        found.unwrap_or_default().trim().to_owned()
+    };
+    // What was there before was not computed now.
+    let found = ran.lines().next().and_then(|line| {
+        let words = line.strip_suffix(" of them found")?;
+        words.rsplit(' ').next()?.parse::<u64>().ok()
+    });
+    let computed = rows - found.unwrap_or(0);
+    Ok(format!(
+        "{rows} rows of cylinders, {computed} computed now in {run_s:.0} s: {:.1} a second; failed {}; merged in \
+         {merge_s:.1} s, told in {report_s:.1} s; hash {}",
+        computed as f64 / run_s,
+        line(&ran, "failed "),
+        line(&merged, "hash ")
     ))
 }
 

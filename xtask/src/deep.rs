@@ -15,7 +15,7 @@ const FUZZ_SECONDS: u64 = 600;
 /// A long check: name, what it does, about how many minutes on two cores, how.
 struct Check(&'static str, &'static str, u32, fn() -> StepResult<String>);
 
-const CHECKS: [Check; 32] = [
+const CHECKS: [Check; 33] = [
     Check(
         "flips",
         "all 1- and 2-bit flips of 1 000 frames of every message type",
@@ -106,6 +106,12 @@ const CHECKS: [Check; 32] = [
         "both laws on 10 000 random robots with the same noise; goes on where it was stopped",
         90,
         campaign::pairs,
+    ),
+    Check(
+        "cylinder-rows",
+        "1 000 000 cylinders off their data sheets as cases of a campaign; goes on where it was stopped",
+        350,
+        campaign::cylinder_rows,
     ),
     Check(
         "kubernetes",

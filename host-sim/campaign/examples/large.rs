@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use wheeleg_campaign::{
-    Case, Cases, Options, Outcome, PlanFile, Shard, Status, Store, merge, report, run,
+    Case, Cases, Options, Outcome, PlanFile, Shard, Status, Store, merge, report, run, work_s,
 };
 use wheeleg_config::plan::{Plan, Sources};
 use wheeleg_studies::analysis::Analyser;
@@ -17,7 +17,7 @@ const ROWS: u64 = 4096;
 
 /// A result without a simulation.
 fn computed(case: &Case) -> Option<Outcome> {
-    let (scenario, robot) = case.setup.as_ref().ok()?;
+    let (scenario, robot) = case.setup.as_ref().ok()?.robot()?;
     let mut targets = Analyser::new(scenario, robot).finish().targets;
     for (i, target) in targets.iter_mut().enumerate() {
         target.value = Some(case.seed as f64 * 1e-18 + i as f64);
@@ -69,8 +69,12 @@ fn main() {
     let begun = Instant::now();
     let large = plan(500_000);
     let cases = Cases::new(&large).expect("a plan");
-    let store = Store::create(folder.path(), PlanFile::of(&large, 10.0), &Stop::default())
-        .expect("a folder");
+    let store = Store::create(
+        folder.path(),
+        PlanFile::of(&large, work_s(10.0)),
+        &Stop::default(),
+    )
+    .expect("a folder");
     run(&store, &cases, &options(1), &computed).expect("it runs");
     println!(
         "first row of {} cases: {:.3} s, {:.0} MB",
@@ -89,8 +93,12 @@ fn main() {
     let small = plan(rows / 2);
     let cases = Cases::new(&small).expect("a plan");
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Store::create(folder.path(), PlanFile::of(&small, 10.0), &Stop::default())
-        .expect("a folder");
+    let store = Store::create(
+        folder.path(),
+        PlanFile::of(&small, work_s(10.0)),
+        &Stop::default(),
+    )
+    .expect("a folder");
     let begun = Instant::now();
     run(&store, &cases, &options(rows), &computed).expect("it runs");
     let each_ms = begun.elapsed().as_secs_f64() * 1e3 / rows as f64;

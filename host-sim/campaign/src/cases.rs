@@ -1,6 +1,7 @@
 //! Any case of a plan from its index.
 
-use wheeleg_config::plan::{Plan, Resolved, Resolver, Sets, Value};
+use wheeleg_config::bench::Bench;
+use wheeleg_config::plan::{Base, OnRobot, Plan, Resolved, Resolver, Sets, Value};
 use wheeleg_config::{RobotConfig, Scenario};
 use wheeleg_remote_host::Nodes;
 use wheeleg_sim::faults;
@@ -11,6 +12,21 @@ use crate::draw::Draws;
 use crate::identity::{CaseId, identity};
 use crate::place::Place;
 use crate::reasons::{problems, why};
+
+/// Simulated seconds of a robot in one of work, about.
+const SPEED: f64 = 20.0;
+/// Simulated time of a start-up, s, about (1.4 of `wheeleg-2003`, 2.7 of `wheeleg`, measured 2026-11-26): it comes
+/// before the time of a scenario.
+const START_UP_S: f64 = 2.5;
+/// Processor time of a case on the bench, s, about.
+const BENCH_S: f64 = 0.03;
+
+/// Processor time of one case, s, about: that of a scenario of so many seconds, and of its start-up. Not measured:
+/// two computers must come to the same blocks.
+#[must_use]
+pub fn work_s(duration_s: f64) -> f64 {
+    (START_UP_S + duration_s) / SPEED
+}
 
 /// Cells that are looked at before the first case.
 const CELLS: u64 = 1000;
@@ -26,8 +42,28 @@ pub struct Case {
     pub id: CaseId,
     /// Seed of all noise.
     pub seed: u64,
-    /// Scenario and robot, or why there are none.
-    pub setup: Result<(Scenario, RobotConfig), String>,
+    /// What is simulated, or why nothing can be.
+    pub setup: Result<Setup, String>,
+}
+
+/// What a case simulates.
+#[derive(Debug, Clone)]
+pub enum Setup {
+    /// A robot in a scenario.
+    Robot(Box<(Scenario, RobotConfig)>),
+    /// A cylinder on the bench.
+    Bench(Box<Bench>),
+}
+
+impl Setup {
+    /// Scenario and robot; none of a cylinder on the bench.
+    #[must_use]
+    pub fn robot(&self) -> Option<(&Scenario, &RobotConfig)> {
+        match self {
+            Self::Robot(both) => Some((&both.0, &both.1)),
+            Self::Bench(_) => None,
+        }
+    }
 }
 
 /// All cases of a plan.
@@ -70,15 +106,25 @@ impl<'a> Cases<'a> {
     /// Time of the first case's scenario, s, without its start-up.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        let setup = self.case(0).setup;
-        setup.map_or(1.0, |(scenario, _)| scenario.duration_s)
+        let setup = self.case(0).setup.ok();
+        let robot = setup.as_ref().and_then(Setup::robot);
+        robot.map_or(1.0, |(scenario, _)| scenario.duration_s)
+    }
+
+    /// Processor time of a case, s, about.
+    #[must_use]
+    pub fn work_s(&self) -> f64 {
+        match self.plan.base {
+            Base::Robot { .. } => work_s(self.duration_s()),
+            Base::Axis(_) => BENCH_S,
+        }
     }
 
     /// Whether a case can be at all: tells why not before any is begun. A case that cannot be
     /// among others that can has a row that says so.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if no case of the first sample has a scenario and a robot.
+    /// [`CampaignError::Refused`] if no case of the first sample can be simulated.
     pub fn ensure_possible(&self) -> Result<(), CampaignError> {
         let mut why = String::new();
         for cell in 0..self.plan.cells().min(CELLS) {
@@ -133,12 +179,15 @@ impl<'a> Cases<'a> {
 }
 
 /// What the simulator, too, asks of the faults; those that the plan adds stand in no other file.
-fn checked(plan: &Plan, resolved: Resolved) -> Result<(Scenario, RobotConfig), String> {
-    let Resolved {
+fn checked(plan: &Plan, resolved: Resolved) -> Result<Setup, String> {
+    let OnRobot {
         scenario, robot, ..
-    } = resolved;
+    } = match resolved {
+        Resolved::Robot(case) => *case,
+        Resolved::Axis(case) => return Ok(Setup::Bench(Box::new(case.bench))),
+    };
     match faults::check(&scenario, &robot, &Nodes::default()) {
-        Ok(()) => Ok((scenario, robot)),
+        Ok(()) => Ok(Setup::Robot(Box::new((scenario, robot)))),
         Err(error) => {
             let added = plan.factors.iter();
             let added = added.filter(|factor| matches!(factor.sets, Sets::Fault(_)));

@@ -3,8 +3,11 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use wheeleg_config::plan::{Distribution, Factor, Plan, Resolver, Sets, Value, Values};
-use wheeleg_studies::analysis::Analyser;
+use wheeleg_config::plan::{
+    Distribution, Factor, Plan, Resolved, Resolver, Sets, Setting, Value, Values,
+};
+use wheeleg_studies::analysis::{Analyser, Target};
+use wheeleg_studies::bench;
 
 use crate::CampaignError;
 use crate::pages::{MOST_COLUMNS, NAMES_MOST};
@@ -62,7 +65,8 @@ impl Column {
     /// The limits of a target in words, after a comma; empty where it has none.
     pub(crate) fn limits(&self) -> String {
         let unit = match self.unit.as_str() {
-            "" => String::new(),
+            // A number without a unit.
+            "" | "1" => String::new(),
             unit => format!(" {unit}"),
         };
         match (self.min, self.max) {
@@ -112,7 +116,12 @@ const BETWEEN: [(&str, Kind, &str, &str); 5] = [
         "ok, error, panic, crashed or limit",
     ),
     ("error", Kind::Text, "", "what went wrong"),
-    ("log_hash", Kind::Text, "", "hash of the log"),
+    (
+        "log_hash",
+        Kind::Text,
+        "",
+        "hash of the log; on the bench, of the recorded moves",
+    ),
     (
         "simulated_s",
         Kind::Number,
@@ -127,26 +136,32 @@ const BETWEEN: [(&str, Kind, &str, &str); 5] = [
     ),
 ];
 
+fn plain(list: &[(&str, Kind, &str, &str)]) -> Vec<Column> {
+    let columns = list.iter();
+    columns
+        .map(|(name, kind, unit, meaning)| Column::new(name, *kind, unit, meaning))
+        .collect()
+}
+
 impl Columns {
-    /// Those of a plan. Targets are those of all its scenarios.
+    /// Columns of every table: those before the factors, and those between them and the targets.
+    #[must_use]
+    pub fn of_every_table() -> [Vec<Column>; 2] {
+        [plain(&BEFORE), plain(&BETWEEN)]
+    }
+
+    /// Those of a plan. Targets are those of all its scenarios, or moves.
     ///
     /// # Errors
     /// [`CampaignError::Config`] if a scenario or robot is wrong, [`CampaignError::Refused`] if there are
     /// too many columns, or names that are too long.
     pub fn of(plan: &Plan, resolver: &Resolver<'_>) -> Result<Self, CampaignError> {
-        let plain = |list: &[(&str, Kind, &str, &str)]| -> Vec<Column> {
-            let columns = list.iter();
-            columns
-                .map(|(name, kind, unit, meaning)| Column::new(name, *kind, unit, meaning))
-                .collect()
-        };
         let mut all = plain(&BEFORE);
         all.extend(plan.factors.iter().map(factor_column));
         all.extend(plain(&BETWEEN));
         let mut targets: Vec<String> = Vec::new();
         for values in probes(plan) {
-            let case = resolver.resolve(&values)?;
-            for target in Analyser::new(&case.scenario, &case.robot).finish().targets {
+            for target in targets_of(&resolver.resolve(&values)?) {
                 if targets.contains(&target.id) {
                     // Of several scenarios one may ask for what another only tells.
                     let known = all.iter_mut().find(|column| column.name == target.id);
@@ -229,18 +244,15 @@ fn factor_column(factor: &Factor) -> Column {
         _ => Kind::Number,
     };
     let meaning = match &factor.sets {
-        Sets::Scenario => "scenario".to_owned(),
-        Sets::Robot => "robot".to_owned(),
+        Sets::Base(setting) => setting.name().to_owned(),
         Sets::Fault(template) => format!("fault {template}"),
-        Sets::Fields { scenario, robot } => {
-            let scenario = scenario.iter().map(|path| format!("scenario.{path}"));
-            let robot = robot.iter().map(|path| format!("robot.{path}"));
+        Sets::Fields(fields) => {
             let how = if factor.scale {
                 "times the file's "
             } else {
                 ""
             };
-            let paths: Vec<String> = scenario.chain(robot).collect();
+            let paths: Vec<String> = fields.iter().map(ToString::to_string).collect();
             format!("{how}{}", paths.join(", "))
         }
     };
@@ -261,12 +273,30 @@ fn longest_name(factor: &Factor) -> usize {
     longest.unwrap_or(0)
 }
 
-/// Values at which each scenario and each robot is seen once, the other factors in their middle.
+/// Targets without values.
+fn targets_of(case: &Resolved) -> Vec<Target> {
+    match case {
+        Resolved::Robot(case) => Analyser::new(&case.scenario, &case.robot).finish().targets,
+        Resolved::Axis(case) => bench::unmeasured(case.bench.motion),
+    }
+}
+
+/// Whether the targets depend on a setting.
+fn is_judged_by(setting: Setting) -> bool {
+    matches!(setting, Setting::Scenario | Setting::Robot | Setting::Move)
+}
+
+/// Values at which each scenario, robot and move is seen once, the other factors in their middle.
 fn probes(plan: &Plan) -> Vec<Vec<Value>> {
     let mut probes = vec![Vec::new()];
     for factor in &plan.factors {
         let values = match (&factor.sets, &factor.values) {
-            (Sets::Scenario | Sets::Robot, Values::Grid(list)) => list.clone(),
+            (Sets::Base(setting), Values::Grid(list)) if is_judged_by(*setting) => list.clone(),
+            (Sets::Base(setting), Values::Drawn(Distribution::Choice(list)))
+                if is_judged_by(*setting) =>
+            {
+                list.iter().map(|choice| choice.value.clone()).collect()
+            }
             (_, Values::Grid(list)) => vec![list[0].clone()],
             (_, Values::Drawn(distribution)) => vec![distribution.middle()],
         };

@@ -10,7 +10,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde_json::{Value as Json, json};
-use wheeleg_config::plan::{Plan, Resolved, Sets, Value};
+use wheeleg_config::plan::{Base, Part, Plan, Resolved, Sets, Setting, Value};
 
 use crate::place::Place;
 
@@ -121,14 +121,24 @@ fn content(plan: &Plan, values: &[Value], replicate: u64, resolved: Option<&Reso
             (factor.name.clone(), value)
         })
         .collect();
-    let of = |json: fn(&Resolved) -> &Json| resolved.map(|r| json(r).clone());
-    json!({
+    let mut content = json!({
         "format": FORMAT,
-        "scenario": of(|r| &r.scenario_json),
-        "robot": of(|r| &r.robot_json),
         "factors": factors,
         "replicate": replicate,
-    })
+    });
+    match (resolved, &plan.base) {
+        (Some(Resolved::Robot(case)), _) => {
+            content["scenario"] = case.scenario_json.clone();
+            content["robot"] = case.robot_json.clone();
+        }
+        (Some(Resolved::Axis(case)), _) => content["bench"] = case.bench_json.clone(),
+        (None, Base::Robot { .. }) => {
+            content["scenario"] = Json::Null;
+            content["robot"] = Json::Null;
+        }
+        (None, Base::Axis(_)) => content["bench"] = Json::Null,
+    }
+    content
 }
 
 /// Takes a paired factor and what it sets out of a content.
@@ -137,25 +147,41 @@ fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
         factors.remove(name);
     }
     match sets {
-        Sets::Scenario => content["scenario"] = Json::Null,
-        Sets::Robot => content["robot"] = Json::Null,
+        Sets::Base(Setting::Scenario) => content["scenario"] = Json::Null,
+        Sets::Base(Setting::Robot) => content["robot"] = Json::Null,
+        Sets::Base(Setting::Axis) => {
+            for key in ["name", "axis", "plant"] {
+                content["bench"][key] = Json::Null;
+            }
+        }
+        Sets::Base(setting) => content["bench"][setting.name()] = Json::Null,
         Sets::Fault(template) => {
             let fault = template.replace("{}", &value.to_string());
             if let Some(list) = content["scenario"]["faults"].as_array_mut() {
                 list.retain(|listed| listed.as_str() != Some(&fault));
             }
         }
-        Sets::Fields { scenario, robot } => {
-            for path in scenario {
-                remove_field(&mut content["scenario"], path);
-            }
-            for path in robot {
-                let parameters = &mut content["robot"]["parameters"];
-                if let Some(parameters) = parameters.as_object_mut() {
-                    parameters.retain(|listed, _| !is_or_holds(listed, path));
+        Sets::Fields(fields) => {
+            for field in fields {
+                let path = field.path.as_str();
+                match field.part {
+                    Part::Scenario => remove_field(&mut content["scenario"], path),
+                    Part::Robot => remove_parameter(&mut content["robot"]["parameters"], path),
+                    Part::Axis => {
+                        remove_parameter(&mut content["bench"]["axis"], path);
+                        remove_parameter(&mut content["bench"]["plant"], path);
+                    }
+                    Part::Plant => remove_parameter(&mut content["bench"]["plant"], path),
                 }
             }
         }
+    }
+}
+
+/// Removes the parameter that a path leads to, or into.
+fn remove_parameter(parameters: &mut Json, path: &str) {
+    if let Some(parameters) = parameters.as_object_mut() {
+        parameters.retain(|listed, _| !is_or_holds(listed, path));
     }
 }
 

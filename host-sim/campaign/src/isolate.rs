@@ -46,7 +46,7 @@ pub(crate) fn isolate(
     let child = child.map_err(|e| {
         CampaignError::refused(
             format!("cannot start `{}`: {e}", program.display()),
-            "the program must be where it was",
+            "put the program back to where it was, and run the same command again",
         )
     })?;
     let row = part::read(&file, &store.plan().hash);

@@ -1,4 +1,4 @@
-//! Campaigns: one scenario many times, on as many computers as there are.
+//! Campaigns: one scenario, or one cylinder on the bench, many times, on as many computers as there are.
 //!
 //! A plan ([`wheeleg_config::plan`]) says what differs. [`Cases`] makes any case from its index,
 //! [`run`] works off a shard of them into a folder of part files ([`Store`]), [`merge`] makes one
@@ -8,7 +8,7 @@
 //!
 //! # Glossary
 //!
-//! * **case**: one run: a scenario and a robot with a value of each factor, and a seed
+//! * **case**: one run: a scenario and a robot, or a cylinder and a move, with a value of each factor, and a seed
 //! * **sample**: values of the factors that are drawn; the same in every cell of the grid
 //! * **cell**: one combination of values of the factors that have a list
 //! * **replicate**: the same values with other noise
@@ -49,7 +49,7 @@ mod submit;
 mod table;
 mod work;
 
-pub use cases::{Case, Cases};
+pub use cases::{Case, Cases, Setup, work_s};
 pub use causes::{Cause, Causes};
 pub use columns::{Column, Columns, Kind};
 pub use compute::Simulate;
@@ -62,7 +62,7 @@ pub use isolate::isolated;
 pub use merge::{Merged, merge, merge_partial};
 pub use place::Place;
 pub use program::program;
-pub use replay::{Replayed, replay};
+pub use replay::{Files, Replayed, replay};
 pub use row::{Figure, Row, Status};
 pub use run::{Options, Ran, SAVE_EVERY, run};
 pub use shard::Shard;

@@ -1,17 +1,20 @@
-//! One case again: its row computed anew, and the whole run with log, figures and report.
+//! One case again: its row computed anew, and the whole run with log, figures and report; on the bench, the moves
+//! with tables, figures and page.
 
 use std::path::{Path, PathBuf};
 
-use wheeleg_config::{open_file, word};
+use wheeleg_config::bench::Bench;
+use wheeleg_config::{RobotConfig, Scenario, open_file, word};
 use wheeleg_report::plot::ensure_png;
-use wheeleg_studies::run::Run;
+use wheeleg_studies::bench;
+use wheeleg_studies::run::run_read;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
-use crate::cases::Cases;
+use crate::cases::{Cases, Setup};
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
-use crate::simulate::simulate;
+use crate::simulate::{on_bench, simulate};
 use crate::store::{PlanFile, Store};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
@@ -25,8 +28,15 @@ pub struct Replayed {
     pub before: Option<Row>,
     /// Program that computed it.
     pub program: String,
-    /// The run with its files; none of a case that has no scenario or robot.
-    pub run: Option<Finished<Run>>,
+    /// Its files; none of a case that cannot be simulated.
+    pub files: Option<Finished<Files>>,
+}
+
+/// What a replay has written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Files {
+    /// Hash of the log, or of the recorded moves; none of a run that was stopped or failed.
+    pub hash: Option<String>,
 }
 
 impl Replayed {
@@ -46,12 +56,10 @@ impl Replayed {
     /// case that was given up: its log ends before that of the full run.
     #[must_use]
     pub fn same_log(&self) -> Option<bool> {
-        let run = self
-            .run
-            .as_ref()
-            .filter(|run| run.result.summary.complete && self.row.status == Status::Ok)?;
+        let files = self.files.as_ref();
+        let files = files.filter(|_| self.row.status == Status::Ok)?;
         let hash = self.row.log_hash.as_ref()?;
-        Some(run.result.summary.hash == *hash)
+        Some(files.result.hash.as_ref()? == hash)
     }
 }
 
@@ -93,29 +101,54 @@ pub fn replay(
         return Ok(None);
     };
     let case = cases.case(index);
-    let run = match &case.setup {
-        Ok((scenario, robot)) => {
-            let folder = out.map_or_else(
-                || Path::new("runs").join(format!("{}-{}", plan.name, case.id)),
-                Path::to_owned,
-            );
-            let settings = Settings {
-                out: folder,
-                png,
-                stop: stop.clone(),
-            };
-            Some(wheeleg_studies::run::run_read(
-                scenario, robot, case.seed, &settings,
-            )?)
-        }
+    let settings = Settings {
+        out: out.map_or_else(
+            || Path::new("runs").join(format!("{}-{}", plan.name, case.id)),
+            Path::to_owned,
+        ),
+        png,
+        stop: stop.clone(),
+    };
+    let files = match &case.setup {
+        Ok(Setup::Robot(both)) => Some(run_again(&both.0, &both.1, case.seed, &settings)?),
+        Ok(Setup::Bench(bench)) => play_again(bench, case.seed, &settings)?,
         Err(_) => None,
     };
     Ok(Some(Replayed {
         row,
         before,
         program: plan_file.program,
-        run,
+        files,
     }))
+}
+
+/// The whole run, with log, figures and report.
+fn run_again(
+    scenario: &Scenario,
+    robot: &RobotConfig,
+    seed: u64,
+    settings: &Settings,
+) -> Result<Finished<Files>, CampaignError> {
+    let run = run_read(scenario, robot, seed, settings)?;
+    Ok(run.map(|run| Files {
+        hash: run.summary.complete.then_some(run.summary.hash),
+    }))
+}
+
+/// The moves on the bench, with tables, figures and page; none of one that cannot be played.
+fn play_again(
+    bench: &Bench,
+    seed: u64,
+    settings: &Settings,
+) -> Result<Option<Finished<Files>>, CampaignError> {
+    let (outcome, played) = on_bench(bench, seed);
+    let Some(played) = played else {
+        return Ok(None);
+    };
+    let written = bench::write(bench, seed, &played, settings)?;
+    Ok(Some(written.map(|_| Files {
+        hash: outcome.log_hash,
+    })))
 }
 
 /// The plan in a merged table.

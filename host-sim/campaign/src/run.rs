@@ -1,6 +1,6 @@
 //! Runs a shard of a campaign.
 
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -91,6 +91,8 @@ pub fn run(
         failed: AtomicU64::new(0),
         causes: Mutex::new(Causes::default()),
         last: Mutex::new(None),
+        lined: Mutex::new(Instant::now()),
+        is_terminal: std::io::stderr().is_terminal(),
         found: AtomicU64::new(0),
     };
     if !options.json {
@@ -173,12 +175,28 @@ struct Live<'a> {
     failed: AtomicU64,
     causes: Mutex<Causes>,
     last: Mutex<Option<Instant>>,
+    /// When the last line was written where no bar is shown.
+    lined: Mutex<Instant>,
+    is_terminal: bool,
 }
 
-/// Time between two lines of progress.
+/// Time between two tellings of progress, and between two plain lines of it, which stay.
 const BETWEEN: Duration = Duration::from_secs(1);
+const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
 impl Live<'_> {
+    /// A plain line from time to time where no bar is shown, as in a log of a scheduler.
+    fn line(&self, done: u64, told: &str) {
+        let Ok(mut lined) = self.lined.try_lock() else {
+            return;
+        };
+        if !self.is_terminal && lined.elapsed() >= BETWEEN_LINES {
+            *lined = Instant::now();
+            // Standard error may be closed or full.
+            let _ = writeln!(std::io::stderr(), "{done} of {} cases, {told}", self.of);
+        }
+    }
+
     fn found(&self, cases: u64) {
         self.found.fetch_add(cases, Ordering::Relaxed);
         self.tell(false);
@@ -216,8 +234,9 @@ impl Live<'_> {
             return;
         }
         let left = left_s.map_or(String::new(), |s| format!(", {s:.0} s left"));
+        let told = format!("{failed} failed, {rate:.1} cases/s{left}");
         self.progress.at(done);
-        self.progress
-            .say(format!("{failed} failed, {rate:.1} cases/s{left}"));
+        self.progress.say(told.clone());
+        self.line(done, &told);
     }
 }

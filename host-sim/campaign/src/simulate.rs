@@ -3,16 +3,18 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use wheeleg_config::bench::Bench;
 use wheeleg_scene::Scene;
 use wheeleg_sim::Boards;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
+use wheeleg_studies::bench::{self, PlayedBench};
 use wheeleg_studies::run::{self, Simulated};
 use wheeleg_studies::study::Stop;
 use wheeleg_telemetry::{Keep, LogFile, Recorder};
 
 use crate::CampaignError;
-use crate::cases::Case;
+use crate::cases::{Case, Setup};
 use crate::reasons::why;
 use crate::row::Status;
 
@@ -54,6 +56,63 @@ pub fn simulate(case: &Case, limit_s: Option<f64>, stop: &Stop) -> Option<Outcom
     recorded(case, Recorder::new(Keep::nothing()), limit_s, stop)
 }
 
+/// Plays a case on the bench; without a recording it has an error.
+pub(crate) fn on_bench(bench: &Bench, seed: u64) -> (Outcome, Option<PlayedBench>) {
+    let played = match bench::play(bench, seed) {
+        Ok(played) => played,
+        Err(error) => return (Outcome::without(Status::Error, error.to_string()), None),
+    };
+    let targets = bench::targets(bench, &played);
+    let faults = played.traces().map(|(_, trace)| trace.faults);
+    let faults = faults.reduce(|all, other| all.union(other));
+    let faults: Vec<&str> = faults
+        .iter()
+        .flat_map(|all| all.iter())
+        .map(|fault| fault.name())
+        .collect();
+    let outcome = Outcome {
+        status: Status::Ok,
+        error: (!faults.is_empty()).then(|| format!("fault {}", faults.join(", "))),
+        log_hash: Some(hash(&played)),
+        simulated_s: Some(played.simulated_s),
+        passed: Some(targets.iter().all(|target| target.pass || !target.required)),
+        targets,
+    };
+    (outcome, Some(played))
+}
+
+/// Hash of all that was recorded.
+fn hash(played: &PlayedBench) -> String {
+    let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign bench v1");
+    let mut bytes = Vec::new();
+    for (name, trace) in played.traces() {
+        hasher.update(name.as_bytes());
+        for row in &trace.rows {
+            bytes.clear();
+            let [a_pa, b_pa] = row.pressure_pa;
+            for value in [
+                row.reference_m,
+                row.stroke_m,
+                row.measured_m,
+                row.velocity_m_s,
+                a_pa,
+                b_pa,
+                row.load_n,
+                row.air_kg,
+            ] {
+                bytes.extend(value.to_le_bytes());
+            }
+            for on_us in row.on_us {
+                bytes.extend(on_us.to_le_bytes());
+            }
+            bytes.extend(row.switches.to_le_bytes());
+            bytes.push(u8::from(row.settled));
+            hasher.update(&bytes);
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
 /// The same with a log at `path`, under that name once it is whole.
 pub(crate) fn log(
     case: &Case,
@@ -66,7 +125,7 @@ pub(crate) fn log(
     let made = || {
         let mut file = LogFile::create(&temporary).map_err(StudyError::from)?;
         // A case that cannot be built has a row that says so.
-        if let Ok((scenario, robot)) = &case.setup {
+        if let Some((scenario, robot)) = case.setup.as_ref().ok().and_then(Setup::robot) {
             let scene = Scene::new(robot, scenario).map_err(StudyError::from)?;
             file = file.with(scene).map_err(StudyError::from)?;
         }
@@ -89,7 +148,8 @@ fn recorded(
     stop: &Stop,
 ) -> Option<Outcome> {
     let (scenario, robot) = match &case.setup {
-        Ok(setup) => setup,
+        Ok(Setup::Robot(both)) => (&both.0, &both.1),
+        Ok(Setup::Bench(bench)) => return Some(on_bench(bench, case.seed).0),
         Err(why) => return Some(Outcome::without(Status::Error, why.clone())),
     };
     let mut over = false;

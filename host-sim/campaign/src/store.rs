@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
-use wheeleg_config::plan::{MOST_BLOCKS, Plan, Sources, Text};
+use wheeleg_config::plan::{MOST_BLOCKS, MOST_IN_BLOCK, Plan, Sources, Text};
 use wheeleg_report::output::same_file;
 use wheeleg_studies::study::Stop;
 
@@ -53,26 +53,14 @@ pub struct PlanFile {
     pub sources: Sources,
 }
 
-/// Work of one block, s, where the plan does not say how many cases it has. Not measured: two
-/// computers must come to the same blocks.
+/// Work of one block, s, where the plan does not say how many cases it has.
 const BLOCK_S: f64 = 60.0;
-/// Simulated seconds in one of work, about.
-const SPEED: f64 = 20.0;
-/// Simulated time of a start-up, s, about (1.4 of `wheeleg-2003`, 2.7 of `wheeleg`, measured 2026-11-26): it comes
-/// before the time of a scenario.
-const START_UP_S: f64 = 2.5;
-
-/// Work of one case, s, about: that of a scenario of so many seconds, and of its start-up.
-pub(crate) fn work_s(duration_s: f64) -> f64 {
-    (START_UP_S + duration_s) / SPEED
-}
 
 impl PlanFile {
-    /// That of a plan, for this program. `duration_s`: time of a case's scenario, without its
-    /// start-up.
+    /// That of a plan, for this program. `work_s`: processor time of a case, about.
     #[must_use]
-    pub fn of(plan: &Plan, duration_s: f64) -> Self {
-        let by_work = (BLOCK_S / work_s(duration_s)).max(1.0) as u64;
+    pub fn of(plan: &Plan, work_s: f64) -> Self {
+        let by_work = (BLOCK_S / work_s).clamp(1.0, MOST_IN_BLOCK as f64) as u64;
         // The power of two that is not above it, unless that makes too many parts.
         let by_work = 1 << by_work.ilog2();
         let by_number = plan.cases().div_ceil(MOST_BLOCKS).next_power_of_two();
@@ -148,6 +136,7 @@ impl PlanFile {
                 plan,
                 scenarios,
                 robots,
+                axes,
                 data,
                 ..
             } = of.sources.clone();
@@ -155,6 +144,7 @@ impl PlanFile {
                 .into_iter()
                 .map(|(n, t)| (format!("scenario {n}"), t));
             let robots = robots.into_iter().map(|(n, t)| (format!("robot {n}"), t));
+            let axes = axes.into_iter().map(|(n, t)| (format!("axis {n}"), t));
             let plan = [("plan".to_owned(), plan)];
             let files = data.into_iter().flat_map(|(scenario, files)| {
                 files.into_iter().map(move |(file, data)| {
@@ -166,6 +156,7 @@ impl PlanFile {
             plan.into_iter()
                 .chain(named)
                 .chain(robots)
+                .chain(axes)
                 .chain(files)
                 .collect::<Vec<_>>()
         };
@@ -193,7 +184,7 @@ impl PlanFile {
                 return Some(format!("the {name} differs, first in line {number}"));
             }
         }
-        Some("it lacks a scenario or a robot".to_owned())
+        Some("it lacks a scenario, a robot or an axis".to_owned())
     }
 }
 
@@ -206,7 +197,12 @@ fn hash(sources: &Sources, block: u64) -> String {
     };
     add(&block.to_string());
     add(&sources.plan.text);
-    for (kind, files) in [("scenario", &sources.scenarios), ("robot", &sources.robots)] {
+    let kinds = [
+        ("scenario", &sources.scenarios),
+        ("robot", &sources.robots),
+        ("axis", &sources.axes),
+    ];
+    for (kind, files) in kinds {
         for (name, source) in files {
             add(kind);
             add(name);

@@ -6,7 +6,6 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::store::work_s;
 use crate::{CampaignError, Store};
 
 /// Shortest work of a task, s: less is mostly start-up, and overwhelms a site.
@@ -39,16 +38,16 @@ impl Submission {
         name: &str,
         program: &Path,
         shards: u64,
-        duration_s: f64,
+        case_s: f64,
     ) -> Result<Self, CampaignError> {
-        let work_s = store.plan().cases as f64 * work_s(duration_s);
+        let work_s = store.plan().cases as f64 * case_s;
         let most = ((work_s / LEAST_TASK_S) as u64)
             .max(FEW)
             .min(store.blocks());
         if shards == 0 || shards > most {
             return Err(CampaignError::refused(
                 format!(
-                    "{shards} shards of {} blocks, about {work_s:.0} s of work",
+                    "{shards} shards are too many, or none: the campaign has {} blocks, about {work_s:.0} s of work",
                     store.blocks()
                 ),
                 format!(

@@ -9,13 +9,14 @@
 //!   limits that judge it
 //! * **terrain**: the ground of a scenario, in parts, each with a kind and a material
 //! * **source**: origin of a value: PAPER, DATASHEET, DERIVED, ASSUMED, IDENTIFIED
-//! * **plan**: a file of a campaign: a scenario, and the differences from case to case
+//! * **plan**: a file of a campaign: a scenario or an axis, and the differences from case to case
 //! * **factor**: one of these differences: a list of values, or a distribution
 //! * **fingerprint**: hash of names, values and units of a robot; files that differ only in layout have the
 //!   same
 
 pub mod axis;
 mod bars;
+pub mod bench;
 mod board_value;
 pub mod builtin;
 mod command;

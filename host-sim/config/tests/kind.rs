@@ -21,6 +21,7 @@ fn plan_of(text: &str) -> Result<Plan, ConfigError> {
         plan,
         scenarios: BTreeMap::new(),
         robots: BTreeMap::new(),
+        axes: BTreeMap::new(),
         robot_of: BTreeMap::new(),
         data: BTreeMap::new(),
     })

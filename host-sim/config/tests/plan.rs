@@ -69,6 +69,7 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
         number(1.5),
     ];
     let case = resolver.resolve(&values).expect("it can be");
+    let case = case.on_robot().expect("a robot");
     let plain = wheeleg_config::builtin::robot("wheeleg-2003").expect("built in");
     let changed: BTreeMap<&str, &[f64]> = (case.robot.parameters.iter())
         .zip(&plain.parameters)
@@ -247,7 +248,8 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     let resolver = Resolver::new(&plan).expect("usable");
     for ground in ["walk", "rocks-20"] {
         let case = resolver.resolve(&[Value::Text(ground.to_owned())]);
-        let bars = case.expect("it can be").scenario.bars;
+        let case = case.expect("it can be").on_robot().expect("a robot");
+        let bars = case.scenario.bars;
         assert_eq!(bars.len(), 2, "{ground}");
         assert_eq!((bars[0].measure, bars[0].min), (Measure::Speed, Some(0.02)));
         assert!(bars[0].required && !bars[1].required);
@@ -257,7 +259,8 @@ fn bars_of_a_plan_stand_in_place_of_those_of_its_scenarios() {
     let plan = walks("").expect("usable");
     let resolver = Resolver::new(&plan).expect("usable");
     let own = resolver.resolve(&[Value::Text("walk".to_owned())]);
-    assert_eq!(own.expect("it can be").scenario.bars.len(), 8);
+    let own = own.expect("it can be").on_robot().expect("a robot");
+    assert_eq!(own.scenario.bars.len(), 8);
     for (bars, told) in [
         ("[[bars]]\nmeasure = \"conditioning\"\n", "`info = true`"),
         (
@@ -441,8 +444,8 @@ fn what_is_wrong_is_told_with_field_value_and_range() {
             vec!["factor.x", "`{}`"],
         ),
         (
-            "[factor.x]\nparameter = \"plant.mass\"\ngrid = [1.0]\n".to_owned(),
-            vec!["plant.mass", "`robot.`", "`scenario.`"],
+            "[factor.x]\nparameter = \"body.mass\"\ngrid = [1.0]\n".to_owned(),
+            vec!["body.mass", "`robot.`", "`scenario.`"],
         ),
     ] {
         let found = refused(&factors);
@@ -650,7 +653,8 @@ fn a_plan_may_stand_on_a_height_map() {
     let built_in = Plan::of(sources(&format!("{ON_A_MAP}\"height-map\"\n"))).expect("usable");
     let resolve = |plan: &Plan| {
         let resolver = Resolver::new(plan).expect("read");
-        resolver.resolve(&[]).expect("a case")
+        let case = resolver.resolve(&[]).expect("a case");
+        case.on_robot().expect("a robot")
     };
     let ground = resolve(&built_in).scenario.ground;
     let own = wheeleg_config::builtin::scenario("height-map").expect("built in");

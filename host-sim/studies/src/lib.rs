@@ -4,6 +4,7 @@
 //! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
 //! * [`matrix`]: every fault, and the required response;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`axis_sim`]);
+//! * [`mod@bench`]: one cylinder off its data sheet, a case of a campaign;
 //! * [`identify`]: a user's cylinder from measurements;
 //! * [`figures`]: the paper's figures and misprints;
 //! * [`study`]: the parts that all of them share;
@@ -20,6 +21,7 @@
 
 pub mod analysis;
 pub mod axis_sim;
+pub mod bench;
 mod cause;
 pub mod check;
 pub mod compare;

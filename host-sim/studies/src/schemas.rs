@@ -10,6 +10,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     vec![
         schema::<crate::run::Summary>(),
         schema::<crate::compare::Cases<'static>>(),
+        schema::<crate::bench::BenchSummary>(),
         schema::<crate::tune::Summary<'static>>(),
         schema::<crate::delay::Summary<'static>>(),
         schema::<crate::matrix::Summary<'static>>(),

@@ -362,6 +362,89 @@ fn a_pilot_has_a_table_and_a_page() {
     assert!(state["causes"][0]["cases"].as_u64() > Some(0), "{state}");
 }
 
+fn view(folder: &Path) -> Output {
+    let mut view = Command::new(env!("CARGO_BIN_EXE_wheeleg"));
+    output(view.arg("view").arg(folder).env("NO_COLOR", "1"))
+}
+
+/// The page of the log of a robot says what its run missed.
+#[test]
+fn the_log_of_a_replayed_case_tells_what_it_missed() {
+    let home = folder();
+    let plan = plan(home.path(), 1);
+    let [out, again] = ["out", "again"].map(|name| home.path().join(name));
+    succeeded(wheeleg().arg("run").arg(&plan).arg("--out").arg(&out));
+    succeeded(
+        wheeleg()
+            .arg("replay")
+            .arg(&out)
+            .arg("0")
+            .arg("--out")
+            .arg(&again),
+    );
+    let told = text(&view(&again).stdout);
+    assert!(told.contains("required targets missed"), "{told}");
+    let page = fs::read_to_string(again.join("log.html")).expect("a page");
+    assert!(page.contains("<h2>Missed</h2>") && page.contains("asked: "));
+    // A summary of another run says nothing of this log.
+    let summary = again.join("summary.json");
+    let other = fs::read_to_string(&summary).expect("there");
+    fs::write(&summary, other.replace("\"seed\": \"", "\"seed\": \"1")).expect("written");
+    let told = text(&view(&again).stdout);
+    assert!(!told.contains("missed"), "{told}");
+}
+
+/// A cylinder on the bench, from the plan to its page; it has no log, and `view` says where its page is.
+#[test]
+fn a_cylinder_goes_from_the_plan_to_its_page() {
+    let home = folder();
+    let plan = home.path().join("bench.toml");
+    let text_of = "name = \"bench\"\nroot = 3\nsamples = 2\nblock = 2\n[base]\naxis = \"small-12x50\"\n\
+        move = \"step-20\"\n[factor.friction]\nparameter = \"plant.friction.viscous\"\nscale = true\n\
+        uniform = { min = 0.5, max = 1.5 }\n";
+    fs::write(&plan, text_of).expect("written");
+    let at = |name: &str| home.path().join(name);
+    let (out, table, again) = (at("out"), at("cases.parquet"), at("again"));
+    succeeded(wheeleg().arg("run").arg(&plan).arg("--out").arg(&out));
+    merged(&[&out], &table);
+    let told = succeeded(wheeleg().arg("report").arg(&table));
+    assert!(told.contains("rows    2"), "{told}");
+    let page = fs::read_to_string(at("cases.html")).expect("a page");
+    assert!(page.contains("rest-error") && !page.contains("<h2>Ground</h2>"));
+    let told = succeeded(
+        wheeleg()
+            .arg("replay")
+            .arg(&table)
+            .arg("1")
+            .arg("--out")
+            .arg(&again),
+    );
+    assert!(told.contains("row     bit-identical"), "{told}");
+    assert!(told.contains("log     bit-identical"), "{told}");
+    let refused = view(&again);
+    assert_eq!(refused.status.code(), Some(2));
+    let told = text(&refused.stderr);
+    assert!(
+        told.contains("no log.mcap") && told.contains("report.html"),
+        "{told}"
+    );
+    let both = text_of.replace("[base]\n", "[base]\nscenario = \"stand\"\n");
+    fs::write(&plan, both).expect("written");
+    let refused = output(
+        wheeleg()
+            .arg("run")
+            .arg(&plan)
+            .arg("--out")
+            .arg(at("other")),
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    let told = text(&refused.stderr);
+    assert!(
+        told.contains("bench.toml:7") && told.contains("both given"),
+        "{told}"
+    );
+}
+
 #[test]
 fn bad_input_is_told_before_the_first_case() {
     let home = folder();

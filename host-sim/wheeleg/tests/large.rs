@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use wheeleg_campaign::{Cases, Figure, PlanFile, Row, Status, Store};
+use wheeleg_campaign::{Cases, Figure, PlanFile, Row, Status, Store, work_s};
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::Stop;
 
@@ -165,8 +165,12 @@ fn a_large_table_is_merged_and_told_in_time() {
     let cases = Cases::new(&plan).expect("a plan");
     let columns = cases.columns();
     assert_eq!(columns.all.len(), 44);
-    let store =
-        Store::create(home.path(), PlanFile::of(&plan, 25.0), &Stop::default()).expect("a folder");
+    let store = Store::create(
+        home.path(),
+        PlanFile::of(&plan, work_s(25.0)),
+        &Stop::default(),
+    )
+    .expect("a folder");
     let mut state = 88_172_645_463_325_252;
     for block in 0..store.blocks() {
         let rows = made_up(&cases, store.cases_of(block), &mut state);

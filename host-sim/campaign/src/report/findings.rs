@@ -14,7 +14,7 @@ use super::worst::{Worst, worst};
 use crate::columns::Column;
 use crate::row::Status;
 use crate::table::Table;
-use crate::{CampaignError, Cases};
+use crate::{CampaignError, Cases, Setup};
 
 /// Kinds of errors that are listed.
 const ERRORS: usize = 20;
@@ -160,7 +160,7 @@ pub struct Findings {
     pub targets: Vec<OfTarget>,
     /// Errors by kind, the most frequent first.
     pub errors: Vec<(String, u64)>,
-    /// What the scenarios stand on.
+    /// What the scenarios stand on; empty of cylinders on the bench.
     pub grounds: Vec<OfScenario>,
     /// The worst cases, the worst first; those that passed come last, the nearest to a limit first.
     pub worst: Vec<Worst>,
@@ -248,12 +248,13 @@ fn grounds(plan: &Plan, merged: &Merged, cells: &[Cell]) -> Result<Vec<OfScenari
         let Some(index) = index.and_then(|index| u64::try_from(index).ok()) else {
             continue;
         };
-        let Ok((scenario, _)) = cases.case(index).setup else {
+        let setup = cases.case(index).setup.ok();
+        let Some((scenario, _)) = setup.as_ref().and_then(Setup::robot) else {
             continue;
         };
         let of = OfScenario {
-            scenario: scenario.name,
-            parts: scenario.ground.parts,
+            scenario: scenario.name.clone(),
+            parts: scenario.ground.parts.clone(),
         };
         if !found.contains(&of) {
             found.push(of);

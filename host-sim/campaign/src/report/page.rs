@@ -11,6 +11,7 @@ use super::findings::{Findings, Rate};
 use super::pairs::Pairs;
 use super::shares;
 use crate::CampaignError;
+use crate::columns::Column;
 
 const TEMPLATE: &str = include_str!("page.html");
 /// Colours of the cells' curves.
@@ -119,16 +120,35 @@ fn distributions(merged: &Merged, cells: &[cells::Cell]) -> Vec<Figure> {
         let margin = 0.05 * (high - low).max(1e-12);
         let unit = format!("{} [{}]", column.name, column.unit);
         let content = Content::curves(&unit, ("[share of cases below]", (0.0, 1.0)), series);
-        let mut panel = Panel::new("", (low - margin, high + margin), 180, content);
+        let x_range = (low - margin, high + margin);
+        let mut panel = Panel::new("", x_range, 180, content);
+        let seen = limits
+            .iter()
+            .filter(|limit| (x_range.0..=x_range.1).contains(*limit));
+        let caption = caption(column, seen.count() == limits.len());
         panel.marks = limits;
         Some(Figure {
             id: format!("distribution-{}", column.name.to_lowercase()),
             title: format!("{}: {}", column.name, column.meaning),
-            caption: "Vertical lines: limits.".to_owned(),
+            caption,
             panels: vec![panel],
         })
     });
     figures.collect()
+}
+
+/// How a distribution is read, with the target's limits.
+fn caption(column: &Column, all_seen: bool) -> String {
+    let read = "The curve is the share of cases with a smaller value.";
+    match column.limits().strip_prefix(", ") {
+        None => format!("{read} This quantity has no limits."),
+        Some(allowed) if all_seen => format!("{read} A vertical line is a limit: {allowed}."),
+        Some(allowed) => {
+            format!(
+                "{read} A vertical line is a limit, one far from all values is left out: {allowed}."
+            )
+        }
+    }
 }
 
 /// Share of values below each of them.

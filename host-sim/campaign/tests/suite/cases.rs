@@ -51,7 +51,8 @@ fn legs_of_the_shipped_plan_are_all_there_with_their_own_indices() {
     let mut found = BTreeSet::new();
     for number in 0..36 {
         let case = cases.case(number);
-        let (scenario, robot) = case.setup.as_ref().expect("it can be");
+        let setup = case.setup.as_ref().expect("it can be");
+        let (scenario, robot) = setup.robot().expect("a robot");
         assert_eq!((scenario.name.as_str(), case.place.sample), ("walk", 0));
         assert_eq!(case.seed, cases.case(0).seed);
         let leg = index(robot);
@@ -313,8 +314,8 @@ fn the_largest_plan_is_begun_and_told_in_a_moment() {
     let plan = plan_of(text);
     let begun = std::time::Instant::now();
     let folder = tempfile::tempdir().expect("a folder");
-    let store = Store::create(folder.path(), PlanFile::of(&plan, 20.0), &Stop::default())
-        .expect("a folder");
+    let store =
+        Store::create(folder.path(), PlanFile::of(&plan, 1.0), &Stop::default()).expect("a folder");
     assert_eq!(store.blocks(), 1_000_000);
     let cases = Cases::new(&plan).expect("a plan");
     let pilot = Options {

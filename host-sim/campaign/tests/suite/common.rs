@@ -35,7 +35,8 @@ pub(crate) fn spread(samples: u64) -> Plan {
 
 /// A result that depends on every value and, by less than 0.1, on the seed, without a simulation.
 pub(crate) fn computed(case: &Case) -> Outcome {
-    let (scenario, robot) = case.setup.as_ref().expect("it can be");
+    let setup = case.setup.as_ref().expect("it can be");
+    let (scenario, robot) = setup.robot().expect("a robot");
     let number = |v: &Value| match v {
         Value::Number(x) => *x,
         other => other.to_string().len() as f64,

@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use wheeleg_campaign::{
-    CampaignError, Merged, PlanFile, Shard, Store, merge, merge_partial, status,
+    CampaignError, Merged, PlanFile, Shard, Store, merge, merge_partial, status, work_s,
 };
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::{Signal, Stop};
@@ -189,7 +189,7 @@ fn a_table_is_no_file_of_its_campaign() {
 fn a_block_that_nobody_chose_is_a_minute_of_work() {
     let text = "name = \"short\"\nroot = 1\nreplicates = 1000\n[base]\nscenario = \"stand\"\n";
     let plan = crate::common::plan_of(text);
-    let block = |duration_s| PlanFile::of(&plan, duration_s).block;
+    let block = |duration_s| PlanFile::of(&plan, work_s(duration_s)).block;
     assert_eq!([0.3, 10.0, 60.0, 7200.0].map(block), [256, 64, 16, 1]);
 }
 

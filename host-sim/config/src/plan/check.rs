@@ -5,9 +5,11 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::base::Base;
 use super::distribution::Distribution;
-use super::factor::{Factor, Sets, Values};
-use super::resolve::{Base, Resolver, factor_between};
+use super::factor::{Factor, Field, Part, Sets, Values};
+use super::field::{Template, factor_between};
+use super::resolve::Resolver;
 use super::value::Value;
 use super::{Plan, distribution};
 use crate::error::ConfigError;
@@ -16,11 +18,6 @@ use crate::quantity::{pretty, suffix};
 use crate::reader::Reader;
 use crate::suggest::closest;
 
-/// Prefix of a path into a scenario.
-const SCENARIO: &str = "scenario.";
-/// Prefix of a path into a robot.
-const ROBOT: &str = "robot.";
-
 /// Reports every factor that does not fit the files, and every end of a factor at which the files become
 /// contradictory.
 pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
@@ -28,20 +25,55 @@ pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
     let mut earlier = BTreeMap::new();
     for factor in &plan.factors {
         twice(r, factor, &mut earlier);
-        let Sets::Fields { scenario, robot } = &factor.sets else {
+        if !is_of_base(r, plan, factor) {
+            continue;
+        }
+        let Sets::Fields(fields) = &factor.sets else {
             continue;
         };
-        for path in scenario {
-            field_in_all(r, factor, (SCENARIO, path), resolver.scenarios.values());
-        }
-        for path in robot {
-            field_in_all(r, factor, (ROBOT, path), resolver.robots.values());
+        for field in fields {
+            field_in_all(r, factor, field, resolver.files_of(field.part));
         }
     }
     if r.is_clean() {
         ends(r, plan, &resolver);
     }
     Ok(())
+}
+
+/// Whether a factor sets what the plan's base has; reports it if not.
+fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
+    let on_bench = matches!(plan.base, Base::Axis(_));
+    let other = match &factor.sets {
+        Sets::Base(setting) => {
+            (setting.is_of_bench() != on_bench).then(|| format!("`{}`", setting.name()))
+        }
+        Sets::Fault(_) => on_bench.then(|| "a fault".to_owned()),
+        Sets::Fields(fields) => {
+            let other = fields.iter().find(|f| f.part.is_of_bench() != on_bench);
+            other.map(|field| format!("`{field}`"))
+        }
+    };
+    let Some(other) = other else {
+        return true;
+    };
+    let (base, allowed) = match on_bench {
+        true => (
+            "a cylinder on the bench (`base.axis`)",
+            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`",
+        ),
+        false => (
+            "a robot in a scenario (`base.scenario`)",
+            "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, and a `fault`",
+        ),
+    };
+    let span = span_of(r, factor);
+    let message = format!(
+        "`factor.{}` sets {other}, and every case is {base}",
+        factor.name
+    );
+    r.problem(span, message, "not of this base", Some(allowed.to_owned()));
+    false
 }
 
 /// Position of a factor's values in the plan.
@@ -68,14 +100,9 @@ fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>>
 /// The paths that a factor sets, as in a plan.
 fn set_by(factor: &Factor) -> Vec<String> {
     match &factor.sets {
-        Sets::Scenario => vec!["scenario".to_owned()],
-        Sets::Robot => vec!["robot".to_owned()],
+        Sets::Base(setting) => vec![setting.name().to_owned()],
         Sets::Fault(_) => Vec::new(),
-        Sets::Fields { scenario, robot } => {
-            let scenario = scenario.iter().map(|path| format!("scenario.{path}"));
-            let robot = robot.iter().map(|path| format!("robot.{path}"));
-            scenario.chain(robot).collect()
-        }
+        Sets::Fields(fields) => fields.iter().map(ToString::to_string).collect(),
     }
 }
 
@@ -106,7 +133,9 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
         true => format!("`factor.{name}` sets `{path}` twice"),
         false => format!("`factor.{other}` and `factor.{name}` both set `{path}`"),
     };
-    r.problem(span, message, "set twice", None);
+    let help =
+        "of two factors of one field the later one would win: take one of them out".to_owned();
+    r.problem(span, message, "set twice", Some(help));
 }
 
 /// One field that a factor sets, in all files that have it; an error in one file is not repeated for the
@@ -114,8 +143,8 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
 fn field_in_all<'a>(
     r: &mut Reader,
     factor: &Factor,
-    path: (&str, &str),
-    mut bases: impl Iterator<Item = &'a Base>,
+    path: &Field,
+    mut bases: impl Iterator<Item = &'a Template>,
 ) {
     let before = r.problem_count();
     while let Some(base) = bases.next().filter(|_| r.problem_count() == before) {
@@ -145,8 +174,8 @@ const WITHOUT_EFFECT: [(&str, &str); 4] = [
 ];
 
 /// One field that a factor sets, in one file.
-fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &Base) {
-    let full = format!("{prefix}{path}");
+fn field(r: &mut Reader, factor: &Factor, field: &Field, base: &Template) {
+    let (full, path) = (field.to_string(), field.path.as_str());
     let named = format!("`factor.{}.parameter` = \"{full}\"", factor.name);
     let at_path = span_of_path(r, factor, &full);
     let without_effect = WITHOUT_EFFECT.iter().find(|(set, _)| *set == full);
@@ -163,7 +192,7 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
     if factor.is_text() {
         if !base.has_text(path) {
             let message = format!("{named}: {} has no name there", base.file);
-            let help = nearest(base, prefix, path, factor);
+            let help = nearest(base, field, factor);
             r.problem(at_path, message, "no such name", Some(help));
         }
         return;
@@ -179,7 +208,7 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
             Some(_) => format!("{named}: {} has no list there, but one number", base.file),
             None => format!("{named}: {} has no such parameter", base.file),
         };
-        let help = nearest(base, prefix, path, factor);
+        let help = nearest(base, field, factor);
         r.problem(at_path, message, "not known", Some(help));
         return;
     };
@@ -211,7 +240,8 @@ fn field(r: &mut Reader, factor: &Factor, (prefix, path): (&str, &str), base: &B
 }
 
 /// A path similar to an unknown one, which this factor could set.
-fn nearest(base: &Base, prefix: &str, path: &str, factor: &Factor) -> String {
+fn nearest(base: &Template, field: &Field, factor: &Factor) -> String {
+    let (prefix, path) = (field.part.prefix(), field.path.as_str());
     let paths = base.listing.iter().map(|p| p.path.as_str());
     let near = closest(path, paths).and_then(|word| base.listed(word));
     match near {
@@ -219,7 +249,9 @@ fn nearest(base: &Base, prefix: &str, path: &str, factor: &Factor) -> String {
             format!("did you mean \"{prefix}{}[0]\"?", info.path)
         }
         Some((info, _)) => format!("did you mean \"{prefix}{}\"?", info.path),
-        None if prefix == ROBOT => "`wheeleg params` lists a robot's parameters".to_owned(),
+        None if field.part == Part::Robot => {
+            "`wheeleg params` lists a robot's parameters".to_owned()
+        }
         None => format!("allowed are the quantities that {} gives", base.file),
     }
 }

@@ -1,5 +1,6 @@
 //! One factor of a plan: its target, and its values.
 
+use super::base::Setting;
 use super::distribution::{self, Distribution};
 use super::value::{Value, list};
 use crate::reader::{Entry, NAME_LENGTH, Reader};
@@ -7,19 +8,62 @@ use crate::reader::{Entry, NAME_LENGTH, Reader};
 /// The target of a factor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Sets {
-    /// The scenario to run.
+    /// A key of `[base]`.
+    Base(Setting),
+    /// Fields of files.
+    Fields(Vec<Field>),
+    /// A fault, with the value in place of its `{}`.
+    Fault(String),
+}
+
+/// A file of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// The scenario.
     Scenario,
     /// The robot.
     Robot,
-    /// Fields of the scenario, without the plan's prefix `scenario.`, and of the robot, without its `robot.`.
-    Fields {
-        /// Of the scenario.
-        scenario: Vec<String>,
-        /// Of the robot.
-        robot: Vec<String>,
-    },
-    /// A fault, with the value in place of its `{}`.
-    Fault(String),
+    /// The axis: its data sheet, and with it the plant.
+    Axis,
+    /// The plant of the axis alone: it then differs from its data sheet.
+    Plant,
+}
+
+impl Part {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Scenario, Self::Robot, Self::Axis, Self::Plant];
+
+    /// Prefix of a path into it.
+    #[must_use]
+    pub const fn prefix(self) -> &'static str {
+        match self {
+            Self::Scenario => "scenario.",
+            Self::Robot => "robot.",
+            Self::Axis => "axis.",
+            Self::Plant => "plant.",
+        }
+    }
+
+    /// Whether it is of a cylinder on the bench.
+    #[must_use]
+    pub const fn is_of_bench(self) -> bool {
+        matches!(self, Self::Axis | Self::Plant)
+    }
+}
+
+/// A field of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// The file.
+    pub part: Part,
+    /// Path in it.
+    pub path: String,
+}
+
+impl std::fmt::Display for Field {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{}", self.part.prefix(), self.path)
+    }
 }
 
 /// Origin of the values.
@@ -143,29 +187,40 @@ fn read(r: &mut Reader, name: &str) -> Option<Factor> {
 fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
     let path = &entry.path;
     let why = match &factor.sets {
-        Sets::Scenario | Sets::Robot if !matches!(factor.values, Values::Grid(_)) => {
-            "scenarios and robots are given as `grid = [\"NAME\", …]`"
+        Sets::Base(Setting::LoadShare) if factor.is_text() || !factor.unit.is_empty() => {
+            "a share of the force left is a number without a unit"
         }
-        Sets::Scenario | Sets::Robot if !factor.is_text() => "its values must be names",
-        Sets::Fields { .. } if factor.scale && factor.is_text() => {
+        Sets::Base(setting) if setting.is_file() && !matches!(factor.values, Values::Grid(_)) => {
+            "scenarios, robots and axes are given as `grid = [\"NAME\", …]`"
+        }
+        Sets::Base(setting) if *setting != Setting::LoadShare && !factor.is_text() => {
+            "its values must be names"
+        }
+        Sets::Fields(_) if factor.scale && factor.is_text() => {
             "a name scales nothing: `scale` needs numbers"
         }
-        Sets::Fields { .. } if factor.scale && !factor.unit.is_empty() => {
+        Sets::Fields(_) if factor.scale && !factor.unit.is_empty() => {
             "a factor that scales has no unit"
         }
-        Sets::Scenario | Sets::Robot | Sets::Fault(_) if factor.scale => {
-            "`scale` is for parameters"
-        }
+        Sets::Base(_) | Sets::Fault(_) if factor.scale => "`scale` is for parameters",
         Sets::Fault(template) if template.matches("{}").count() != 1 => {
             "a fault has `{}` once, where its value goes, as in \"pot-open:joint3@{}s\""
         }
         _ => return true,
     };
+    let help = match &factor.sets {
+        Sets::Base(setting) if setting.names().is_empty() => None,
+        Sets::Base(setting) => Some(format!("allowed are {}", setting.names().join(", "))),
+        Sets::Fields(_) if factor.scale => {
+            Some("leave `scale` out, or give numbers without a unit".to_owned())
+        }
+        Sets::Fields(_) | Sets::Fault(_) => None,
+    };
     r.problem(
         Some(entry.span.clone()),
         format!("`{path}`: {why}"),
         "does not go together",
-        None,
+        help,
     );
     false
 }
@@ -181,32 +236,36 @@ fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
             } else {
                 vec![r.text(entry, "parameter")?]
             };
-            match texts.as_slice() {
-                [one] if one == "scenario" => return Some(Sets::Scenario),
-                [one] if one == "robot" => return Some(Sets::Robot),
-                _ => {}
+            if let [one] = texts.as_slice()
+                && let Some(setting) = Setting::ALL.into_iter().find(|s| s.name() == one)
+            {
+                return Some(Sets::Base(setting));
             }
-            let (mut scenario, mut robot) = (Vec::new(), Vec::new());
+            let mut fields = Vec::new();
             let mut ok = !texts.is_empty();
             for text in texts {
-                if let Some(field) = text.strip_prefix("scenario.") {
-                    scenario.push(field.to_owned());
-                } else if let Some(field) = text.strip_prefix("robot.") {
-                    robot.push(field.to_owned());
-                } else {
-                    ok = false;
-                    r.problem(
-                        item.span().or(Some(span.clone())),
-                        format!(
-                            "`{path}.parameter` = \"{text}\" must begin with `robot.` or \
-                             `scenario.`, or be one of them alone"
-                        ),
-                        "not a path",
-                        Some("for example \"robot.supply.set_pressure\"".into()),
-                    );
+                let field = Part::ALL.into_iter().find_map(|part| {
+                    let path = text.strip_prefix(part.prefix())?.to_owned();
+                    Some(Field { part, path })
+                });
+                if let Some(field) = field {
+                    fields.push(field);
+                    continue;
                 }
+                ok = false;
+                let settings = Setting::ALL.map(|setting| format!("`{}`", setting.name()));
+                r.problem(
+                    item.span().or(Some(span.clone())),
+                    format!(
+                        "`{path}.parameter` = \"{text}\" must begin with `robot.`, `scenario.`, `axis.` or \
+                         `plant.`, or be one of {} alone",
+                        settings.join(", ")
+                    ),
+                    "not a path",
+                    Some("for example \"robot.supply.set_pressure\"".into()),
+                );
             }
-            ok.then_some(Sets::Fields { scenario, robot })
+            ok.then_some(Sets::Fields(fields))
         }
         (found, _) => {
             let how = if found.is_some() { "both" } else { "neither" };
@@ -242,7 +301,8 @@ fn values(r: &mut Reader, entry: &Entry) -> Option<(Values, String)> {
     if key != "grid" {
         if let Some((span, _)) = entry.get("unit") {
             let message = format!("`{path}.unit` belongs into `{path}.{key}`");
-            r.problem(Some(span), message, "not here", None);
+            let help = format!("write `{key} = {{ …, unit = \"…\" }}`");
+            r.problem(Some(span), message, "not here", Some(help));
         }
         let (distribution, unit) = distribution::read(r, entry, key)?;
         return Some((Values::Drawn(distribution), unit));

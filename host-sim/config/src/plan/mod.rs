@@ -1,24 +1,30 @@
-//! A plan of a campaign: one scenario, many times, and the differences from case to case.
+//! A plan of a campaign: one scenario, or one cylinder on the bench, many times, and the differences from case to
+//! case.
 //!
 //! | file | what |
 //! |---|---|
-//! | `sources.rs` | the texts that a plan stands on: its own, of scenarios, of robots |
+//! | `sources.rs` | the texts that a plan stands on: its own, of scenarios, of robots, of axes |
+//! | `base.rs` | what every case starts from |
 //! | `factor.rs` | one factor: what it sets, and its values |
 //! | `value.rs` | one value: a number, a name, yes or no |
 //! | `distribution.rs` | distributions, and where they end |
-//! | `resolve.rs` | values of all factors to a scenario and a robot |
+//! | `resolve.rs` | values of all factors to a scenario and a robot, or to a cylinder on the bench |
+//! | `field.rs` | values of factors in the texts of files |
 //! | `check.rs` | every value that a factor can have, against the files' own ranges |
 
+mod base;
 mod check;
 mod distribution;
 mod factor;
+mod field;
 mod resolve;
 mod sources;
 mod value;
 
+pub use base::{AxisBase, Base, Setting};
 pub use distribution::{Choice, Distribution};
-pub use factor::{Factor, Sets, Values};
-pub use resolve::{Resolved, Resolver};
+pub use factor::{Factor, Field, Part, Sets, Values};
+pub use resolve::{OnBench, OnRobot, Resolved, Resolver};
 pub use sources::{Sources, Text};
 pub use value::Value;
 
@@ -68,15 +74,6 @@ const KEEP: [(&str, KeepLogs); 3] = [
     ("failed", KeepLogs::Failed),
     ("all", KeepLogs::All),
 ];
-
-/// Start of every case.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Base {
-    /// Scenario, by built-in name or path.
-    pub scenario: String,
-    /// Robot instead of the scenario's.
-    pub robot: Option<String>,
-}
 
 /// A plan, checked.
 #[derive(Debug, Clone)]
@@ -248,7 +245,10 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         None => Some(None),
     };
     let bars = bars(r, sources);
-    let base = base(r);
+    let base = base::read(r);
+    if let Some(Base::Axis(_)) = base {
+        ensure_bench_has(r, keep, limit_s, bars.as_ref());
+    }
     let factors = factor::read_all(r);
     let plan = Plan {
         name: name?,
@@ -290,6 +290,44 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         );
     }
     Some(plan)
+}
+
+/// A move on the bench has its own length and its own limits, and is played again in a moment.
+fn ensure_bench_has(
+    r: &mut Reader,
+    keep: Option<KeepLogs>,
+    limit_s: Option<Option<f64>>,
+    bars: Option<&ArrayOfTables>,
+) {
+    let top = r.table("");
+    let none = "not of a cylinder on the bench";
+    let mut told = |key: &str, why: &str, help: &str| {
+        let span = top
+            .as_ref()
+            .and_then(|top| top.get(key))
+            .map(|(key, _)| key);
+        r.problem(span, why.to_owned(), none, Some(help.to_owned()));
+    };
+    if limit_s.is_some_and(|limit| limit.is_some()) {
+        let why = "`limit` is of a scenario's time: a move on the bench has its own";
+        told("limit", why, "leave `limit` out");
+    }
+    if bars.is_some() {
+        let why = "`bars` are of a robot's travel: a cylinder on the bench has limits of its own";
+        told(
+            "bars",
+            why,
+            "leave `bars` out, and judge the columns of the table",
+        );
+    }
+    if keep.is_some_and(|keep| keep != KeepLogs::None) {
+        let why = "`keep`: a case on the bench has no log; allowed is \"none\"";
+        told(
+            "keep",
+            why,
+            "`wheeleg campaign replay` plays a case again, with tables and figures",
+        );
+    }
 }
 
 /// Reports samples without anything drawn: each case would be computed again.
@@ -356,26 +394,4 @@ fn bars(r: &mut Reader, sources: &Sources) -> Option<ArrayOfTables> {
     }
     let document = sources.plan.text.parse::<DocumentMut>().ok()?;
     document.get("bars")?.as_array_of_tables().cloned()
-}
-
-fn base(r: &mut Reader) -> Option<Base> {
-    let Some(entry) = r.table("base") else {
-        r.problem(
-            None,
-            "section [base] is missing".into(),
-            "expected in this file",
-            Some("write `[base]` and below it `scenario = \"three-step\"`".into()),
-        );
-        return None;
-    };
-    r.reject_misplaced(&entry, &["scenario", "robot"], &TOP);
-    let scenario = r.text(&entry, "scenario");
-    let robot = match entry.get("robot") {
-        Some(_) => r.text(&entry, "robot").map(Some),
-        None => Some(None),
-    };
-    Some(Base {
-        scenario: scenario?,
-        robot: robot?,
-    })
 }

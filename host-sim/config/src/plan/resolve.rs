@@ -1,91 +1,86 @@
-//! Turns values of all factors into a scenario and a robot, read and checked like files.
+//! Turns values of all factors into a scenario and a robot, or a cylinder on the bench, read and checked like files.
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, json};
+use serde_json::{Map, Value as Json, json};
 use toml_edit::{DocumentMut, Item};
 
-use super::factor::{Factor, Sets};
+use super::Plan;
+use super::base::{AxisBase, Base, Setting, ensure_load_share};
+use super::factor::{Factor, Part, Sets};
+use super::field::{Template, set};
 use super::value::Value;
-use super::{Plan, Text};
+use crate::bench::{Air, Bench, Kind, Move, StartUp};
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
-use crate::quantity::Dimension;
-use crate::terrain::{Data, Files};
-use crate::{LawChoice, RobotConfig, Scenario};
-
-/// A file that factors change: its name, its text, and every quantity in it.
-pub(super) struct Base {
-    pub(super) file: String,
-    pub(super) document: DocumentMut,
-    pub(super) listing: Vec<ParameterInfo>,
-    /// Data files of a scenario.
-    data: BTreeMap<String, Data>,
-}
-
-impl Base {
-    fn read(source: &Text, listing: Vec<ParameterInfo>) -> Result<Self, ConfigError> {
-        let document = source.text.parse().map_err(|e: toml_edit::TomlError| {
-            // The reader of the file has accepted it.
-            let problem = Problem::whole(&source.file, e.to_string(), None);
-            ConfigError::new(format!("{} is not usable", source.file), vec![problem])
-        })?;
-        Ok(Self {
-            file: source.file.clone(),
-            document,
-            listing,
-            data: BTreeMap::new(),
-        })
-    }
-
-    /// The quantity at a path, or a component of it if the path ends in an index.
-    pub(super) fn listed(&self, path: &str) -> Option<(&ParameterInfo, Option<usize>)> {
-        let of = |path: &str| self.listing.iter().find(|p| p.path == path);
-        if let Some(info) = of(path) {
-            return Some((info, None));
-        }
-        let (whole, component) = overlay::split_index(path)?;
-        let info = of(whole).filter(|info| component < info.value.len())?;
-        Some((info, Some(component)))
-    }
-
-    /// The quantity whose component a path names, even if it lacks that component.
-    pub(super) fn around(&self, path: &str) -> Option<&ParameterInfo> {
-        let (whole, _) = overlay::split_index(path)?;
-        self.listing.iter().find(|p| p.path == whole)
-    }
-
-    /// Whether the path leads to a name rather than a number.
-    pub(super) fn has_text(&self, path: &str) -> bool {
-        is_law(path) || overlay::text(&self.document, path).is_some()
-    }
-}
-
-/// Whether a path leads to the law of a joint board, which has names for its numbers.
-pub(super) fn is_law(path: &str) -> bool {
-    path.starts_with("node.") && path.ends_with(".law")
-}
+use crate::terrain::Files;
+use crate::{AxisConfig, RobotConfig, Scenario};
 
 /// Makes cases of a plan; reads its files once.
 pub struct Resolver<'a> {
     plan: &'a Plan,
-    pub(super) scenarios: BTreeMap<&'a str, Base>,
-    pub(super) robots: BTreeMap<&'a str, Base>,
+    templates: BTreeMap<Kept, BTreeMap<&'a str, Template>>,
 }
 
-/// A case: a scenario on a robot.
+/// Kind of a file that a plan holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kept {
+    Scenario,
+    Robot,
+    Axis,
+}
+
+/// A case: a scenario on a robot, or a cylinder on the bench.
 #[derive(Debug, Clone)]
-pub struct Resolved {
+pub enum Resolved {
+    /// A robot in a scenario.
+    Robot(Box<OnRobot>),
+    /// A cylinder on the bench.
+    Axis(Box<OnBench>),
+}
+
+/// A scenario on a robot.
+#[derive(Debug, Clone)]
+pub struct OnRobot {
     /// The scenario.
     pub scenario: Scenario,
     /// The robot.
     pub robot: RobotConfig,
     /// The scenario's text as JSON, without parts that have no effect on a run: description, sources, the
     /// robot's file, the seed.
-    pub scenario_json: serde_json::Value,
+    pub scenario_json: Json,
     /// Name, parameters and commissioned boards of the robot as JSON.
-    pub robot_json: serde_json::Value,
+    pub robot_json: Json,
+}
+
+/// A cylinder on the bench.
+#[derive(Debug, Clone)]
+pub struct OnBench {
+    /// The cylinder, and what is played on it.
+    pub bench: Bench,
+    /// Name and parameters of the axis, parameters of the plant, and the settings, as JSON.
+    pub bench_json: Json,
+}
+
+impl Resolved {
+    /// The robot in its scenario; none of a cylinder.
+    #[must_use]
+    pub fn on_robot(self) -> Option<OnRobot> {
+        match self {
+            Self::Robot(case) => Some(*case),
+            Self::Axis(_) => None,
+        }
+    }
+
+    /// The cylinder; none of a robot.
+    #[must_use]
+    pub fn on_bench(self) -> Option<OnBench> {
+        match self {
+            Self::Robot(_) => None,
+            Self::Axis(case) => Some(*case),
+        }
+    }
 }
 
 impl<'a> Resolver<'a> {
@@ -94,34 +89,52 @@ impl<'a> Resolver<'a> {
     /// # Errors
     /// [`ConfigError`] of the first file that is wrong before any change.
     pub fn new(plan: &'a Plan) -> Result<Self, ConfigError> {
-        let (mut scenarios, mut robots) = (BTreeMap::new(), BTreeMap::new());
+        let mut templates: BTreeMap<Kept, BTreeMap<&str, Template>> = BTreeMap::new();
+        let mut keep = |kept, name: &'a String, template| {
+            templates.entry(kept).or_default().insert(name, template);
+        };
         for (name, source) in &plan.sources.scenarios {
             let data = plan.sources.data.get(name).cloned().unwrap_or_default();
             let files = Files::Held(&data);
             let (_, listing) = Scenario::parse_with(&source.file, &source.text, &files)?;
-            let mut base = Base::read(source, listing)?;
+            let mut base = Template::read(source, listing)?;
             if let Some(bars) = &plan.bars {
                 overlay::set_bars(&mut base.document, bars);
                 let text = base.document.to_string();
                 (_, base.listing) = Scenario::parse_with(&source.file, &text, &files)?;
             }
-            scenarios.insert(name.as_str(), Base { data, ..base });
+            keep(Kept::Scenario, name, Template { data, ..base });
         }
         for (name, source) in &plan.sources.robots {
             let robot = RobotConfig::parse(&source.file, &source.text)?;
-            robots.insert(name.as_str(), Base::read(source, robot.parameters)?);
+            let template = Template::read(source, robot.parameters)?;
+            keep(Kept::Robot, name, template);
         }
-        Ok(Self {
-            plan,
-            scenarios,
-            robots,
-        })
+        for (name, source) in &plan.sources.axes {
+            let axis = AxisConfig::parse(&source.file, &source.text)?;
+            let template = Template::read(source, axis.parameters)?;
+            keep(Kept::Axis, name, template);
+        }
+        Ok(Self { plan, templates })
+    }
+
+    /// The files that a path may lead into.
+    pub(super) fn files_of(&self, part: Part) -> impl Iterator<Item = &Template> {
+        let kept = match part {
+            Part::Scenario => Kept::Scenario,
+            Part::Robot => Kept::Robot,
+            Part::Axis | Part::Plant => Kept::Axis,
+        };
+        self.templates
+            .get(&kept)
+            .into_iter()
+            .flat_map(BTreeMap::values)
     }
 
     /// The case of one value for each factor, in their order.
     ///
     /// # Errors
-    /// [`ConfigError`] if the values do not make a valid scenario or robot.
+    /// [`ConfigError`] if the values do not make a valid scenario or robot, or a valid axis.
     pub fn resolve(&self, values: &[Value]) -> Result<Resolved, ConfigError> {
         let all: Vec<_> = self.plan.factors.iter().zip(values).collect();
         self.resolve_only(&all)
@@ -132,41 +145,39 @@ impl<'a> Resolver<'a> {
         &self,
         factors: &[(&Factor, &Value)],
     ) -> Result<Resolved, ConfigError> {
-        let chosen = |sets: &Sets| {
-            let found = factors.iter().find(|(factor, _)| factor.sets == *sets);
-            found.map(|(_, value)| value.to_string())
-        };
-        let base = &self.plan.base;
-        let scenario_name = chosen(&Sets::Scenario).unwrap_or_else(|| base.scenario.clone());
+        Ok(match &self.plan.base {
+            Base::Robot { scenario, robot } => {
+                let case = self.on_robot(factors, scenario, robot.as_ref())?;
+                Resolved::Robot(Box::new(case))
+            }
+            Base::Axis(base) => Resolved::Axis(Box::new(self.on_bench(factors, base)?)),
+        })
+    }
+
+    fn on_robot(
+        &self,
+        factors: &[(&Factor, &Value)],
+        scenario: &String,
+        robot: Option<&String>,
+    ) -> Result<OnRobot, ConfigError> {
+        let chosen = |setting| chosen(factors, setting).map(ToString::to_string);
+        let scenario_name = chosen(Setting::Scenario).unwrap_or_else(|| scenario.clone());
         let robot_of = &self.plan.sources.robot_of;
-        let robot_name = chosen(&Sets::Robot)
-            .or_else(|| base.robot.clone())
+        let robot_name = chosen(Setting::Robot)
+            .or_else(|| robot.cloned())
             .or_else(|| robot_of.get(&scenario_name).cloned())
             .unwrap_or_default();
-        let scenario = known(&self.scenarios, "scenario", &scenario_name)?;
-        let robot = known(&self.robots, "robot", &robot_name)?;
+        let scenario = self.known(Kept::Scenario, &scenario_name)?;
+        let robot = self.known(Kept::Robot, &robot_name)?;
         let mut scenario_text = scenario.document.clone();
-        let mut robot_text = robot.document.clone();
+        let robot_text = changed(robot, factors, Part::Robot)?;
         for (factor, value) in factors {
-            match &factor.sets {
-                Sets::Scenario | Sets::Robot => {}
-                Sets::Fault(template) => {
-                    let fault = template.replace("{}", &value.to_string());
-                    overlay::add_fault(&mut scenario_text, &fault);
-                }
-                Sets::Fields {
-                    scenario: of_scenario,
-                    robot: of_robot,
-                } => {
-                    for path in of_scenario {
-                        set(scenario, &mut scenario_text, factor, path, value)?;
-                    }
-                    for path in of_robot {
-                        set(robot, &mut robot_text, factor, path, value)?;
-                    }
-                }
+            if let Sets::Fault(template) = &factor.sets {
+                let fault = template.replace("{}", &value.to_string());
+                overlay::add_fault(&mut scenario_text, &fault);
             }
         }
+        change(scenario, &mut scenario_text, factors, Part::Scenario)?;
         let mut scenario_json = without_notes(&scenario_text);
         if !scenario.data.is_empty() {
             // Two maps of the same name may be different ground.
@@ -178,116 +189,184 @@ impl<'a> Resolver<'a> {
             Scenario::parse_with(&scenario.file, &scenario_text.to_string(), &files)?;
         let robot = RobotConfig::parse(&robot.file, &robot_text.to_string())?;
         scenario.check_with(&robot)?;
-        Ok(Resolved {
+        Ok(OnRobot {
             robot_json: robot_json(&robot),
             scenario,
             robot,
             scenario_json,
         })
     }
+
+    fn on_bench(
+        &self,
+        factors: &[(&Factor, &Value)],
+        base: &AxisBase,
+    ) -> Result<OnBench, ConfigError> {
+        let chosen = |setting| chosen(factors, setting);
+        let name = chosen(Setting::Axis).map_or_else(|| base.axis.clone(), ToString::to_string);
+        let mut template = self.known(Kept::Axis, &name)?;
+        let sheet_text = changed(template, factors, Part::Axis)?;
+        let sheet = AxisConfig::parse(&template.file, &sheet_text.to_string())?;
+        // The plant is off its data sheet, whatever that says.
+        let stated;
+        if factors.iter().any(|(factor, _)| sets(factor, Part::Axis)) {
+            stated = Template {
+                file: template.file.clone(),
+                document: sheet_text,
+                listing: sheet.parameters.clone(),
+                data: BTreeMap::new(),
+            };
+            template = &stated;
+        }
+        let plant = match factors.iter().any(|(factor, _)| sets(factor, Part::Plant)) {
+            true => {
+                let text = changed(template, factors, Part::Plant)?;
+                AxisConfig::parse(&template.file, &text.to_string())?
+            }
+            false => sheet.clone(),
+        };
+        let load_share = match chosen(Setting::LoadShare) {
+            Some(Value::Number(share)) => *share,
+            _ => base.load_share,
+        };
+        ensure_load_share(load_share).map_err(|told| not_possible("load_share", told))?;
+        let bench = Bench {
+            axis: sheet.name.clone(),
+            motion: named(
+                chosen(Setting::Move),
+                Setting::Move,
+                base.motion,
+                Move::of_name,
+            )?,
+            controller: named(
+                chosen(Setting::Controller),
+                Setting::Controller,
+                base.controller,
+                Kind::of_name,
+            )?,
+            delays: named(
+                chosen(Setting::Delays),
+                Setting::Delays,
+                base.delays,
+                StartUp::of_name,
+            )?,
+            air: named(chosen(Setting::Air), Setting::Air, base.air, Air::of_name)?,
+            sheet: sheet.axis,
+            plant: plant.axis,
+            load_share,
+        };
+        Ok(OnBench {
+            bench_json: json!({
+                "name": sheet.name,
+                "axis": parameters_json(&sheet.parameters),
+                "plant": parameters_json(&plant.parameters),
+                "move": bench.motion.name(),
+                "controller": bench.controller.name(),
+                "delays": bench.delays.name(),
+                "air": bench.air.name(),
+                "load_share": load_share,
+            }),
+            bench,
+        })
+    }
+
+    fn known(&self, kept: Kept, name: &str) -> Result<&Template, ConfigError> {
+        let found = self.templates.get(&kept).and_then(|own| own.get(name));
+        found.ok_or_else(|| {
+            let kind = match kept {
+                Kept::Scenario => "scenario",
+                Kept::Robot => "robot",
+                Kept::Axis => "axis",
+            };
+            let message = format!("the plan has no text of the {kind} `{name}`");
+            ConfigError::new(
+                "the plan is not complete",
+                vec![Problem::whole(name, message, None)],
+            )
+        })
+    }
 }
 
-fn known<'m>(
-    files: &'m BTreeMap<&str, Base>,
-    kind: &str,
-    name: &str,
-) -> Result<&'m Base, ConfigError> {
-    files.get(name).ok_or_else(|| {
-        let message = format!("the plan has no text of the {kind} `{name}`");
-        ConfigError::new(
-            "the plan is not complete",
-            vec![Problem::whole(name, message, None)],
+/// The value of the factor that sets a key of `[base]`.
+fn chosen<'v>(factors: &[(&Factor, &'v Value)], setting: Setting) -> Option<&'v Value> {
+    let found = factors
+        .iter()
+        .find(|(factor, _)| factor.sets == Sets::Base(setting));
+    found.map(|(_, value)| *value)
+}
+
+/// Whether a factor sets a field of a file.
+fn sets(factor: &Factor, part: Part) -> bool {
+    match &factor.sets {
+        Sets::Fields(fields) => fields.iter().any(|field| field.part == part),
+        Sets::Base(_) | Sets::Fault(_) => false,
+    }
+}
+
+/// The text of a file with the values of factors.
+fn changed(
+    template: &Template,
+    factors: &[(&Factor, &Value)],
+    part: Part,
+) -> Result<DocumentMut, ConfigError> {
+    let mut text = template.document.clone();
+    change(template, &mut text, factors, part)?;
+    Ok(text)
+}
+
+fn change(
+    template: &Template,
+    text: &mut DocumentMut,
+    factors: &[(&Factor, &Value)],
+    part: Part,
+) -> Result<(), ConfigError> {
+    for (factor, value) in factors {
+        let Sets::Fields(fields) = &factor.sets else {
+            continue;
+        };
+        for field in fields.iter().filter(|field| field.part == part) {
+            set(template, text, factor, &field.path, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// The setting of a name; without one, that of the base.
+fn named<T>(
+    value: Option<&Value>,
+    setting: Setting,
+    base: T,
+    of_name: fn(&str) -> Option<T>,
+) -> Result<T, ConfigError> {
+    let Some(value) = value else {
+        return Ok(base);
+    };
+    of_name(&value.to_string()).ok_or_else(|| {
+        let names = setting.names().join(", ");
+        not_possible(
+            setting.name(),
+            format!("{value} is not known: allowed are {names}"),
         )
     })
 }
 
-/// Puts one value into the text of a file.
-fn set(
-    base: &Base,
-    document: &mut DocumentMut,
-    factor: &Factor,
-    path: &str,
-    value: &Value,
-) -> Result<(), ConfigError> {
-    let nowhere = |message: String| {
-        let problem = Problem::whole(&base.file, message, None);
-        ConfigError::new(format!("factor `{}`", factor.name), vec![problem])
-    };
-    let law = match value {
-        Value::Text(name) if is_law(path) => {
-            let law = name.parse::<LawChoice>();
-            Some(f64::from(law.map_err(nowhere)?.number()))
-        }
-        _ => None,
-    };
-    if let (Value::Text(text), None) = (value, law) {
-        let done = overlay::set(document, path, text.as_str().into());
-        return done
-            .then_some(())
-            .ok_or_else(|| nowhere(format!("there is no `{path}`")));
-    }
-    let number = law.unwrap_or(match value {
-        Value::Number(number) => *number,
-        Value::Flag(flag) => f64::from(u8::from(*flag)),
-        Value::Text(_) => f64::NAN,
+fn not_possible(key: &str, told: String) -> ConfigError {
+    let problem = Problem::whole(&format!("base.{key}"), told, None);
+    ConfigError::new("the case is not possible", vec![problem])
+}
+
+fn parameters_json(parameters: &[ParameterInfo]) -> Map<String, Json> {
+    let each = parameters.iter().map(|p| {
+        let value = json!({ "value": p.value, "unit": p.unit });
+        (p.path.clone(), value)
     });
-    let Some((info, component)) = base.listed(path) else {
-        return Err(nowhere(format!("there is no `{path}`")));
-    };
-    let (values, unit) = written(info, component, factor, number);
-    let source = format!("factor {} of the plan", factor.name);
-    let done = overlay::set_quantity(document, info, &values, &unit, &source);
-    done.then_some(())
-        .ok_or_else(|| nowhere(format!("there is no `{path}`")))
+    each.collect()
 }
 
-/// The text to write for a value of a factor, and its unit.
-pub(super) fn written(
-    info: &ParameterInfo,
-    component: Option<usize>,
-    factor: &Factor,
-    number: f64,
-) -> (Vec<f64>, String) {
-    let at = |i: usize| component.is_none_or(|component| component == i);
-    let each = info.value.iter().enumerate();
-    if factor.scale {
-        let scaled = each.map(|(i, v)| if at(i) { v * number } else { *v });
-        return (scaled.collect(), info.unit.clone());
-    }
-    let unit = match factor.unit.as_str() {
-        "" => info.unit.clone(),
-        unit => unit.to_owned(),
-    };
-    if info.value.len() == 1 {
-        return (vec![number], unit);
-    }
-    // The other components are in the file's unit.
-    let number = number * factor_between(info, &unit);
-    let mixed = each.map(|(i, v)| if at(i) { number } else { *v });
-    (mixed.collect(), info.unit.clone())
-}
-
-/// Factor from a unit to that of the file; 1 if only one is accepted.
-pub(super) fn factor_between(info: &ParameterInfo, unit: &str) -> f64 {
-    let si = |unit: &str| info.dimension.and_then(|d: Dimension| d.factor(unit));
-    match (si(unit), si(&info.unit)) {
-        (Some(from), Some(to)) if unit != info.unit => from / to,
-        _ => 1.0,
-    }
-}
-
-fn robot_json(robot: &RobotConfig) -> serde_json::Value {
-    let parameters: Map<String, serde_json::Value> = robot
-        .parameters
-        .iter()
-        .map(|p| {
-            let value = json!({ "value": p.value, "unit": p.unit });
-            (p.path.clone(), value)
-        })
-        .collect();
+fn robot_json(robot: &RobotConfig) -> Json {
     json!({
         "name": robot.name,
-        "parameters": parameters,
+        "parameters": parameters_json(&robot.parameters),
         "commissioned": robot.commissioned,
     })
 }
@@ -296,7 +375,7 @@ fn robot_json(robot: &RobotConfig) -> serde_json::Value {
 const EXACT: u64 = 1 << f64::MANTISSA_DIGITS;
 
 /// A scenario's text as JSON, with numbers as floats if they are exact, the others as text.
-fn without_notes(document: &DocumentMut) -> serde_json::Value {
+fn without_notes(document: &DocumentMut) -> Json {
     let mut json = item_json(document.as_item());
     if let Some(top) = json.as_object_mut() {
         for key in ["description", "robot", "seed"] {
@@ -306,11 +385,11 @@ fn without_notes(document: &DocumentMut) -> serde_json::Value {
     json
 }
 
-fn item_json(item: &Item) -> serde_json::Value {
+fn item_json(item: &Item) -> Json {
     if let Some(table) = item.as_table_like() {
         let fields = table.iter().filter(|(key, _)| *key != "source");
         let fields = fields.map(|(key, item)| (key.to_owned(), item_json(item)));
-        return serde_json::Value::Object(fields.collect());
+        return Json::Object(fields.collect());
     }
     if let Some(tables) = item.as_array_of_tables() {
         let tables = tables.iter().map(|t| item_json(&Item::Table(t.clone())));

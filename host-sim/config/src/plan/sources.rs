@@ -8,11 +8,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml_edit::{Document, Item};
 
-use crate::Scenario;
 use crate::builtin::{self, Source};
 use crate::error::{ConfigError, word};
 use crate::reader::Reader;
 use crate::terrain::{Data, named_files};
+use crate::{AxisConfig, Scenario};
 
 /// A file: its name for messages, and its contents.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -23,7 +23,7 @@ pub struct Text {
     pub text: String,
 }
 
-/// A plan's own text and those of all scenarios and robots named in it.
+/// A plan's own text and those of all scenarios, robots and axes named in it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Sources {
     /// The plan.
@@ -32,6 +32,9 @@ pub struct Sources {
     pub scenarios: BTreeMap<String, Text>,
     /// Robots by their name in the plan or scenario.
     pub robots: BTreeMap<String, Text>,
+    /// Axes by their name in the plan.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub axes: BTreeMap<String, Text>,
     /// Robot of each scenario, by their names.
     pub robot_of: BTreeMap<String, String>,
     /// Data files of each scenario, by their name in it.
@@ -54,6 +57,7 @@ impl Sources {
             plan: Text { file, text },
             scenarios: BTreeMap::new(),
             robots: BTreeMap::new(),
+            axes: BTreeMap::new(),
             robot_of: BTreeMap::new(),
             data: BTreeMap::new(),
         };
@@ -72,6 +76,14 @@ impl Sources {
                 Ok(Source { file, text }) => {
                     let robots = &mut sources.robots;
                     robots.insert(named.name, Text { file, text });
+                }
+                Err(error) => wrong.push((named, error)),
+            }
+        }
+        for named in named(&document, "axis") {
+            match AxisConfig::source(&placed(folder, &named.name)) {
+                Ok(Source { file, text }) => {
+                    sources.axes.insert(named.name, Text { file, text });
                 }
                 Err(error) => wrong.push((named, error)),
             }

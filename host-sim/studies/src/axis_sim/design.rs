@@ -5,6 +5,7 @@
 //! in [`wheeleg_control::axis::AxisModel::new`].
 
 use wheeleg_config::SENSOR_TRACK;
+use wheeleg_config::bench::Kind;
 use wheeleg_config::derived::{derived, limits};
 use wheeleg_control::axis::AxisData;
 use wheeleg_control::joint::{Correction, Gain, JointGains, Law};
@@ -14,61 +15,6 @@ use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
 use super::firmware::{Design, Supervision};
-
-/// A controller of the comparison.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// Full push or pull outside a dead band.
-    OnOff,
-    /// PWM, proportional.
-    PwmP,
-    /// PWM, PID.
-    PwmPid,
-    /// The paper's P + fuzzy PD.
-    FuzzyPd,
-    /// P + fuzzy ID.
-    FuzzyId,
-    /// Sliding mode on seven valve modes.
-    Sliding,
-    /// Estimated pressures, dead time ahead; the default.
-    Predictive,
-}
-
-impl Kind {
-    /// All of them, simple to best.
-    pub const ALL: [Self; 7] = [
-        Self::OnOff,
-        Self::PwmP,
-        Self::PwmPid,
-        Self::FuzzyPd,
-        Self::FuzzyId,
-        Self::Sliding,
-        Self::Predictive,
-    ];
-
-    /// Name in reports and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::OnOff => "on-off",
-            Self::PwmP => "pwm-p",
-            Self::PwmPid => "pwm-pid",
-            Self::FuzzyPd => "fuzzy-pd",
-            Self::FuzzyId => "fuzzy-id",
-            Self::Sliding => "sliding",
-            Self::Predictive => "predictive",
-        }
-    }
-
-    /// The controller with this name.
-    #[must_use]
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-}
 
 /// The designer's knowledge of an axis: its data sheet. The designer does not know the load, nor deviations
 /// from the data sheet.

@@ -44,7 +44,7 @@ mod textbook;
 mod unphysical;
 pub mod valve_resolution;
 
-pub use design::{Kind, axis_data, design};
+pub use design::{axis_data, design};
 pub use firmware::{Design, Firmware, Supervision, TICK};
 pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{Metrics, SETTLED_BAND_M};
@@ -52,3 +52,4 @@ pub use motion::{LoadEvent, Motion};
 pub use node::Node;
 pub use run::{Action, AxisSim, Board, REFERENCES_M, Row, SPEEDS_M_S, Sample, Trace};
 pub use valve_resolution::ValveResolution;
+pub use wheeleg_config::bench::Kind;

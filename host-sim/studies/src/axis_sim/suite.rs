@@ -7,6 +7,7 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
+pub use wheeleg_config::bench::StartUp;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_plant::sensors::AdcNoise;
 
@@ -151,15 +152,6 @@ pub fn weaker_force_n(p: &AxisParams) -> f64 {
     let area = std::f64::consts::FRAC_PI_4 * (c.bore_m * c.bore_m - c.rod_m * c.rod_m);
     let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
     gauge * area
-}
-
-/// Whether a controller finds the valves' delays before its first move.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StartUp {
-    /// The data sheet's delays are used.
-    Sheet,
-    /// [`identify`] finds them.
-    Identified,
 }
 
 /// The design of a controller that knows the sheet of its plant and, after [`StartUp::Identified`], the

@@ -8,9 +8,9 @@ use serde::Serialize;
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
 
-use super::moves::{CONTACT_S, Move, Played, RECOVERY_S};
+use super::moves::{CONTACT_S, Move, Played, RECOVERY_S, loaded, play_from_power_up};
 use super::variation::{UnknownVariation, Variation};
-use crate::axis_sim::suite::{AxisSimError, Factors, StartUp, TestRig};
+use crate::axis_sim::suite::{AxisSimError, Factors, StartUp};
 use crate::axis_sim::{Delays, Kind, Metrics, Trace, design, design_with, identify};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
@@ -185,10 +185,8 @@ impl Case {
             StartUp::Sheet => design(&self.sheet, kind),
             StartUp::Identified => design_with(&self.sheet, self.delays, kind),
         };
-        let plant = motion.plant(&self.plant, &self.sheet);
-        let mut rig = TestRig::new(&plant, &design, self.noise_seed)?;
-        rig.wait(self.wait_ms)?;
-        motion.play(&mut rig, &self.sheet, plant.load_n).map(Some)
+        let plants = [&self.sheet, &self.plant];
+        play_from_power_up(motion, plants, &design, self.noise_seed, self.wait_ms).map(Some)
     }
 
     /// The row of a case. `bound_s` are the time-optimal times of the measured
@@ -201,7 +199,7 @@ impl Case {
         played: Option<&Played>,
         bound_s: Option<[f64; 2]>,
     ) -> Row {
-        let plant = motion.plant(&self.plant, &self.sheet);
+        let plant = loaded(motion, &self.plant, &self.sheet);
         let factors = self.variation.factors(&self.sheet);
         let gauge_pa = plant.supply.set_pressure_pa - plant.gas.ambient_pressure_pa;
         let t_on_s = self

@@ -22,8 +22,10 @@ use wheeleg_plant::axis::{Axis, AxisParams};
 pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
 pub(crate) use charts::panel;
 pub use judged::{Before, ERROR_MM, Judged, OVERSHOOT_MM, Paired, Quantile, judging_root};
+pub(crate) use moves::play_from_power_up;
 pub use moves::{CONTACT_S, Move, Played, RECOVERY_S, REST_S, STEP_S, Sizes};
 pub use single::{Single, play};
+pub(crate) use single::{trace_csv, trace_figure};
 pub use variation::{UnknownVariation, Variation};
 
 use crate::StudyError;

@@ -1,33 +1,10 @@
 //! The moves of the comparison, each from power-up.
 
+pub use wheeleg_config::bench::Move;
 use wheeleg_plant::axis::AxisParams;
 
 use crate::axis_sim::suite::{AxisSimError, LEAD_S, TestRig, force_left_n};
-use crate::axis_sim::{LoadEvent, Motion, Trace};
-
-/// Motion of a case.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum Move {
-    /// 20 mm back and out.
-    #[serde(rename = "step-20")]
-    Step20,
-    /// 100 mm back and out.
-    #[serde(rename = "step-100")]
-    Step100,
-    /// 64 mm out and back, in 1 s each, without a jerk.
-    SCurve,
-    /// Two periods of 2 s, 60 mm from crest to crest.
-    Sine,
-    /// At rest for 10 s after a step.
-    Hold,
-    /// A load against the move is removed in its middle and returns 0.4 s later.
-    Contact,
-    /// The same with a load that helps.
-    ContactHelped,
-}
+use crate::axis_sim::{Design, LoadEvent, Motion, Trace};
 
 /// Distances of the moves on one axis: as in their names, or less if the stroke is too short for them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,131 +60,109 @@ pub const CONTACT_S: [f64; 2] = [0.15, 0.55];
 /// From the return of the load to the time when the error counts \[s\].
 pub const RECOVERY_S: f64 = 0.5;
 
-impl Move {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::Step20,
-        Self::Step100,
-        Self::SCurve,
-        Self::Sine,
-        Self::Hold,
-        Self::Contact,
-        Self::ContactHelped,
-    ];
-
-    /// Name in reports and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Step20 => "step-20",
-            Self::Step100 => "step-100",
-            Self::SCurve => "s-curve",
-            Self::Sine => "sine",
-            Self::Hold => "hold",
-            Self::Contact => "contact",
-            Self::ContactHelped => "contact-helped",
-        }
+/// The load of a foot on the ground \[N\], none for most moves. The measured move extends, so a negative
+/// load is against it.
+#[must_use]
+fn contact_n(motion: Move, sheet: &AxisParams) -> f64 {
+    match motion {
+        Move::Contact => -Sizes::of(sheet).contact_n,
+        Move::ContactHelped => Sizes::of(sheet).contact_n,
+        _ => 0.0,
     }
+}
 
-    /// The move with this name.
-    #[must_use]
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|m| m.name() == name)
-    }
+/// The plant at power-up: loaded from the start if contact is to be lost.
+#[must_use]
+pub(super) fn loaded(motion: Move, plant: &AxisParams, sheet: &AxisParams) -> AxisParams {
+    let mut loaded = plant.clone();
+    loaded.load_n += contact_n(motion, sheet);
+    loaded
+}
 
-    /// The load of a foot on the ground \[N\], none for most moves. The measured move extends, so a negative
-    /// load is against it.
-    #[must_use]
-    pub fn contact_n(self, sheet: &AxisParams) -> f64 {
-        match self {
-            Self::Contact => -Sizes::of(sheet).contact_n,
-            Self::ContactHelped => Sizes::of(sheet).contact_n,
-            _ => 0.0,
-        }
-    }
-
-    /// The plant at power-up: loaded from the start if contact is to be lost.
-    #[must_use]
-    pub fn plant(self, plant: &AxisParams, sheet: &AxisParams) -> AxisParams {
-        let mut loaded = plant.clone();
-        loaded.load_n += self.contact_n(sheet);
-        loaded
-    }
-
-    /// Whether contact is lost and regained.
-    #[must_use]
-    pub const fn loses_contact(self) -> bool {
-        matches!(self, Self::Contact | Self::ContactHelped)
-    }
-
-    /// Plays the move with a board that was just switched on, on [`Move::plant`],
-    /// whose load is `load_n`.
-    ///
-    /// # Errors
-    /// [`AxisSimError`].
-    pub fn play(
-        self,
-        rig: &mut TestRig,
-        sheet: &AxisParams,
-        load_n: f64,
-    ) -> Result<Played, AxisSimError> {
-        let sizes = Sizes::of(sheet);
-        let [low_m, high_m] = sizes.large_m;
-        let mut steps = |list: &[f64]| -> Result<Vec<Trace>, AxisSimError> {
-            list.iter().map(|to_m| rig.step(*to_m, STEP_S)).collect()
-        };
-        let (mut moves, measured) = match self {
-            Self::Step20 => (steps(&[high_m])?, steps(&[high_m - sizes.small_m, high_m])?),
-            Self::Step100 => (steps(&[high_m])?, steps(&[low_m, high_m])?),
-            Self::SCurve => {
-                let [from_m, to_m] = sizes.curve_m;
-                let first = steps(&[to_m, from_m])?;
-                let mut curve = |from_m: f64, to_m: f64| {
-                    let motion = Motion::SCurve {
-                        at_s: LEAD_S,
-                        duration_s: 1.0,
-                        from_m,
-                        to_m,
-                    };
-                    rig.run(&motion, &[], 2.0)
-                };
-                (first, vec![curve(from_m, to_m)?, curve(to_m, from_m)?])
-            }
-            Self::Sine => {
-                let [from_m, crest_m] = sizes.sine_m;
-                let first = steps(&[crest_m, from_m])?;
-                let motion = Motion::Sine {
+/// Plays the move with a board that was just switched on, on [`loaded`],
+/// whose load is `load_n`.
+///
+/// # Errors
+/// [`AxisSimError`].
+fn play(
+    motion: Move,
+    rig: &mut TestRig,
+    sheet: &AxisParams,
+    load_n: f64,
+) -> Result<Played, AxisSimError> {
+    let sizes = Sizes::of(sheet);
+    let [low_m, high_m] = sizes.large_m;
+    let mut steps = |list: &[f64]| -> Result<Vec<Trace>, AxisSimError> {
+        list.iter().map(|to_m| rig.step(*to_m, STEP_S)).collect()
+    };
+    let (mut moves, measured) = match motion {
+        Move::Step20 => (steps(&[high_m])?, steps(&[high_m - sizes.small_m, high_m])?),
+        Move::Step100 => (steps(&[high_m])?, steps(&[low_m, high_m])?),
+        Move::SCurve => {
+            let [from_m, to_m] = sizes.curve_m;
+            let first = steps(&[to_m, from_m])?;
+            let mut curve = |from_m: f64, to_m: f64| {
+                let motion = Motion::SCurve {
                     at_s: LEAD_S,
-                    period_s: 2.0,
-                    periods: 2,
+                    duration_s: 1.0,
                     from_m,
-                    crest_m,
+                    to_m,
                 };
-                (first, vec![rig.run(&motion, &[], 5.0)?])
-            }
-            Self::Hold => {
-                let first = steps(&[high_m, low_m])?;
-                (first, vec![rig.run(&Motion::hold(low_m), &[], REST_S)?])
-            }
-            Self::Contact | Self::ContactHelped => {
-                let first = steps(&[high_m, low_m])?;
-                let [gone_s, back_s] = CONTACT_S;
-                let events = [
-                    LoadEvent {
-                        at_s: gone_s,
-                        load_n: load_n - self.contact_n(sheet),
-                    },
-                    LoadEvent {
-                        at_s: back_s,
-                        load_n,
-                    },
-                ];
-                (first, vec![rig.step_with(high_m, &events, STEP_S)?])
-            }
-        };
-        Ok(Played {
-            first: moves.remove(0),
-            measured,
-        })
-    }
+                rig.run(&motion, &[], 2.0)
+            };
+            (first, vec![curve(from_m, to_m)?, curve(to_m, from_m)?])
+        }
+        Move::Sine => {
+            let [from_m, crest_m] = sizes.sine_m;
+            let first = steps(&[crest_m, from_m])?;
+            let motion = Motion::Sine {
+                at_s: LEAD_S,
+                period_s: 2.0,
+                periods: 2,
+                from_m,
+                crest_m,
+            };
+            (first, vec![rig.run(&motion, &[], 5.0)?])
+        }
+        Move::Hold => {
+            let first = steps(&[high_m, low_m])?;
+            (first, vec![rig.run(&Motion::hold(low_m), &[], REST_S)?])
+        }
+        Move::Contact | Move::ContactHelped => {
+            let first = steps(&[high_m, low_m])?;
+            let [gone_s, back_s] = CONTACT_S;
+            let events = [
+                LoadEvent {
+                    at_s: gone_s,
+                    load_n: load_n - contact_n(motion, sheet),
+                },
+                LoadEvent {
+                    at_s: back_s,
+                    load_n,
+                },
+            ];
+            (first, vec![rig.step_with(high_m, &events, STEP_S)?])
+        }
+    };
+    Ok(Played {
+        first: moves.remove(0),
+        measured,
+    })
+}
+
+/// Switches a board with a design on, on a plant off its sheet, waits, and plays the move.
+///
+/// # Errors
+/// [`AxisSimError`].
+pub(crate) fn play_from_power_up(
+    motion: Move,
+    [sheet, plant]: [&AxisParams; 2],
+    design: &Design,
+    seed: u64,
+    wait_ms: u64,
+) -> Result<Played, AxisSimError> {
+    let plant = loaded(motion, plant, sheet);
+    let mut rig = TestRig::new(&plant, design, seed)?;
+    rig.wait(wait_ms)?;
+    play(motion, &mut rig, sheet, plant.load_n)
 }

@@ -82,8 +82,8 @@ impl Single {
         let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
         let mut figures = Vec::new();
         for (name, trace) in all {
-            job.keep(job.save(&format!("{CSV}/{name}.csv"), &rows(trace)));
-            figures.push(figure(&name, &self.row.case.id, trace));
+            job.keep(job.save(&format!("{CSV}/{name}.csv"), &trace_csv(trace)));
+            figures.push(trace_figure(&name, &self.row.case.id, trace));
         }
         let drawn = job.draw(figures);
         job.keep(job.save_figures(&drawn));
@@ -97,7 +97,7 @@ impl Single {
 }
 
 /// A recording as CSV, units in the header line.
-fn rows(trace: &Trace) -> String {
+pub(crate) fn trace_csv(trace: &Trace) -> String {
     use std::fmt::Write as _;
     let mut text = String::from(
         "time_s,reference_mm,stroke_mm,measured_mm,speed_mm_s,pressure_a_bar_abs,pressure_b_bar_abs,\
@@ -126,7 +126,7 @@ load_n,fill_a_us,vent_a_us,fill_b_us,vent_b_us,switches,air_kg,settled\n",
 type Points = Vec<(f64, f64)>;
 
 /// Stroke, pressures and valves of a recording, one above the other.
-pub(crate) fn figure(id: &str, title: &str, trace: &Trace) -> Figure {
+pub(crate) fn trace_figure(id: &str, title: &str, trace: &Trace) -> Figure {
     let time = |k: usize| k as f64 * 1e-3;
     let end = time(trace.rows.len());
     let of = |f: &dyn Fn(&crate::axis_sim::Row) -> f64| -> Points {

@@ -20,11 +20,11 @@ use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
 use crate::StudyError;
 use crate::axis_sim::commission::{commission, toml_lines, value};
-use crate::axis_sim::suite::{Factors, TestRig};
+use crate::axis_sim::suite::Factors;
 use crate::axis_sim::{
     Delays, Design, Kind, Supervision, ValveResolution, design, design_with, identify,
 };
-use crate::compare::{Figures, MARGIN, Move, Played, axis_error};
+use crate::compare::{Figures, MARGIN, Move, Played, axis_error, play_from_power_up};
 use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
 use wheeleg_config::AxisConfig;
@@ -237,10 +237,7 @@ impl Tuned {
             .flat_map(|motion| [(motion, &before), (motion, &after)])
             .collect();
         let played = progress.each("tests", &runs, |&(motion, design)| {
-            let loaded = motion.plant(plant, plant);
-            let mut rig = TestRig::new(&loaded, design, seed).map_err(failed)?;
-            let played = motion.play(&mut rig, plant, loaded.load_n);
-            played.map_err(failed)
+            play_from_power_up(motion, [plant, plant], design, seed, 0).map_err(failed)
         })?;
         // A test that was played with only one of the two boards shows nothing.
         let mut played = played.into_iter();

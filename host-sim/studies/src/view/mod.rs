@@ -7,6 +7,7 @@
 mod content;
 mod difference;
 mod ground;
+mod judged;
 mod page;
 mod signals;
 mod thin;
@@ -19,6 +20,7 @@ pub use wheeleg_report::plain::plain;
 use wheeleg_report::results::COMPARED_PAGE;
 
 use self::content::{Content, Span};
+use self::judged::Judged;
 use self::signals::Signal;
 use crate::StudyError;
 use crate::export::write_new;
@@ -59,6 +61,8 @@ pub struct Viewed {
 struct Named {
     name: String,
     content: Content,
+    /// Judgement of its run, if that is known.
+    judged: Judged,
 }
 
 /// If less than this is missing, the log's last sample is only a little early, s.
@@ -96,7 +100,12 @@ pub fn view(options: &Options, progress: &Progress) -> Result<Option<Viewed>, St
             return Err(empty(path, &content));
         }
         let name = plain(&path.display().to_string());
-        logs.push(Named { name, content });
+        let judged = Judged::beside(path, &content).unwrap_or_default();
+        logs.push(Named {
+            name,
+            content,
+            judged,
+        });
     }
     let differences = match logs.as_slice() {
         [one, other] => difference::differences(&one.content, &other.content),

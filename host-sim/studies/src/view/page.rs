@@ -11,6 +11,7 @@ use wheeleg_telemetry::EventKind;
 
 use super::Named;
 use super::difference::Difference;
+use super::judged::Missed;
 use super::signals::{Curve, Group, Plot};
 use crate::StudyError;
 use crate::cause::{LISTED, Wrong, first_sentence, listed};
@@ -68,6 +69,9 @@ struct About {
     wrong: Vec<Wrong>,
     /// Causes beyond those listed.
     more_wrong: usize,
+    /// Which required targets its run missed, and how many, if that is known.
+    missed: Vec<Missed>,
+    missed_told: String,
 }
 
 #[derive(Serialize)]
@@ -174,6 +178,8 @@ fn about(log: &Named) -> About {
         more_wrong: causes.len().saturating_sub(LISTED),
         injected: injected.map(|event| event.text()).collect(),
         wrong: listed(&causes, |t_s| t_s),
+        missed: log.judged.missed.clone(),
+        missed_told: log.judged.sentence(),
     }
 }
 
@@ -268,7 +274,12 @@ fn single(log: &Named) -> String {
         name("robot"),
         name("scenario")
     );
-    first_sentence(&content.causes()).unwrap_or_else(|| format!("{what}: no fault"))
+    let missed = log.judged.sentence();
+    match first_sentence(&content.causes()) {
+        Some(told) => told,
+        None if missed.is_empty() => format!("{what}: no fault"),
+        None => format!("{what}: no fault, but {missed}"),
+    }
 }
 
 /// Makes the page.

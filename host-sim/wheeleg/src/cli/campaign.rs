@@ -1,4 +1,4 @@
-//! `wheeleg campaign`: one scenario many times, on as many computers as there are.
+//! `wheeleg campaign`: one scenario or cylinder many times, on as many computers as there are.
 
 mod print;
 
@@ -73,7 +73,7 @@ struct RunArgs {
     /// Exit with code 1 if a case of this shard misses a required target or has no result.
     #[arg(long)]
     strict: bool,
-    /// How progress is shown: a bar, if standard error is a terminal, or lines of JSON.
+    /// How progress is shown: a bar, or a line every 30 s if standard error is no terminal; or lines of JSON.
     #[arg(long, value_enum, default_value = "bar")]
     progress: Shown,
 }
@@ -217,8 +217,7 @@ fn plan_of(name_or_path: &str) -> Result<(Plan, PlanFile), CampaignError> {
         return Ok((file.plan()?, file));
     }
     let plan = Plan::load(name_or_path)?;
-    let duration_s = Cases::new(&plan)?.duration_s();
-    let file = PlanFile::of(&plan, duration_s);
+    let file = PlanFile::of(&plan, Cases::new(&plan)?.work_s());
     Ok((plan, file))
 }
 
@@ -300,8 +299,8 @@ fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let store = Store::create(&args.out, file, &stop)?;
     let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("wheeleg"));
-    let duration_s = cases.duration_s();
-    let submission = Submission::new(&store, &plan.name, &program, args.shards, duration_s)?;
+    let case_s = cases.work_s();
+    let submission = Submission::new(&store, &plan.name, &program, args.shards, case_s)?;
     if let Some(signal) = stop.signal() {
         tell(&format!(
             "{} before anything was submitted; run the same command again",
@@ -398,11 +397,11 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
     };
     show(&print::replayed(&replayed))?;
     let same = replayed.same_row() != Some(false) && replayed.same_log() != Some(false);
-    if let Some(run) = replayed.run {
-        if !tell_unwritten(run.unwritten) {
+    if let Some(files) = replayed.files {
+        if !tell_unwritten(files.unwritten) {
             return Ok(ExitCode::from(CANNOT_WRITE));
         }
-        if let Some(why) = run.stopped {
+        if let Some(why) = files.stopped {
             tell(&format!(
                 "{why}; the files hold the results up to that point"
             ));

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use wheeleg_report::results::REPORT;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::export::log_of;
 use wheeleg_studies::study::Progress;
@@ -56,12 +57,20 @@ fn seconds(text: &str) -> Result<f64, String> {
 fn log_in(given: &Path) -> Result<PathBuf, StudyError> {
     let log = log_of(given);
     if given.is_dir() && !log.exists() {
+        let page = given.join(REPORT);
+        let help = match page.is_file() {
+            true => format!(
+                "open its page, `{}`; a log is in the folder of a run or of a recording",
+                plain(&page.display().to_string())
+            ),
+            false => "give a log, or the folder of a run or of a recording".to_owned(),
+        };
         return Err(StudyError::refused(
             format!(
                 "there is no log.mcap in `{}`",
                 plain(&given.display().to_string())
             ),
-            "give a log, or the folder of a run or of a recording",
+            help,
         ));
     }
     Ok(log)

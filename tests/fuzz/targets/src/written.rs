@@ -4,11 +4,11 @@
 
 use std::collections::BTreeMap;
 
-use wheeleg_config::ConfigError;
 use wheeleg_config::builtin::{self, Source};
 use wheeleg_config::plan::{
-    Distribution, Factor, Plan, Resolver, Sets, Sources, Text, Value, Values,
+    Distribution, Factor, Part, Plan, Resolver, Sets, Sources, Text, Value, Values,
 };
+use wheeleg_config::{AxisConfig, ConfigError};
 
 /// Longest text.
 const LENGTH_MAX: usize = 16 * 1024;
@@ -24,6 +24,7 @@ fn text(source: Source) -> Text {
 fn sources(plan: &str) -> Sources {
     let scenario = builtin::scenario_source("stand").expect("built in");
     let robot = builtin::robot_source("wheeleg-2003").expect("built in");
+    let axis = AxisConfig::source("bench-vq110u").expect("built in");
     let one = |name: &str, source: Source| [(name.to_owned(), text(source))].into();
     Sources {
         plan: Text {
@@ -32,6 +33,7 @@ fn sources(plan: &str) -> Sources {
         },
         scenarios: one("stand", scenario),
         robots: one("wheeleg-2003", robot),
+        axes: one("bench-vq110u", axis),
         robot_of: [("stand".to_owned(), "wheeleg-2003".to_owned())].into(),
         data: BTreeMap::new(),
     }
@@ -80,8 +82,11 @@ pub fn run(data: &[u8]) {
         let Some(chosen) = chosen else { continue };
         match resolver.resolve(&chosen) {
             Ok(resolved) => {
+                let Some(case) = resolved.on_robot() else {
+                    continue;
+                };
                 for (factor, value) in plan.factors.iter().zip(&chosen) {
-                    arrived(factor, value, &resolved.robot.parameters);
+                    arrived(factor, value, &case.robot.parameters);
                 }
             }
             // Values that do not fit together; but the file was TOML.
@@ -95,15 +100,15 @@ pub fn run(data: &[u8]) {
 
 /// A value without a unit of its own reaches the robot unchanged.
 fn arrived(factor: &Factor, value: &Value, parameters: &[wheeleg_config::ParameterInfo]) {
-    let (Sets::Fields { robot, .. }, Value::Number(number)) = (&factor.sets, value) else {
+    let (Sets::Fields(fields), Value::Number(number)) = (&factor.sets, value) else {
         return;
     };
     if factor.scale || !factor.unit.is_empty() {
         return;
     }
-    for path in robot {
-        if let Some(info) = parameters.iter().find(|p| p.path == *path) {
-            assert_eq!(info.value, [*number], "{path}");
+    for field in fields.iter().filter(|field| field.part == Part::Robot) {
+        if let Some(info) = parameters.iter().find(|p| p.path == field.path) {
+            assert_eq!(info.value, [*number], "{field}");
         }
     }
 }

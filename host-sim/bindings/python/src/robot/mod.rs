@@ -147,8 +147,13 @@ impl Robot {
         let cases = Cases::new(&plan).map_err(|e| error::config(&e))?;
         let index = input::number("index", index, plan.cases() - 1)?;
         let case = cases.case(index);
-        let (scenario, robot) = case.setup.map_err(error::value)?;
-        Self::of(py, scenario, robot, case.seed)
+        let setup = case.setup.map_err(error::value)?;
+        let Some((scenario, robot)) = setup.robot() else {
+            let told =
+                "the plan's cases are cylinders on the bench (`base.axis`): they have no robot";
+            return Err(error::value(told));
+        };
+        Self::of(py, scenario.clone(), robot.clone(), case.seed)
     }
 
     /// Number of cases of a campaign's plan.

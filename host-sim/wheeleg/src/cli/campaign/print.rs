@@ -213,14 +213,14 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
     if let Some(hash) = &row.log_hash {
         let _ = writeln!(out, "hash    {hash}");
     }
-    if let Some(run) = &replayed.run {
+    if let Some(files) = &replayed.files {
         let log = match replayed.same_log() {
             Some(true) => "bit-identical",
             Some(false) => "DIFFERS",
             None => "not compared",
         };
         let _ = writeln!(out, "log     {log}");
-        let _ = writeln!(out, "report  {}", run.report.display());
+        let _ = writeln!(out, "report  {}", files.report.display());
     }
     out
 }

@@ -1,0 +1,228 @@
+//! Cylinders on the bench as cases: the same engine, from the plan to the replay.
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use wheeleg_campaign::report::Report;
+use wheeleg_campaign::{Case, Cases, Outcome, Setup, Status, merge, replay, simulate};
+use wheeleg_config::bench::Bench;
+use wheeleg_config::plan::Plan;
+use wheeleg_studies::study::{Signal, Stop};
+
+use crate::common::{options, parts, plan_of, run_in};
+
+const HEAD: &str = "name = \"bench\"\nroot = 1000007\nblock = 2\n";
+const BASE: &str = "[base]\naxis = \"bench-vq110u\"\nmove = \"step-20\"\nair = \"unknown\"\n";
+const SPREAD: &str = "[factor.friction]\n\
+     parameter = [\"plant.friction.coulomb\", \"plant.friction.static\"]\nscale = true\n\
+     loguniform = { min = 0.5, max = 2.0 }\n\
+     [factor.controller]\nparameter = \"controller\"\ngrid = [\"pwm-p\", \"predictive\"]\n\
+     paired = true\n";
+
+fn played(case: &Case) -> Option<Outcome> {
+    simulate(case, None, &Stop::default())
+}
+
+fn bench_of(case: &Case) -> Bench {
+    match case.setup.as_ref().expect("it can be") {
+        Setup::Bench(bench) => (**bench).clone(),
+        Setup::Robot(_) => panic!("a robot"),
+    }
+}
+
+/// A figure of the first cases of a plan.
+fn figures(plan: &Plan, id: &str) -> Vec<Option<f64>> {
+    let cases = Cases::new(plan).expect("a plan");
+    let of = |index| {
+        let outcome = played(&cases.case(index)).expect("not stopped");
+        assert_eq!(outcome.status, Status::Ok, "{:?}", outcome.error);
+        let targets = outcome.targets.iter();
+        targets.filter(|t| t.id == id).find_map(|t| t.value)
+    };
+    (0..plan.cases()).map(of).collect()
+}
+
+fn merged(folder: &Path) -> String {
+    let table = folder.join("cases.parquet");
+    let merged = merge(&[folder.to_owned()], &table, &Stop::default()).expect("merged");
+    merged.expect("not stopped").hash
+}
+
+/// A row that a stop has cut off is computed later by another number of threads, and replayed: to the bit the
+/// same.
+#[test]
+fn rows_of_cylinders_are_the_same_however_they_are_run_and_replayed() {
+    let plan = plan_of(&format!("samples = 3\n{HEAD}{BASE}{SPREAD}"));
+    let [whole, stopped] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let (ran, _) = run_in(whole.path(), &plan, &options(1), &played);
+    assert_eq!(ran.expect("it runs").computed, 6);
+    let first = options(2);
+    let (stop, count) = (first.stop.clone(), AtomicUsize::new(0));
+    let (ran, _) = run_in(stopped.path(), &plan, &first, &|case| {
+        if count.fetch_add(1, Ordering::Relaxed) >= 3 {
+            stop.ask(Signal::Terminate);
+            return None;
+        }
+        played(case)
+    });
+    let begun = ran.expect("it runs").computed;
+    assert!(begun < 6);
+    let (ran, simulated) = run_in(stopped.path(), &plan, &options(2), &played);
+    let ran = ran.expect("it runs");
+    assert_eq!((ran.found, simulated as u64), (begun, 6 - begun));
+    assert_eq!(merged(whole.path()), merged(stopped.path()));
+    assert!(parts(whole.path()) == parts(stopped.path()));
+
+    let table = whole.path().join("cases.parquet");
+    let out = whole.path().join("again");
+    let replayed = replay(&table, "3", Some(&out), false, &Stop::default());
+    let replayed = replayed.expect("replayed").expect("not stopped");
+    assert_eq!(
+        (replayed.same_row(), replayed.same_log()),
+        (Some(true), Some(true))
+    );
+    for file in [
+        "report.html",
+        "summary.json",
+        "csv/first.csv",
+        "csv/measured-2.csv",
+    ] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    let page = fs::read_to_string(out.join("report.html")).expect("read");
+    assert!(page.contains("required targets") && page.contains("bench-vq110u"));
+    let report = Report::of(&table, None).expect("a report");
+    let findings = &report.findings;
+    assert!(findings.grounds.is_empty());
+    assert_eq!(
+        (findings.passed.len(), findings.drawn.as_slice()),
+        (2, &["friction".to_owned()][..])
+    );
+}
+
+#[test]
+fn what_the_plant_is_and_what_its_board_is_told_are_told_apart() {
+    let of = |parameter: &str| {
+        let factor =
+            format!("[factor.mass]\nparameter = \"{parameter}\"\ngrid = [3.0]\nunit = \"kg\"\n");
+        let plan = plan_of(&format!("{HEAD}{BASE}{factor}"));
+        let cases = Cases::new(&plan).expect("a plan");
+        let case = cases.case(0);
+        (case.id, bench_of(&case))
+    };
+    let (plant_id, plant) = of("plant.moving.mass");
+    let (axis_id, axis) = of("axis.moving.mass");
+    assert_eq!(
+        (plant.sheet.moving_mass_kg, plant.plant.moving_mass_kg),
+        (1.5, 3.0)
+    );
+    assert_eq!(
+        (axis.sheet.moving_mass_kg, axis.plant.moving_mass_kg),
+        (3.0, 3.0)
+    );
+    assert_ne!(plant_id, axis_id);
+    // A factor of the plant scales what the data sheet states.
+    let plan = plan_of(&format!(
+        "{HEAD}{BASE}[factor.a]\nparameter = \"axis.moving.mass\"\ngrid = [2.0]\nunit = \"kg\"\n\
+         [factor.b]\nparameter = \"plant.moving.mass\"\nscale = true\ngrid = [1.5]\n"
+    ));
+    let bench = bench_of(&Cases::new(&plan).expect("a plan").case(0));
+    assert_eq!(
+        (bench.sheet.moving_mass_kg, bench.plant.moving_mass_kg),
+        (2.0, 3.0)
+    );
+}
+
+/// Pairs share the seed, so the noise and the air at power-up; all else has its own.
+#[test]
+fn paired_controllers_meet_the_same_cylinder() {
+    let plan = plan_of(&format!("samples = 2\n{HEAD}{BASE}{SPREAD}"));
+    let cases = Cases::new(&plan).expect("a plan");
+    let all: Vec<Case> = (0..4).map(|index| cases.case(index)).collect();
+    assert_eq!(all[0].seed, all[1].seed);
+    assert_ne!(all[0].id, all[1].id);
+    assert_ne!(all[0].seed, all[2].seed);
+    let [one, other] = [&all[0], &all[1]].map(bench_of);
+    assert_ne!(one.controller, other.controller);
+    assert_eq!(
+        one.plant.cylinder.friction.coulomb_n,
+        other.plant.cylinder.friction.coulomb_n
+    );
+}
+
+/// Valves that are slower than the data sheet says, friction, load and the source of the delays change the
+/// move, each as it must.
+#[test]
+fn factors_that_matter_do() {
+    let of = |factor: &str, base: &str| {
+        plan_of(&format!(
+            "{HEAD}[base]\naxis = \"bench-vq110u\"\nmove = \"step-20\"\n{base}[factor.x]\n{factor}"
+        ))
+    };
+    let delay = "parameter = \"plant.cylinder.timing_spread\"\nscale = true\ngrid = [1.0, 2.5]\npaired = true\n";
+    let settling = figures(&of(delay, ""), "settling");
+    assert_ne!(settling[0], settling[1], "{settling:?}");
+    // Whoever searches for the delays knows them.
+    let source = "parameter = \"delays\"\ngrid = [\"sheet\", \"identified\"]\npaired = true\n\
+        [factor.delay]\nparameter = \"plant.cylinder.timing_spread\"\nscale = true\ngrid = [2.5]\n";
+    let edges = figures(&of(source, ""), "edges");
+    assert_ne!(edges[0], edges[1], "{edges:?}");
+    let friction = "parameter = [\"plant.friction.coulomb\", \"plant.friction.static\", \"plant.friction.viscous\"]\n\
+        scale = true\ngrid = [0.5, 3.0]\npaired = true\n";
+    let rms = figures(&of(friction, ""), "rms");
+    assert!(rms[0] < rms[1], "friction makes it late: {rms:?}");
+    let load = "parameter = \"load_share\"\ngrid = [0.0, 0.5]\n";
+    let margin = figures(&of(load, ""), "margin");
+    assert_eq!(margin[0], Some(1e3));
+    assert!(
+        (margin[1].expect("measured") - 2.0).abs() < 1e-9,
+        "{margin:?}"
+    );
+}
+
+/// Columns are those of all moves of the plan; what a move does not have is empty.
+#[test]
+fn what_a_move_does_not_have_is_empty() {
+    let plan = plan_of(&format!(
+        "{HEAD}{BASE}[factor.m]\nparameter = \"move\"\ngrid = [\"step-20\", \"hold\"]\n"
+    ));
+    let cases = Cases::new(&plan).expect("a plan");
+    let targets = &cases.columns().targets;
+    let has = |id: &str| targets.iter().any(|other| other == id);
+    assert!(has("rest-edges") && has("settling") && !has("recovery"));
+    assert!(figures(&plan, "rest-edges")[0].is_none());
+    assert!(figures(&plan, "settling")[1].is_none());
+}
+
+/// What cannot be simulated is a row that says why: here a plant whose friction at rest is below that of
+/// sliding in one of some cases.
+#[test]
+fn a_cylinder_that_cannot_be_is_a_row() {
+    let plan = plan_of(&format!(
+        "samples = 32\n{HEAD}{BASE}[factor.a]\nparameter = \"plant.friction.coulomb\"\n\
+         uniform = {{ min = 12.0, max = 14.0, unit = \"N\" }}\n\
+         [factor.b]\nparameter = \"plant.friction.static\"\n\
+         uniform = {{ min = 13.0, max = 15.0, unit = \"N\" }}\n"
+    ));
+    let cases = Cases::new(&plan).expect("a plan");
+    let wrong = (0..32).filter_map(|index| cases.case(index).setup.err());
+    let wrong: Vec<String> = wrong.collect();
+    assert!(!wrong.is_empty() && wrong.len() < 32, "{wrong:?}");
+    assert!(
+        wrong.iter().all(|why| why.contains("friction.static")),
+        "{wrong:?}"
+    );
+}
+
+/// All cases of the first samples can be simulated.
+#[test]
+fn the_shipped_plan_makes_cases() {
+    let plan = Plan::load("cylinder-spread").expect("built in");
+    let cases = Cases::new(&plan).expect("a plan");
+    cases.ensure_possible().expect("some can be");
+    for index in 0..16 {
+        let case = cases.case(index);
+        assert!(case.setup.is_ok(), "{index}: {:?}", case.setup.err());
+    }
+}

@@ -1,0 +1,125 @@
+//! What is played on a bench axis: by which controller, which move, and what its board is told.
+
+use wheeleg_plant::axis::AxisParams;
+
+/// Names of an enum without values, each with its meaning.
+macro_rules! named {
+    ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $name:ident = $key:literal,)* }) => {
+        $(#[$about])*
+        #[derive(
+            Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
+        )]
+        pub enum $type {
+            $($(#[$doc])* #[serde(rename = $key)] $name,)*
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: [Self; [$($key),*].len()] = [$(Self::$name),*];
+
+            /// Name in files, in reports and on the command line.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$name => $key,)* }
+            }
+
+            /// The one with this name.
+            #[must_use]
+            pub fn of_name(name: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| one.name() == name)
+            }
+        }
+    };
+}
+
+named! {
+    /// A controller of the comparison.
+    Kind {
+        /// Full push or pull outside a dead band.
+        OnOff = "on-off",
+        /// PWM, proportional.
+        PwmP = "pwm-p",
+        /// PWM, PID.
+        PwmPid = "pwm-pid",
+        /// The paper's P + fuzzy PD.
+        FuzzyPd = "fuzzy-pd",
+        /// P + fuzzy ID.
+        FuzzyId = "fuzzy-id",
+        /// Sliding mode on seven valve modes.
+        Sliding = "sliding",
+        /// Estimated pressures, dead time ahead; the default.
+        Predictive = "predictive",
+    }
+}
+
+named! {
+    /// Motion of a case.
+    Move {
+        /// 20 mm back and out.
+        Step20 = "step-20",
+        /// 100 mm back and out.
+        Step100 = "step-100",
+        /// 64 mm out and back, in 1 s each, without a jerk.
+        SCurve = "s-curve",
+        /// Two periods of 2 s, 60 mm from crest to crest.
+        Sine = "sine",
+        /// At rest for 10 s after a step.
+        Hold = "hold",
+        /// A load against the move is removed in its middle and returns 0.4 s later.
+        Contact = "contact",
+        /// The same with a load that helps.
+        ContactHelped = "contact-helped",
+    }
+}
+
+impl Move {
+    /// Whether contact is lost and regained.
+    #[must_use]
+    pub const fn loses_contact(self) -> bool {
+        matches!(self, Self::Contact | Self::ContactHelped)
+    }
+}
+
+named! {
+    /// Whether a controller finds the valves' delays before its first move.
+    StartUp {
+        /// The data sheet's delays are used.
+        Sheet = "sheet",
+        /// The board searches for them at start-up.
+        Identified = "identified",
+    }
+}
+
+named! {
+    /// The air in the chambers at power-up, and the tick of the law's period in which the first move begins.
+    Air {
+        /// Pressures of the axis file, and the first tick.
+        File = "file",
+        /// Drawn from the seed, such that the piston stands: what no board knows at power-up.
+        Unknown = "unknown",
+    }
+}
+
+/// Allowed force on the rod, as a share of the force left at the supply on the weaker side.
+pub const LOAD_SHARES: [f64; 2] = [-0.95, 0.95];
+
+/// A cylinder on the bench: the data that its board is told, what it is in truth, and what is played.
+#[derive(Debug, Clone)]
+pub struct Bench {
+    /// Name of the axis.
+    pub axis: String,
+    /// Its data sheet: what the board is told.
+    pub sheet: AxisParams,
+    /// The plant.
+    pub plant: AxisParams,
+    /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
+    pub load_share: f64,
+    /// The move.
+    pub motion: Move,
+    /// The controller.
+    pub controller: Kind,
+    /// Source of the board's valve delays.
+    pub delays: StartUp,
+    /// Air at power-up.
+    pub air: Air,
+}

@@ -1,0 +1,158 @@
+//! Plans of cylinders on the bench: how errors in them are reported.
+
+use std::fs;
+
+use wheeleg_config::bench::{Air, Kind, Move, StartUp};
+use wheeleg_config::plan::{Plan, Resolver, Sources, Value};
+
+const HEAD: &str = "name = \"test\"\nroot = 1\n";
+const BASE: &str = "[base]\naxis = \"bench-vq110u\"\n";
+
+fn plan(text: &str) -> Result<Plan, Vec<String>> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.toml");
+    fs::write(&path, text).expect("written");
+    let plan = Sources::load(&path.to_string_lossy()).and_then(Plan::of);
+    plan.map_err(|e| e.problems().iter().map(|p| p.summary()).collect())
+}
+
+#[test]
+fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
+    let plan = plan(&format!(
+        "{HEAD}{BASE}controller = \"fuzzy-pd\"\ndelays = \"identified\"\nair = \"unknown\"\nload_share = 0.2\n\
+         [factor.move]\nparameter = \"move\"\ngrid = [\"hold\", \"sine\"]\n\
+         [factor.law]\nparameter = \"controller\"\nchoice = {{ values = [\"predictive\"] }}\n\
+         [factor.axis]\nparameter = \"axis\"\ngrid = [\"bench-vq110u\", \"small-12x50\"]\n\
+         [factor.load]\nparameter = \"load_share\"\nuniform = {{ min = -0.1, max = 0.5 }}\n"
+    ));
+    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
+    let text = |text: &str| Value::Text(text.to_owned());
+    let values = [
+        text("sine"),
+        text("predictive"),
+        text("small-12x50"),
+        Value::Number(0.5),
+    ];
+    let case = Resolver::new(&plan).expect("read").resolve(&values);
+    let bench = case
+        .expect("it can be")
+        .on_bench()
+        .expect("a cylinder")
+        .bench;
+    assert_eq!(
+        (
+            bench.motion,
+            bench.controller,
+            bench.delays,
+            bench.air,
+            bench.load_share
+        ),
+        (
+            Move::Sine,
+            Kind::Predictive,
+            StartUp::Identified,
+            Air::Unknown,
+            0.5
+        )
+    );
+    assert_eq!(bench.axis, "small-12x50");
+}
+
+/// Each mistake with the field, its value and what is allowed.
+#[test]
+fn mistakes_are_told() {
+    let factor = |text: &str| format!("{HEAD}{BASE}[factor.x]\n{text}");
+    for (text, told) in [
+        (
+            format!("{HEAD}[base]\naxis = \"bench-vq110u\"\nscenario = \"stand\"\n"),
+            "`base.scenario` and `base.axis` are both given",
+        ),
+        (
+            format!("{HEAD}{BASE}robot = \"wheeleg\"\n"),
+            "`base.robot` needs `base.scenario`",
+        ),
+        (
+            format!("{HEAD}[base]\nscenario = \"stand\"\nmove = \"hold\"\n"),
+            "`base.move` needs `base.axis`",
+        ),
+        (
+            format!("{HEAD}{BASE}move = \"jump\"\n"),
+            "`base.move` = \"jump\" is not known",
+        ),
+        (
+            format!("{HEAD}{BASE}load_share = 2.0\n"),
+            "`base.load_share` = 2 is out of range: allowed -0.95 to 0.95",
+        ),
+        (
+            format!("{HEAD}[base]\naxis = \"bench\"\n"),
+            "`base.axis` = \"bench\": no built-in axis has this name",
+        ),
+        (
+            format!("limit = \"3 s\"\n{HEAD}{BASE}"),
+            "`limit` is of a scenario's time",
+        ),
+        (
+            format!("keep = \"failed\"\n{HEAD}{BASE}"),
+            "`keep`: a case on the bench has no log",
+        ),
+        (
+            format!("{HEAD}{BASE}[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n"),
+            "`bars` are of a robot's travel",
+        ),
+        (
+            factor("parameter = \"plant.moving.mas\"\ngrid = [1.0]\nunit = \"kg\"\n"),
+            "`factor.x.parameter` = \"plant.moving.mas\": axes/bench-vq110u.toml has no such parameter",
+        ),
+        (
+            factor("parameter = \"plant.moving.mass\"\ngrid = [1e6]\nunit = \"kg\"\n"),
+            "`factor.x`: 1000000 kg is out of range: allowed",
+        ),
+        (
+            factor(
+                "parameter = \"axis.friction.static\"\nlognormal = { median = 15.0, sigma = 1.0, unit = \"N\" }\n",
+            ),
+            "its distribution has no upper end",
+        ),
+        (
+            factor("parameter = \"robot.supply.droop\"\ngrid = [0.3]\nunit = \"bar\"\n"),
+            "`factor.x` sets `robot.supply.droop`, and every case is a cylinder on the bench",
+        ),
+        (
+            factor("fault = \"pot-open:joint3@{}s\"\ngrid = [1.0]\n"),
+            "`factor.x` sets a fault, and every case is a cylinder on the bench",
+        ),
+        (
+            factor("parameter = \"controller\"\ngrid = [\"pid\"]\n"),
+            "pid is not known: allowed are on-off, pwm-p",
+        ),
+        (
+            factor("parameter = \"load_share\"\nuniform = { min = 0.0, max = 1.5 }\n"),
+            "1.5 is out of range: allowed -0.95 to 0.95",
+        ),
+        (
+            factor("parameter = \"load_share\"\ngrid = [0.5]\nunit = \"N\"\n"),
+            "a share of the force left is a number without a unit",
+        ),
+        (
+            factor("parameter = \"axis\"\nchoice = { values = [\"small-12x50\"] }\n"),
+            "axes are given as `grid",
+        ),
+        (
+            factor("parameter = \"wind\"\ngrid = [0.5]\n"),
+            "must begin with `robot.`, `scenario.`, `axis.` or `plant.`",
+        ),
+        (
+            format!(
+                "{HEAD}[base]\nscenario = \"stand\"\n[factor.x]\nparameter = \"plant.moving.mass\"\n\
+                 grid = [1.0]\nunit = \"kg\"\n"
+            ),
+            "`factor.x` sets `plant.moving.mass`, and every case is a robot in a scenario",
+        ),
+    ] {
+        let all = plan(&text).expect_err(&text);
+        assert!(
+            all.iter().any(|line| line.contains(told)),
+            "{told}: {all:#?}"
+        );
+    }
+}

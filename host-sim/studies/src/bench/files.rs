@@ -1,0 +1,163 @@
+//! The files of one case: summary, tables, figures and page.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use wheeleg_config::bench::Bench;
+use wheeleg_report::number::{counted, listed};
+use wheeleg_report::plot::Figure;
+use wheeleg_report::results::CSV;
+use wheeleg_report::{Picture, page, pictures};
+
+use super::{About, PlayedBench, targets};
+use crate::StudyError;
+use crate::analysis::{Judgement, Target};
+use crate::compare::{trace_csv, trace_figure};
+use crate::study::schema::json;
+use crate::study::{self, Drawn, Finished, Job, Settings};
+
+const TEMPLATE: &str = include_str!("page.html");
+
+/// Contents of `summary.json`.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct BenchSummary {
+    /// The case.
+    #[serde(flatten)]
+    pub about: About,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Simulated time, s, without the search for the valves' delays.
+    pub simulated_s: f64,
+    /// Names of the faults that the board latched.
+    pub faults: Vec<&'static str>,
+    /// Whether every required target is met.
+    pub passed: bool,
+    /// Targets with values and verdicts.
+    pub targets: Vec<Target>,
+}
+
+impl study::Summary for BenchSummary {
+    const SCHEMA: &'static str = "wheeleg.bench/1";
+}
+
+impl BenchSummary {
+    /// Of a case.
+    #[must_use]
+    pub fn of(bench: &Bench, seed: u64, case: &PlayedBench) -> Self {
+        let targets = targets(bench, case);
+        let traces = case.traces();
+        let faults = traces
+            .map(|(_, trace)| trace.faults)
+            .reduce(|all, other| all.union(other));
+        Self {
+            about: About::of(bench, seed),
+            version: env!("CARGO_PKG_VERSION"),
+            simulated_s: case.simulated_s,
+            faults: faults
+                .iter()
+                .flat_map(|all| all.iter())
+                .map(|f| f.name())
+                .collect(),
+            passed: targets.iter().all(|t| t.pass || !t.required),
+            targets,
+        }
+    }
+
+    /// The page's first sentence.
+    fn verdict(&self) -> String {
+        let missed: Vec<String> = (self.targets.iter())
+            .filter(|target| target.judgement() == Judgement::Missed)
+            .map(Target::name_text)
+            .collect();
+        let required = self.targets.iter().filter(|target| target.required).count();
+        match missed.len() {
+            0 => format!("All {required} required targets are met"),
+            n => format!(
+                "{} of {required} required targets missed: {}",
+                counted(n, "target", "targets"),
+                listed(&missed)
+            ),
+        }
+    }
+}
+
+/// A target on the page.
+#[derive(Serialize)]
+struct Line<'a> {
+    id: &'a str,
+    description: &'a str,
+    measured: String,
+    asked: String,
+    judgement: &'static str,
+    class: Judgement,
+}
+
+#[derive(Serialize)]
+struct Page<'a> {
+    stopped: Option<String>,
+    verdict: String,
+    about: &'a About,
+    faults: String,
+    missed: Vec<&'a Line<'a>>,
+    targets: &'a [Line<'a>],
+    figures: Vec<Picture<'a>>,
+    version: &'static str,
+}
+
+/// Writes a case: `summary.json`, a table and a figure of every move, and the page; earlier results in the
+/// folder are set aside.
+///
+/// # Errors
+/// [`StudyError`] if the folder cannot be used.
+pub fn write(
+    bench: &Bench,
+    seed: u64,
+    case: &PlayedBench,
+    settings: &Settings,
+) -> Result<Finished<BenchSummary>, StudyError> {
+    let job = Job::begin("case", settings, &[])?;
+    let summary = BenchSummary::of(bench, seed, case);
+    let text = json(&summary, None);
+    Ok(job.finish(summary, text, None, |job, summary| {
+        job.keep(job.subfolder(CSV));
+        let mut figures: Vec<Figure> = Vec::new();
+        for (name, trace) in case.traces() {
+            job.keep(job.save(&format!("{CSV}/{name}.csv"), &trace_csv(trace)));
+            figures.push(trace_figure(&name, title(&name), trace));
+        }
+        let drawn = job.draw(figures);
+        (render(summary, &drawn), drawn)
+    }))
+}
+
+fn title(name: &str) -> &str {
+    match name {
+        "first" => "The first move after power-up",
+        "measured-1" => "The first measured move",
+        _ => "The second measured move",
+    }
+}
+
+fn render(summary: &BenchSummary, drawn: &[Drawn]) -> Result<String, StudyError> {
+    let lines: Vec<Line<'_>> = (summary.targets.iter())
+        .map(|target| Line {
+            id: &target.id,
+            description: &target.description,
+            measured: target.measured_text(),
+            asked: target.asked_text(),
+            judgement: target.judgement().word(),
+            class: target.judgement(),
+        })
+        .collect();
+    let missed = lines.iter().filter(|l| l.class == Judgement::Missed);
+    let values = Page {
+        stopped: None,
+        verdict: summary.verdict(),
+        about: &summary.about,
+        faults: summary.faults.join(", "),
+        missed: missed.collect(),
+        targets: &lines,
+        figures: pictures(drawn),
+        version: summary.version,
+    };
+    Ok(page(TEMPLATE, values)?)
+}

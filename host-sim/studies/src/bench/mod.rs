@@ -1,0 +1,95 @@
+//! One cylinder on the bench off its data sheet: played, judged and shown. A case of a campaign; the moves and
+//! figures are those of [`crate::compare`].
+
+mod files;
+mod targets;
+
+use serde::Serialize;
+use wheeleg_config::bench::{Air, Bench};
+
+pub use files::{BenchSummary, write};
+pub use targets::{targets, unmeasured};
+
+use crate::axis_sim::Trace;
+use crate::axis_sim::suite::{AxisSimError, Factors, designed, force_left_n};
+use crate::compare::{Played, play_from_power_up};
+
+/// A case that was played.
+#[derive(Debug, Clone)]
+pub struct PlayedBench {
+    /// Its moves.
+    pub played: Played,
+    /// Force left over the load at rest; 1.25 means a quarter more than the load needs. At most [`NO_LOAD`].
+    pub margin: f64,
+    /// Time from power-up to the end, s, without the search for the valves' delays.
+    pub simulated_s: f64,
+}
+
+/// Margin of a cylinder without a load.
+pub const NO_LOAD: f64 = 1e3;
+
+impl PlayedBench {
+    /// Its recordings with their names: the first move, then the measured ones.
+    pub fn traces(&self) -> impl Iterator<Item = (String, &Trace)> {
+        let measured = self.played.measured.iter().enumerate();
+        let measured = measured.map(|(k, trace)| (format!("measured-{}", k + 1), trace));
+        std::iter::once(("first".to_owned(), &self.played.first)).chain(measured)
+    }
+}
+
+/// Plays a case. The seed makes the noise of the converter, and the air where that is unknown.
+///
+/// # Errors
+/// [`AxisSimError`] if plant or board refuse their data, or the plant leaves the range of its model.
+pub fn play(bench: &Bench, seed: u64) -> Result<PlayedBench, AxisSimError> {
+    let mut plant = bench.plant.clone();
+    let left_n = force_left_n(&plant);
+    plant.load_n += bench.load_share * left_n;
+    let wait_ms = match bench.air {
+        Air::File => 0,
+        Air::Unknown => Factors::draw_start(&mut plant, seed),
+    };
+    let design = designed(&bench.sheet, &plant, bench.controller, bench.delays, seed)?;
+    let plants = [&bench.sheet, &plant];
+    let played = play_from_power_up(bench.motion, plants, &design, seed, wait_ms)?;
+    let traces = std::iter::once(&played.first).chain(&played.measured);
+    let ticks: usize = traces.map(|trace| trace.rows.len()).sum();
+    Ok(PlayedBench {
+        margin: (left_n / plant.load_n.abs().max(1e-9)).min(NO_LOAD),
+        simulated_s: (ticks as u64 + wait_ms) as f64 * 1e-3,
+        played,
+    })
+}
+
+/// What a case is, in words for a page.
+#[derive(Debug, Clone, Serialize, schemars::JsonSchema)]
+pub struct About {
+    /// Axis.
+    pub axis: String,
+    /// Controller.
+    pub controller: &'static str,
+    /// Move.
+    #[serde(rename = "move")]
+    pub motion: &'static str,
+    /// Source of the board's valve delays.
+    pub delays: &'static str,
+    /// Air at power-up.
+    pub air: &'static str,
+    /// Seed, a whole number as text: JSON numbers are exact only up to 2^53.
+    pub seed: String,
+}
+
+impl About {
+    /// Of a case.
+    #[must_use]
+    pub fn of(bench: &Bench, seed: u64) -> Self {
+        Self {
+            axis: bench.axis.clone(),
+            controller: bench.controller.name(),
+            motion: bench.motion.name(),
+            delays: bench.delays.name(),
+            air: bench.air.name(),
+            seed: seed.to_string(),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! What a case on the bench is judged by, and what it is described by.
+
+use wheeleg_config::bench::{Bench, Move};
+
+use super::PlayedBench;
+use crate::analysis::Target;
+use crate::axis_sim::ValveResolution;
+use crate::compare::{ERROR_MM, Figures, OVERSHOOT_MM};
+
+/// Reversals in the last second from which on the end is a limit cycle.
+const CYCLE: f64 = 3.0;
+
+/// A quantity of a case: name, meaning, unit, limits if it is required, and its value.
+struct Quantity {
+    id: &'static str,
+    meaning: &'static str,
+    unit: &'static str,
+    limits: Option<[f64; 2]>,
+    value: fn(&Figures) -> Option<f64>,
+}
+
+const NONE: f64 = f64::NEG_INFINITY;
+
+/// Those of the moves themselves; the worse of the measured moves counts.
+const QUANTITIES: [Quantity; 15] = [
+    Quantity {
+        id: "rest-error",
+        meaning: "error at rest (mean of the last 0.2 s)",
+        unit: "mm",
+        limits: Some([-ERROR_MM, ERROR_MM]),
+        value: |f| f.steady_error_mm,
+    },
+    Quantity {
+        id: "overshoot",
+        meaning: "overshoot past the target",
+        unit: "mm",
+        limits: Some([NONE, OVERSHOOT_MM]),
+        value: |f| f.overshoot_mm,
+    },
+    Quantity {
+        id: "reversals",
+        meaning: "turns of more than 0.2 mm in the last second (3 are a limit cycle)",
+        unit: "1",
+        limits: Some([NONE, CYCLE - 1.0]),
+        value: |f| f.reversals.map(f64::from),
+    },
+    Quantity {
+        id: "stopped",
+        meaning: "whether the supervision stopped the board (1) or not (0)",
+        unit: "1",
+        limits: Some([NONE, 0.0]),
+        value: |f| f.stopped.map(|stopped| f64::from(u8::from(stopped))),
+    },
+    Quantity {
+        id: "faults",
+        meaning: "faults that the board latched",
+        unit: "1",
+        limits: Some([NONE, 0.0]),
+        value: |f| Some(f.faults.split_whitespace().count() as f64),
+    },
+    Quantity {
+        id: "settling",
+        meaning: "time until within 1 mm for good",
+        unit: "s",
+        limits: None,
+        value: |f| f.settle_s,
+    },
+    Quantity {
+        id: "rise",
+        meaning: "time from 10 to 90 % of the move",
+        unit: "s",
+        limits: None,
+        value: |f| f.rise_s,
+    },
+    Quantity {
+        id: "rms",
+        meaning: "error from the start of the motion (root mean square)",
+        unit: "mm",
+        limits: None,
+        value: |f| f.rms_mm,
+    },
+    Quantity {
+        id: "worst",
+        meaning: "largest error from the start of the motion",
+        unit: "mm",
+        limits: None,
+        value: |f| f.worst_mm,
+    },
+    Quantity {
+        id: "edges",
+        meaning: "poppet movements per second, all four valves",
+        unit: "1/s",
+        limits: None,
+        value: |f| f.switches_per_s,
+    },
+    Quantity {
+        id: "rest-edges",
+        meaning: "poppet movements in 10 s at rest",
+        unit: "1",
+        limits: None,
+        value: |f| f.rest_switches.map(|n| n as f64),
+    },
+    Quantity {
+        id: "air",
+        meaning: "air (ANR) from the supply for one move",
+        unit: "dm3",
+        limits: None,
+        value: |f| f.air_nl,
+    },
+    Quantity {
+        id: "recovery",
+        meaning: "time from the return of the load until within 2 mm for good",
+        unit: "s",
+        limits: None,
+        value: |f| f.recovery_s,
+    },
+    Quantity {
+        id: "first-overshoot",
+        meaning: "overshoot of the first move after power-up",
+        unit: "mm",
+        limits: None,
+        value: |f| f.first_overshoot_mm,
+    },
+    Quantity {
+        id: "first-settling",
+        meaning: "time until within 1 mm for good of the first move",
+        unit: "s",
+        limits: None,
+        value: |f| f.first_settle_s,
+    },
+];
+
+/// Whether a quantity means anything for a move.
+fn applies(id: &str, motion: Move) -> bool {
+    let is_step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
+    match id {
+        "overshoot" => !matches!(motion, Move::Sine | Move::Hold),
+        "settling" | "rise" => is_step,
+        "rest-edges" => motion == Move::Hold,
+        "recovery" => motion.loses_contact(),
+        _ => true,
+    }
+}
+
+fn of_figures(motion: Move, figures: &Figures) -> impl Iterator<Item = Target> {
+    let own = QUANTITIES.iter().filter(move |q| applies(q.id, motion));
+    own.map(|q| {
+        let value = (q.value)(figures);
+        match q.limits {
+            Some([min, max]) => {
+                let min = Some(min).filter(|min| *min > NONE);
+                Target::new(q.id, q.meaning, value, q.unit, min, Some(max))
+            }
+            None => Target::new(q.id, q.meaning, value, q.unit, None, None).info(),
+        }
+    })
+}
+
+/// Those of the cylinder, whatever it does.
+fn of_cylinder(margin: Option<f64>, resolution: Option<f64>) -> [Target; 2] {
+    [
+        (
+            "margin",
+            "force left over the load at rest (1000: no load)",
+            margin,
+        ),
+        (
+            "valve-resolution",
+            "smallest step of force over the range that friction holds (above 0.5: coarse valves)",
+            resolution,
+        ),
+    ]
+    .map(|(id, meaning, value)| Target::new(id, meaning, value, "1", None, None).info())
+}
+
+/// Targets of a case that was played.
+#[must_use]
+pub fn targets(bench: &Bench, case: &PlayedBench) -> Vec<Target> {
+    let figures = Figures::of(bench.motion, &case.played, None);
+    let resolution = ValveResolution::of(&bench.sheet).ratio;
+    of_figures(bench.motion, &figures)
+        .chain(of_cylinder(Some(case.margin), resolution))
+        .collect()
+}
+
+/// The same without values: what a case of this move will be told by.
+#[must_use]
+pub fn unmeasured(motion: Move) -> Vec<Target> {
+    of_figures(motion, &Figures::default())
+        .map(|target| Target {
+            value: None,
+            ..target
+        })
+        .chain(of_cylinder(None, None))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_move_has_its_own_quantities_and_none_twice() {
+        for motion in Move::ALL {
+            let ids: Vec<String> = unmeasured(motion).into_iter().map(|t| t.id).collect();
+            let mut once = ids.clone();
+            once.sort();
+            once.dedup();
+            assert_eq!(once.len(), ids.len(), "{ids:?}");
+            let has = |id: &str| ids.iter().any(|other| other == id);
+            assert_eq!(has("rest-edges"), motion == Move::Hold);
+            assert_eq!(has("recovery"), motion.loses_contact());
+            assert!(has("rest-error") && has("faults") && has("margin"));
+        }
+        let required = unmeasured(Move::Step100).into_iter().filter(|t| t.required);
+        assert_eq!(required.count(), 5);
+    }
+}
