@@ -78,12 +78,10 @@ fn bar<'a>(tried: &'a Tried, measure: &str) -> &'a Measured {
 fn a_wall_and_steep_sand_are_not_climbed() {
     let summary = field(&["sand-slope-20", "dry-sand-slope-20", "wall-30"], 1);
     let wall = tried(&summary, "wall-30");
-    let missed = wall.measured.iter().filter(|m| m.met == 0);
-    let missed: Vec<&str> = missed.map(|m| m.measure.as_str()).collect();
-    // 20 s are wanted: it needs 26, of which 11 are the way to the wall.
-    assert_eq!(missed, ["stuck-after"]);
+    assert_eq!(wall.passed, 1);
     let gives_up_s = bar(wall, "stuck-after").mean.expect("it gives up");
-    assert!((20.0..30.0).contains(&gives_up_s), "{gives_up_s}");
+    // 12 s are the way to the wall; then each leg has to find it.
+    assert!((15.0..20.0).contains(&gives_up_s), "{gives_up_s}");
     let sand = tried(&summary, "dry-sand-slope-20");
     assert_eq!(sand.passed, 1);
     let gives_up_s = bar(sand, "stuck-after").mean.expect("it gives up");

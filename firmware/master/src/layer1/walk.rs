@@ -7,6 +7,7 @@
 //! * a stance lasts as long as the foot stays within its leg's reach, T_st = S/v;
 //! * a cycle is a stance and a swing; the legs swing half a cycle apart (alternate) or one right
 //!   after the other (tandem);
+//! * where the speed leaves time, alternate legs swing earlier: some reach is kept for a swing that takes long;
 //! * a foot rises only when the other has been loaded for 100 ms;
 //! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the
 //!   standing foot has room for it.
@@ -46,6 +47,9 @@ const SWING_MIN_S: f32 = 0.6;
 const SWING_MAX_S: f32 = 3.0;
 /// From the touch of one foot to the rise of the other, s: [`LOADED`] and a cycle each way.
 const EXCHANGE_S: f32 = 0.12;
+/// A stance is planned to end so much before its foot is at the end of its reach, s. Ground that a foot
+/// looks for 50 mm below where it was expected takes that long: the wheels need not wait for it.
+const RESERVE_S: f32 = 0.5;
 /// The references wait for wheels that are behind by so much, mm, and stand still at twice that.
 const LEAD_MM: f32 = 40.0;
 /// Feet that have moved less than this, m, have not moved.
@@ -61,6 +65,8 @@ const MISSED_MOST: u64 = 10;
 const FREE_M: f32 = 0.5;
 /// … or has tried so many times.
 const TRIES: u8 = 3;
+/// Something before both legs that no wheel climbs is tried once more: feet that are lifted higher do not help.
+const TRIES_AT_A_FACE: u8 = 1;
 /// The governor is told when it takes more than this share of the speed, and again only after it
 /// has given all of it back.
 const GOVERNED: f32 = 0.5;
@@ -193,6 +199,7 @@ impl Walk {
 
     /// The references of this cycle.
     pub fn setpoints(&mut self, now_us: u64, feedback: &Feedback) -> Setpoints {
+        let bumped = self.acts.bumps != feedback.acts.bumps;
         self.acts = feedback.acts;
         let moved = self.moved(feedback);
         let lift_mm = self.order.lift_mm.get().to_num::<f32>();
@@ -216,7 +223,7 @@ impl Walk {
             }
         }
         self.level(plan_mm);
-        self.watch_progress(progress_m);
+        self.watch_progress(progress_m, bumped);
         let next = self.next_swing(wanted);
         if let Some((side, 0)) = next
             && let Some(leg) = self.legs.get_mut(side.index())
@@ -235,8 +242,9 @@ impl Walk {
         self.write(now_us, lift_mm)
     }
 
-    /// Backs off where the feet make no progress, and gives up after some tries.
-    fn watch_progress(&mut self, progress_m: f32) {
+    /// Backs off where the feet make no progress, and gives up after some tries. `bumped`: one has just
+    /// run against something.
+    fn watch_progress(&mut self, progress_m: f32, bumped: bool) {
         self.free_m += progress_m;
         if self.free_m > FREE_M {
             self.tries = 0;
@@ -245,15 +253,19 @@ impl Walk {
             self.back_off = self.back_off.saturating_sub(1);
             return;
         }
-        if core::mem::replace(&mut self.stuck, self.acts.stuck) == self.acts.stuck {
+        let stuck = core::mem::replace(&mut self.stuck, self.acts.stuck) != self.acts.stuck;
+        let faces = self.legs.iter().all(Leg::faces);
+        if !stuck && !(faces && bumped && !self.stopping) {
             return;
         }
         self.free_m = 0.0;
-        if self.tries < TRIES {
+        let tries = if faces { TRIES_AT_A_FACE } else { TRIES };
+        if self.tries < tries {
             self.tries = self.tries.saturating_add(1);
             self.back_off = BACK_OFF;
             self.tell(Act::BackOff);
         } else {
+            self.tries = TRIES;
             self.stopping = true;
             self.tell(Act::Stuck);
         }
@@ -335,7 +347,7 @@ impl Walk {
         }
         let cycle_s = self.stance_s(wanted) + self.swing_s;
         let apart_s = match self.order.pattern {
-            WalkPattern::Alternate => 0.5 * cycle_s,
+            WalkPattern::Alternate => 0.5 * (cycle_s - RESERVE_S),
             // The second of a pair follows at once, the first one a whole cycle after it did.
             WalkPattern::Tandem if self.steps % 2 == 1 => 0.0,
             WalkPattern::Tandem => cycle_s - self.swing_s,

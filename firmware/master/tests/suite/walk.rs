@@ -32,6 +32,8 @@ struct Robot {
     last: Setpoints,
     /// How often it was reported as stuck, not counting what the behaviours find.
     stuck: u8,
+    /// Something that its feet cannot be lifted over keeps b5 from going farther out than this, mm.
+    wall_mm: [f64; 2],
 }
 
 fn order(speed_mm_s: i16, turn_rad_s: &str) -> WalkOrder {
@@ -61,6 +63,7 @@ impl Robot {
             now_us: 0,
             last: Setpoints::idle(0),
             stuck: 0,
+            wall_mm: [180.0; 2],
         }
     }
 
@@ -99,6 +102,12 @@ impl Robot {
             *wanted = self.behaving.apply(joint, *wanted, out.walk.as_ref());
             let to = wanted.reference_mm.to_f64();
             self.strokes[joint] += (to - self.strokes[joint]).clamp(-PISTON_MM, PISTON_MM);
+            for side in [Side::Left, Side::Right] {
+                if joint == side.joint(Cylinder::Horizontal) {
+                    let wall_mm = self.wall_mm[side.index()].max(before[joint]);
+                    self.strokes[joint] = self.strokes[joint].min(wall_mm);
+                }
+            }
             self.speeds[joint] = 100.0 * (self.strokes[joint] - before[joint]);
         }
         let travel = out.travel.expect("the wheels are led");
@@ -336,6 +345,58 @@ fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
         }
     }
     panic!("it tries for ever");
+}
+
+/// The tries of a walk whose feet run against walls there, and the time from the first bump until it gives up, s.
+fn gives_up(wall_mm: [f64; 2]) -> (u32, f64) {
+    let mut robot = Robot::new(order(50, "0"));
+    robot.run(8.0);
+    robot.wall_mm = wall_mm;
+    let (mut tries, mut since) = (0, None);
+    for cycle in 0..6000_u32 {
+        robot.cycle();
+        for act in &robot.told {
+            match act {
+                Act::Bump(_) => _ = since.get_or_insert(cycle),
+                Act::BackOff => tries += 1,
+                Act::Stuck => {
+                    let begun = since.expect("it has run against something");
+                    return (tries, 0.01 * f64::from(cycle - begun));
+                }
+                _ => {}
+            }
+        }
+    }
+    panic!("it tries for ever")
+}
+
+#[test]
+fn what_no_wheel_climbs_is_tried_once_more() {
+    let (tries, took_s) = gives_up([60.0; 2]);
+    assert_eq!(tries, 1);
+    assert!(took_s < 8.0, "{took_s}");
+    // Before one leg alone it may yet find a way.
+    let (tries, _) = gives_up([60.0, 180.0]);
+    assert_eq!(tries, 3);
+}
+
+#[test]
+fn a_stance_ends_before_its_reach_where_the_speed_leaves_time() {
+    // 0.5 s at 60 mm/s are 30 mm; no stance begins or ends within 7.5 mm of the stroke.
+    let mut robot = Robot::new(order(60, "0"));
+    robot.run(8.0);
+    for _ in 0..1000 {
+        let stood = robot.last.walk.expect("it walks").legs;
+        let feet = [Side::Left, Side::Right].map(|side| robot.foot_m(side)[0]);
+        robot.cycle();
+        let plan = robot.last.walk.expect("it walks").legs;
+        for i in 0..2 {
+            if stood[i] == LegPlan::Stance && plan[i] == LegPlan::Lift {
+                let left_mm = 1e3 * (feet[i] - 0.0175);
+                assert!((20.0..40.0).contains(&left_mm), "{left_mm}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -39,6 +39,9 @@ const TRIES: u8 = 2;
 /// A foot that runs against something although it is as high as it goes is set down so far in front
 /// of it, m.
 const BEFORE_M: f32 = 0.1;
+/// Nothing of this height over where a foot stood is climbed by a wheel, mm: one alone rolls over a round
+/// rock of 95 mm, and over a step of 45 mm.
+const CLIMB_MM: f32 = 100.0;
 /// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
 /// presses less.
 const ANNOUNCED: u8 = 8;
@@ -120,6 +123,8 @@ pub(super) struct Leg {
     bumps: u8,
     /// It has run against something in this swing, or in the one that its stance began with.
     bumped: bool,
+    /// It has at a height that no wheel climbs.
+    faces: bool,
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
@@ -146,6 +151,7 @@ impl Leg {
             anchor_m: sensed.foot_m,
             bumps,
             bumped: false,
+            faces: false,
             last: sensed.plane.map(|reference_mm| JointSetpoint {
                 reference_mm,
                 ..JointSetpoint::default()
@@ -193,6 +199,7 @@ impl Leg {
         self.tries = 0;
         self.before_m = None;
         self.bumped = false;
+        self.faces = false;
         // Where a touch would have been, as the leg stands now.
         self.ground_mm = self.stand_mm - millimetres(PRESS_MM);
         self.state = LegState::Lift(self.stand_mm);
@@ -201,6 +208,11 @@ impl Leg {
     /// What it stands on may be the face of something that it has run against.
     pub(super) fn may_stand_at_a_face(&self) -> bool {
         self.stands() && self.bumped
+    }
+
+    /// In its last swing it has run against something that no wheel climbs.
+    pub(super) const fn faces(&self) -> bool {
+        self.faces
     }
 
     /// At full length it finds no ground: the nose is to go down.
@@ -274,6 +286,7 @@ impl Leg {
                 if !bumped {
                     return;
                 }
+                self.faces |= self.stand_mm - sensed.height_mm >= CLIMB_MM;
                 if lift_mm < self.stand_mm {
                     self.higher_mm += HIGHER_MM;
                 } else if self.before_m.is_none() {
