@@ -255,7 +255,8 @@ impl Walk {
         }
         let stuck = core::mem::replace(&mut self.stuck, self.acts.stuck) != self.acts.stuck;
         let faces = self.legs.iter().all(Leg::faces);
-        if !stuck && !(faces && bumped && !self.stopping) {
+        let at_a_face = faces && bumped && !self.stopping;
+        if !(stuck || at_a_face) {
             return;
         }
         self.free_m = 0.0;

@@ -157,11 +157,11 @@ impl<'a> Resolver<'a> {
     fn on_robot(
         &self,
         factors: &[(&Factor, &Value)],
-        scenario: &String,
+        scenario: &str,
         robot: Option<&String>,
     ) -> Result<OnRobot, ConfigError> {
         let chosen = |setting| chosen(factors, setting).map(ToString::to_string);
-        let scenario_name = chosen(Setting::Scenario).unwrap_or_else(|| scenario.clone());
+        let scenario_name = chosen(Setting::Scenario).unwrap_or_else(|| scenario.to_owned());
         let robot_of = &self.plan.sources.robot_of;
         let robot_name = chosen(Setting::Robot)
             .or_else(|| robot.cloned())
