@@ -347,8 +347,9 @@ fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
     panic!("it tries for ever");
 }
 
-/// The tries of a walk whose feet run against walls there, and the time from the first bump until it gives up, s.
-fn gives_up(wall_mm: [f64; 2]) -> (u32, f64) {
+/// The tries of a walk whose feet run against walls there, and the time from the first bump until it gives up, s;
+/// `None` if it has not in a minute.
+fn gives_up(wall_mm: [f64; 2]) -> Option<(u32, f64)> {
     let mut robot = Robot::new(order(50, "0"));
     robot.run(8.0);
     robot.wall_mm = wall_mm;
@@ -361,23 +362,22 @@ fn gives_up(wall_mm: [f64; 2]) -> (u32, f64) {
                 Act::BackOff => tries += 1,
                 Act::Stuck => {
                     let begun = since.expect("it has run against something");
-                    return (tries, 0.01 * f64::from(cycle - begun));
+                    return Some((tries, 0.01 * f64::from(cycle - begun)));
                 }
                 _ => {}
             }
         }
     }
-    panic!("it tries for ever")
+    None
 }
 
 #[test]
 fn what_no_wheel_climbs_is_tried_once_more() {
-    let (tries, took_s) = gives_up([60.0; 2]);
+    let (tries, took_s) = gives_up([60.0; 2]).expect("it gives up");
     assert_eq!(tries, 1);
     assert!(took_s < 8.0, "{took_s}");
-    // Before one leg alone it may yet find a way.
-    let (tries, _) = gives_up([60.0, 180.0]);
-    assert_eq!(tries, 3);
+    // Before one leg alone it goes on beside it.
+    assert_eq!(gives_up([60.0, 180.0]), None);
 }
 
 #[test]
@@ -461,7 +461,7 @@ fn a_robot_that_is_stuck_backs_off_the_way_that_it_came() {
                 break;
             }
         }
-        robot.run(0.5);
+        robot.run(0.3);
         robot.stuck = 1;
         robot.cycle();
         assert!(robot.told.contains(&Act::BackOff), "{speed} {turn}");

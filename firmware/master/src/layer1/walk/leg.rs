@@ -123,7 +123,7 @@ pub(super) struct Leg {
     bumps: u8,
     /// It has run against something in this swing, or in the one that its stance began with.
     bumped: bool,
-    /// It has at a height that no wheel climbs.
+    /// It has at a height that no wheel climbs, and in every swing since.
     faces: bool,
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
@@ -199,7 +199,6 @@ impl Leg {
         self.tries = 0;
         self.before_m = None;
         self.bumped = false;
-        self.faces = false;
         // Where a touch would have been, as the leg stands now.
         self.ground_mm = self.stand_mm - millimetres(PRESS_MM);
         self.state = LegState::Lift(self.stand_mm);
@@ -210,7 +209,7 @@ impl Leg {
         self.stands() && self.bumped
     }
 
-    /// In its last swing it has run against something that no wheel climbs.
+    /// It has run against something that no wheel climbs, and has not got over it since.
     pub(super) const fn faces(&self) -> bool {
         self.faces
     }
@@ -319,6 +318,7 @@ impl Leg {
                 self.ground_mm = millimetres(*stroke);
                 self.stand_mm = (self.ground_mm + millimetres(PRESS_MM)).min(full_mm());
                 self.state = LegState::Stance;
+                self.faces &= self.bumped;
             }
             Some(Landing::Nothing(cycles)) => {
                 self.without = *cycles;
