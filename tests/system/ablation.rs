@@ -1,12 +1,14 @@
 //! What each part of the predictive law is worth: it is taken out, and the same random combinations are played with and
 //! without it. `cargo xtask deep ablation` plays them and writes the table of `docs/guide/on-off-valves.md`.
 
+mod long_checks;
+
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-use crate::long_checks::number;
+use long_checks::number;
 use wheeleg_config::AxisConfig;
 use wheeleg_control::ablation::{Part, take_out};
 use wheeleg_report::stats::{failure_bound, mcnemar, quantile};

@@ -5,7 +5,8 @@
 //! moves after the first one from power-up. A hash of the law's sources selects the combinations, so that the
 //! law is not tuned to them. A few run here; `cargo xtask deep combinations` runs as many as a bar needs.
 
-use crate::long_checks::{is_no_step_back, number};
+use crate::long_checks::number;
+use crate::step_back::is_no_step_back;
 use wheeleg_config::AxisConfig;
 use wheeleg_report::stats::{bounded_quantile, failure_bound};
 use wheeleg_studies::axis_sim::Kind;

@@ -5,7 +5,8 @@
 //! from any tick of the law's period. A hash of the law's sources selects the cylinders, so that the law is
 //! not tuned to them. 1,000 here; `cargo xtask deep cylinders` draws as many as a bar needs.
 
-use crate::long_checks::{is_no_step_back, number};
+use crate::long_checks::number;
+use crate::step_back::is_no_step_back;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;

@@ -4,8 +4,9 @@
 //! The seeds of the three steps begin at a hash of the law's sources, so that the law is not tuned to them. A few run here;
 //! `cargo xtask deep robot` runs as many as the bar needs.
 
-use crate::long_checks::{is_no_step_back, number};
+use crate::long_checks::number;
 use crate::sil;
+use crate::step_back::is_no_step_back;
 use std::collections::BTreeMap;
 use wheeleg_config::builtin;
 use wheeleg_report::stats::failure_bound;

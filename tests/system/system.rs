@@ -5,6 +5,7 @@
 mod long_checks;
 mod program;
 mod sil;
+mod step_back;
 
 mod axis_text;
 mod behaviours;

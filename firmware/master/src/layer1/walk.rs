@@ -65,8 +65,6 @@ const MISSED_MOST: u64 = 10;
 const FREE_M: f32 = 0.5;
 /// … or has tried so many times.
 const TRIES: u8 = 3;
-/// Something before both legs that no wheel climbs is tried once more: feet that are lifted higher do not help.
-const TRIES_AT_A_FACE: u8 = 1;
 /// The governor is told when it takes more than this share of the speed, and again only after it
 /// has given all of it back.
 const GOVERNED: f32 = 0.5;
@@ -101,6 +99,9 @@ pub struct Walk {
     /// Way since the last try to get on, m.
     free_m: f32,
     tries: u8,
+    /// One of these tries was at something before both legs that no wheel climbs. Such a thing is tried once more, not
+    /// three times: feet that are lifted higher do not help.
+    tried_face: bool,
     /// Cycles of backing off that are left.
     back_off: u16,
     /// What the behaviours of layer 0 do.
@@ -148,6 +149,7 @@ impl Walk {
             lead_mm: [0.0; WHEELS],
             free_m: 0.0,
             tries: 0,
+            tried_face: false,
             back_off: 0,
             acts: feedback.acts,
             stuck: feedback.acts.stuck,
@@ -248,21 +250,24 @@ impl Walk {
         self.free_m += progress_m;
         if self.free_m > FREE_M {
             self.tries = 0;
+            self.tried_face = false;
         }
         if self.back_off > 0 {
             self.back_off = self.back_off.saturating_sub(1);
             return;
         }
         let stuck = core::mem::replace(&mut self.stuck, self.acts.stuck) != self.acts.stuck;
-        let faces = self.legs.iter().all(Leg::faces);
-        let at_a_face = faces && bumped && !self.stopping;
-        if !(stuck || at_a_face) {
+        let allowed = self.acts.enabled.contains(Behaviour::Stuck);
+        let faces = allowed && self.legs.iter().all(Leg::faces);
+        if !stuck && (!faces || !bumped || self.stopping) {
             return;
         }
         self.free_m = 0.0;
-        let tries = if faces { TRIES_AT_A_FACE } else { TRIES };
-        if self.tries < tries {
+        // A try for another cause says nothing about a face.
+        let goes_on = self.tries < TRIES && !(faces && self.tried_face);
+        if goes_on {
             self.tries = self.tries.saturating_add(1);
+            self.tried_face |= faces;
             self.back_off = BACK_OFF;
             self.tell(Act::BackOff);
         } else {

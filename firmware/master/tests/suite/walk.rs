@@ -4,7 +4,7 @@
 
 use crate::common::leg;
 use fixed::types::I16F16;
-use wheeleg_master::behaviour::{Act, Behaviours};
+use wheeleg_master::behaviour::{Act, Behaviour, Behaviours};
 use wheeleg_master::contact::{FootSwitches, Side};
 use wheeleg_master::event::{Event, Events};
 use wheeleg_master::layer0::behaviours::{Behaving, JointSense, Senses, WheelSense};
@@ -349,9 +349,7 @@ fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
 
 /// The tries of a walk whose feet run against walls there, and the time from the first bump until it gives up, s;
 /// `None` if it has not in a minute.
-fn gives_up(wall_mm: [f64; 2]) -> Option<(u32, f64)> {
-    let mut robot = Robot::new(order(50, "0"));
-    robot.run(8.0);
+fn gives_up(mut robot: Robot, wall_mm: [f64; 2]) -> Option<(u32, f64)> {
     robot.wall_mm = wall_mm;
     let (mut tries, mut since) = (0, None);
     for cycle in 0..6000_u32 {
@@ -371,13 +369,40 @@ fn gives_up(wall_mm: [f64; 2]) -> Option<(u32, f64)> {
     None
 }
 
+/// A robot that has walked for some time.
+fn walking() -> Robot {
+    let mut robot = Robot::new(order(50, "0"));
+    robot.run(8.0);
+    robot
+}
+
 #[test]
 fn what_no_wheel_climbs_is_tried_once_more() {
-    let (tries, took_s) = gives_up([60.0; 2]).expect("it gives up");
+    let (tries, took_s) = gives_up(walking(), [60.0; 2]).expect("it gives up");
     assert_eq!(tries, 1);
     assert!(took_s < 8.0, "{took_s}");
     // Before one leg alone it goes on beside it.
-    assert_eq!(gives_up([60.0, 180.0]), None);
+    assert_eq!(gives_up(walking(), [60.0, 180.0]), None);
+}
+
+/// A try for another cause, shortly before, is not that one.
+#[test]
+fn what_no_wheel_climbs_is_tried_once_more_after_another_try() {
+    let mut robot = walking();
+    robot.stuck = 1;
+    robot.cycle();
+    assert!(robot.told.contains(&Act::BackOff));
+    let (tries, _) = gives_up(robot, [60.0; 2]).expect("it gives up");
+    assert_eq!(tries, 1);
+}
+
+/// With its behaviour switched off nothing gives up.
+#[test]
+fn what_no_wheel_climbs_ends_no_walk_whose_behaviour_is_off() {
+    let mut robot = walking();
+    let on = Behaviours::ALL.without(Behaviour::Stuck);
+    robot.behaving = Behaving::new(on, WalkGeometry::default());
+    assert_eq!(gives_up(robot, [60.0; 2]), None);
 }
 
 #[test]
@@ -385,6 +410,7 @@ fn a_stance_ends_before_its_reach_where_the_speed_leaves_time() {
     // 0.5 s at 60 mm/s are 30 mm; no stance begins or ends within 7.5 mm of the stroke.
     let mut robot = Robot::new(order(60, "0"));
     robot.run(8.0);
+    let mut lifts = 0;
     for _ in 0..1000 {
         let stood = robot.last.walk.expect("it walks").legs;
         let feet = [Side::Left, Side::Right].map(|side| robot.foot_m(side)[0]);
@@ -394,9 +420,11 @@ fn a_stance_ends_before_its_reach_where_the_speed_leaves_time() {
             if stood[i] == LegPlan::Stance && plan[i] == LegPlan::Lift {
                 let left_mm = 1e3 * (feet[i] - 0.0175);
                 assert!((20.0..40.0).contains(&left_mm), "{left_mm}");
+                lifts += 1;
             }
         }
     }
+    assert!(lifts >= 4, "{lifts}");
 }
 
 #[test]
