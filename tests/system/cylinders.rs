@@ -87,7 +87,7 @@ fn played(sheet: &AxisParams, which: u64) -> Vec<Trace> {
     let wait_ms = if std::env::var_os(VENTED_VARIABLE).is_some() {
         0
     } else {
-        Factors::draw_start(&mut plant, which)
+        Factors::draw_start(&mut plant, which).expect("holds")
     };
     let (kind, start) = (Kind::Predictive, StartUp::Identified);
     let design = designed(sheet, &plant, kind, start, which).expect("runs");

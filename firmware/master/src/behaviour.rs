@@ -52,7 +52,7 @@ behaviours! {
     Slip = 7, "slip";
     /// A foot that holds on something pulls harder; its place is kept, it does nothing yet.
     Hook = 8, "hook";
-    /// A robot that does not get on backs off, and stands after three tries.
+    /// A robot that does not get on backs off, and stands after three tries, or one before what no wheel climbs.
     Stuck = 9, "stuck";
     /// Legs that both stand share the load.
     LoadShare = 10, "load-share";

@@ -130,6 +130,18 @@ fn mistakes_are_told() {
             "1.5 is out of range: allowed -0.95 to 0.95",
         ),
         (
+            factor("parameter = \"load_share\"\ngrid = [true, false]\n"),
+            "a share of the force left is a number without a unit",
+        ),
+        (
+            factor("parameter = \"load_share\"\nnormal = { mean = 0.0, sd = 0.2 }\n"),
+            "can leave the range of `load_share`, -0.95 to 0.95",
+        ),
+        (
+            factor("parameter = \"axis.description\"\ngrid = [\"a\", \"b\"]\n"),
+            "no factor sets it",
+        ),
+        (
             factor("parameter = \"load_share\"\ngrid = [0.5]\nunit = \"N\"\n"),
             "a share of the force left is a number without a unit",
         ),

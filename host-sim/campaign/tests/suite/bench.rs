@@ -80,7 +80,7 @@ fn rows_of_cylinders_are_the_same_however_they_are_run_and_replayed() {
     let replayed = replayed.expect("replayed").expect("not stopped");
     assert_eq!(
         (replayed.same_row(), replayed.same_log()),
-        (Some(true), Some(true))
+        (Some(true), None)
     );
     for file in [
         "report.html",
@@ -162,7 +162,8 @@ fn factors_that_matter_do() {
     };
     let delay = "parameter = \"plant.cylinder.timing_spread\"\nscale = true\ngrid = [1.0, 2.5]\npaired = true\n";
     let settling = figures(&of(delay, ""), "settling");
-    assert_ne!(settling[0], settling[1], "{settling:?}");
+    let late_s = settling[1].unwrap_or(f64::INFINITY);
+    assert!(settling[0] < Some(late_s), "{settling:?}");
     // Whoever searches for the delays knows them.
     let source = "parameter = \"delays\"\ngrid = [\"sheet\", \"identified\"]\npaired = true\n\
         [factor.delay]\nparameter = \"plant.cylinder.timing_spread\"\nscale = true\ngrid = [2.5]\n";
@@ -212,6 +213,38 @@ fn a_cylinder_that_cannot_be_is_a_row() {
     assert!(
         wrong.iter().all(|why| why.contains("friction.static")),
         "{wrong:?}"
+    );
+}
+
+/// Without pressure in its supply no air can be drawn: the row says which field forbids it, and a replay as well.
+#[test]
+fn air_that_cannot_be_drawn_is_a_row_that_says_why() {
+    let plan = plan_of(&format!(
+        "{HEAD}{BASE}[factor.empty]\nparameter = \"plant.supply.initial_pressure\"\n\
+         grid = [0.9]\nunit = \"bar\"\n"
+    ));
+    let case = Cases::new(&plan).expect("a plan").case(0);
+    let outcome = played(&case).expect("not stopped");
+    let told = outcome.error.expect("it cannot be played");
+    assert!(
+        told.contains("`supply.initial_pressure` (90000 Pa)"),
+        "{told}"
+    );
+}
+
+/// A move that is made between the first and the measured ones counts, too.
+#[test]
+fn the_simulated_time_is_that_of_all_moves() {
+    let plan = plan_of(&format!(
+        "{HEAD}[base]\naxis = \"bench-vq110u\"\nmove = \"sine\"\n"
+    ));
+    let bench = bench_of(&Cases::new(&plan).expect("a plan").case(0));
+    let played = wheeleg_studies::bench::play(&bench, 1).expect("it can be played");
+    // Two steps of 2.5 s and a recording of 5 s.
+    assert!(
+        (played.simulated_s - 10.0).abs() < 1e-6,
+        "{}",
+        played.simulated_s
     );
 }
 

@@ -12,6 +12,7 @@ use super::field::{Template, factor_between};
 use super::resolve::Resolver;
 use super::value::Value;
 use super::{Plan, distribution};
+use crate::bench::LOAD_SHARES;
 use crate::error::ConfigError;
 use crate::params::ParameterInfo;
 use crate::quantity::{pretty, suffix};
@@ -153,7 +154,7 @@ fn field_in_all<'a>(
 }
 
 /// Fields of a scenario that a case does not take from its file, and what to do instead.
-const WITHOUT_EFFECT: [(&str, &str); 4] = [
+const WITHOUT_EFFECT: [(&str, &str); 8] = [
     (
         "scenario.seed",
         "each case has a seed of its own, which follows from `root`: `replicates` repeats a case with other \
@@ -170,6 +171,22 @@ const WITHOUT_EFFECT: [(&str, &str); 4] = [
     (
         "scenario.description",
         "a description enters no run: leave the factor out",
+    ),
+    (
+        "axis.description",
+        "a description enters no case: leave the factor out",
+    ),
+    (
+        "plant.description",
+        "a description enters no case: leave the factor out",
+    ),
+    (
+        "axis.name",
+        "write `parameter = \"axis\"` and a `grid` of axes",
+    ),
+    (
+        "plant.name",
+        "write `parameter = \"axis\"` and a `grid` of axes",
     ),
 ];
 
@@ -463,7 +480,7 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
             if let Value::Number(n) = probe
                 && n.is_infinite()
             {
-                infinite_fault(r, factor);
+                endless(r, factor);
                 continue;
             }
             let mut values = middle.clone();
@@ -495,11 +512,16 @@ fn report(r: &mut Reader, span: Option<Range<usize>>, what: &str, error: &Config
     }
 }
 
-/// Reports a distribution of a fault's number without an end.
-fn infinite_fault(r: &mut Reader, factor: &Factor) {
+/// Reports a distribution without an end, of a fault's number or of the share of the load.
+fn endless(r: &mut Reader, factor: &Factor) {
     let span = span_of(r, factor);
+    let [least, most] = LOAD_SHARES;
+    let whose = match factor.sets {
+        Sets::Base(_) => format!("of `load_share`, {least} to {most}"),
+        Sets::Fault(_) | Sets::Fields(_) => "of any fault".to_owned(),
+    };
     let message = format!(
-        "`factor.{}`: a distribution without an end can leave the range of any fault",
+        "`factor.{}`: a distribution without an end can leave the range {whose}",
         factor.name
     );
     let help = "cut the distribution with `min` and `max`".to_owned();

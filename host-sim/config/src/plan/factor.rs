@@ -102,6 +102,18 @@ impl Factor {
         }
     }
 
+    /// Whether all of its values are numbers.
+    #[must_use]
+    pub fn is_number(&self) -> bool {
+        match &self.values {
+            Values::Grid(list) => list.iter().all(|v| matches!(v, Value::Number(_))),
+            Values::Drawn(Distribution::Choice(list)) => {
+                (list.iter()).all(|c| matches!(c.value, Value::Number(_)))
+            }
+            Values::Drawn(_) => true,
+        }
+    }
+
     /// Whether its values are names.
     #[must_use]
     pub fn is_text(&self) -> bool {
@@ -187,7 +199,7 @@ fn read(r: &mut Reader, name: &str) -> Option<Factor> {
 fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
     let path = &entry.path;
     let why = match &factor.sets {
-        Sets::Base(Setting::LoadShare) if factor.is_text() || !factor.unit.is_empty() => {
+        Sets::Base(Setting::LoadShare) if !factor.is_number() || !factor.unit.is_empty() => {
             "a share of the force left is a number without a unit"
         }
         Sets::Base(setting) if setting.is_file() && !matches!(factor.values, Values::Grid(_)) => {

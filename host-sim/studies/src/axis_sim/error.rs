@@ -16,6 +16,27 @@ pub enum AxisSimError {
         /// The likely cause.
         help: String,
     },
+    /// No air at power-up holds the piston.
+    #[error(
+        "no air in the chambers between `gas.ambient_pressure` ({} Pa) and `supply.initial_pressure` ({} Pa) holds the piston under {} N",
+        brief(*.ambient_pa),
+        brief(*.supply_pa),
+        brief(*.load_n)
+    )]
+    #[diagnostic(
+        code(wheeleg::bench::start),
+        help(
+            "raise `supply.initial_pressure`, lower `moving.load`, or take the air from the file"
+        )
+    )]
+    Start {
+        /// Atmosphere, absolute \[Pa\].
+        ambient_pa: f64,
+        /// Supply at power-up, absolute \[Pa\].
+        supply_pa: f64,
+        /// Force on the rod \[N\].
+        load_n: f64,
+    },
     /// The plant refused its parameters.
     #[error("the plant of the axis: {0}")]
     #[diagnostic(

@@ -107,7 +107,10 @@ impl Factors {
     /// Draws the unknowns of a board at power-up by a number: both chamber pressures between the atmosphere
     /// and the supply, such that with the load the piston stands within half of its friction. Returns the
     /// tick of the law's period in which the first move falls, 0…3.
-    pub fn draw_start(plant: &mut AxisParams, number: u64) -> u64 {
+    ///
+    /// # Errors
+    /// [`AxisSimError::Start`] if there are no such pressures.
+    pub fn draw_start(plant: &mut AxisParams, number: u64) -> Result<u64, AxisSimError> {
         let mut rng = Pcg64Mcg::seed_from_u64(number ^ 0x57A2_7000);
         let (low, high) = (
             plant.gas.ambient_pressure_pa,
@@ -117,6 +120,14 @@ impl Factors {
         let cylinder = &mut plant.cylinder;
         let circle = |d_m: f64| std::f64::consts::FRAC_PI_4 * d_m * d_m;
         let (bore, rod) = (circle(cylinder.bore_m), circle(cylinder.rod_m));
+        let none = AxisSimError::Start {
+            ambient_pa: low,
+            supply_pa: high,
+            load_n,
+        };
+        if low >= high {
+            return Err(none);
+        }
         for _ in 0..1000 {
             let a_pa = rng.random_range(low..high);
             let net_n = 0.5 * cylinder.friction.coulomb_n * rng.random_range(-1.0..1.0);
@@ -124,10 +135,10 @@ impl Factors {
             if (low..=high).contains(&b_pa) {
                 cylinder.initial_pressure_a_pa = a_pa;
                 cylinder.initial_pressure_b_pa = b_pa;
-                break;
+                return Ok(rng.random_range(0..4));
             }
         }
-        rng.random_range(0..4)
+        Err(none)
     }
 
     /// Force left over the load: 1.25 means a quarter more than the load needs.

@@ -47,16 +47,14 @@ pub fn play(bench: &Bench, seed: u64) -> Result<PlayedBench, AxisSimError> {
     plant.load_n += bench.load_share * left_n;
     let wait_ms = match bench.air {
         Air::File => 0,
-        Air::Unknown => Factors::draw_start(&mut plant, seed),
+        Air::Unknown => Factors::draw_start(&mut plant, seed)?,
     };
     let design = designed(&bench.sheet, &plant, bench.controller, bench.delays, seed)?;
     let plants = [&bench.sheet, &plant];
     let played = play_from_power_up(bench.motion, plants, &design, seed, wait_ms)?;
-    let traces = std::iter::once(&played.first).chain(&played.measured);
-    let ticks: usize = traces.map(|trace| trace.rows.len()).sum();
     Ok(PlayedBench {
         margin: (left_n / plant.load_n.abs().max(1e-9)).min(NO_LOAD),
-        simulated_s: (ticks as u64 + wait_ms) as f64 * 1e-3,
+        simulated_s: (played.ticks + wait_ms) as f64 * 1e-3,
         played,
     })
 }

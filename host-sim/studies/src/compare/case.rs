@@ -126,7 +126,7 @@ impl Case {
         let (noise_seed, wait_ms) = match variation {
             Variation::Drawn(number) => (
                 seed.wrapping_mul(0x9E37_79B9).wrapping_add(number),
-                Factors::draw_start(&mut plant, number),
+                Factors::draw_start(&mut plant, number)?,
             ),
             _ => (seed, 0),
         };

@@ -49,6 +49,8 @@ pub struct Played {
     pub first: Trace,
     /// The measured moves, in the order of the name's description.
     pub measured: Vec<Trace>,
+    /// Ticks of all moves, also of one between the first and the measured ones, which is not kept.
+    pub ticks: u64,
 }
 
 /// Time for a step \[s\].
@@ -144,7 +146,9 @@ fn play(
             (first, vec![rig.step_with(high_m, &events, STEP_S)?])
         }
     };
+    let ticks = (moves.iter().chain(&measured).map(|m| m.rows.len() as u64)).sum();
     Ok(Played {
+        ticks,
         first: moves.remove(0),
         measured,
     })

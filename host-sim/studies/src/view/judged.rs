@@ -42,6 +42,7 @@ struct ReadSummary {
     scenario: String,
     robot: String,
     seed: String,
+    complete: bool,
     targets: Vec<ReadTarget>,
 }
 
@@ -58,7 +59,7 @@ struct ReadTarget {
 }
 
 impl Judged {
-    /// Of the run of a log; none where no summary of it is beside the log.
+    /// Of the run of a log; none where no summary of it is beside the log, or the run was stopped.
     pub(super) fn beside(log: &Path, content: &Content) -> Option<Self> {
         let file = open_file(&log.with_file_name(SUMMARY)).ok()?;
         let mut text = String::new();
@@ -69,11 +70,11 @@ impl Judged {
             ("robot", &summary.robot),
             ("seed", &summary.seed),
         ];
-        // Another run may have been written to the folder since.
-        if same
+        // Another run may have been written to the folder since. One that was stopped has missed nothing yet.
+        let is_other = same
             .iter()
-            .any(|(kind, own)| content.about(kind) != Some(own))
-        {
+            .any(|(kind, own)| content.about(kind) != Some(own));
+        if is_other || !summary.complete {
             return None;
         }
         let required: Vec<&ReadTarget> = summary.targets.iter().filter(|t| t.required).collect();
