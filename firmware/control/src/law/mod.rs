@@ -38,9 +38,7 @@
 //! 8. F\*: that of 4 or 5. No pulse, where 4 says so, or the state of 6 is PAUSE, CATCH or REST. Otherwise that of the
 //!    position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics` with `switching_curve` in it.
 //! 9. F\*, limited to what the supply can give, becomes two pressures (`allocation`) and these pulses
-//!    (`pulse_planner`). Where it is limited, pulses are planned from the bounds of the pressures instead of the expected
-//!    ones, until it is certain that the force is made: a chamber that counts as vented may be full, and a piston that stands
-//!    would not tell.
+//!    (`pulse_planner`).
 //! 10. The on-times of the next tick are cut out of the plan (`due`).
 //!
 //! Gains and thresholds stand in [`crate::tuning`], all of them, each with its unit, its reason, and file and name of
@@ -318,16 +316,9 @@ impl Predictive {
     /// Pulses that make a force, mN; near the target, of one chamber alone.
     fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
         let possible = allocation::possible_force(model, force);
+        let target = self.swap.targets(model, possible, self.observer.expected());
+        self.plan = pulse_planner::plan(model, &self.observer, target, self.begin, near);
         self.limited = possible != force;
-        let expected = self.observer.expected();
-        let target = self.swap.targets(model, possible, expected);
-        // More than there is: then all of it, also of air that is not known.
-        let made = if self.limited {
-            self.observer.certain(force)
-        } else {
-            expected
-        };
-        self.plan = pulse_planner::plan(model, &self.observer, made, target, self.begin, near);
         self.duty = allocation::duty(model, possible);
     }
 }

@@ -1,14 +1,13 @@
 //! Pulse planner: from the pressure that a chamber lacks to the on-times of the next period.
 //!
 //! ```text
-//! opening = (p* − p made) / ṗ             ṗ = n K p_s ψ(p/p_s) / L to fill, −n K p ψ(p_a/p) / L to vent
+//! opening = (p* − p expected) / ṗ         ṗ = n K p_s ψ(p/p_s) / L to fill, −n K p ψ(p_a/p) / L to vent
 //! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
 //! ```
 //!
-//! p made: the expected pressure; where the force is limited by the supply, the bound that makes the least of it. Times in
-//! s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean of the
-//! pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project, decision
-//! 7; flow by ISO 6358-1.
+//! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean
+//! of the pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project,
+//! decision 7; flow by ISO 6358-1.
 //!
 //! Pulses are timed to the microsecond and may outlast a period: what is left of one is decided again in the next
 //! period, when it may be made longer, but not shorter than the shortest pulse. An opening below the shortest (the
@@ -23,9 +22,8 @@
 //! **Grain.** A chamber has half of a force to make (`allocation`), and is left as it is if half of its shortest
 //! opening would be too much. So the least force that makes a pulse is about that of one shortest opening,
 //! F_1 of `switching_curve`. A smaller one is not stored: the next period asks again, and in a piston that stands the
-//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. There is
-//! no vernier: pulses of A and B whose forces oppose each other come about where both pressures are to rise, or both to
-//! fall, but are not chosen for the small difference of their forces.
+//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. There is no vernier: pulses of A and B whose forces oppose each other come about where both
+//! pressures are to rise, or both to fall, but are not chosen for the small difference of their forces.
 //!
 //! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected
 //! one alone; delays of the valves as specified within their margin; supply and atmosphere as specified. If the supply
@@ -118,18 +116,19 @@ fn opening(power: i32, change: i32, n_per_length: i32) -> i32 {
     size.checked_div(rate).unwrap_or(0)
 }
 
-/// On-times of the next period that bring a chamber of `length` (raw mm) to a pressure that differs by `change`, fill
-/// and vent.
+/// On-times of the next period that bring a chamber of `length` (raw mm) from what is expected to `target`,
+/// fill and vent.
 fn pulses(
     model: &AxisModel,
     chamber: &Chamber,
     [choked_speed, length]: [i32; 2],
-    change: i32,
+    target: i32,
     next: u32,
 ) -> [u16; 2] {
     let times = &model.times;
     let [fill, vent] = ready(chamber, next, times);
     let n_per_length = model.exponent_per_length(length);
+    let change = target.saturating_sub(chamber.expected);
     // Of the pressure between now and the end of the dead time.
     let mean = chamber.pressure.saturating_add(chamber.expected) >> 1;
     if change > 0 {
@@ -145,11 +144,10 @@ fn pulses(
     }
 }
 
-/// On-times of the next period, which begins `next`, that bring chambers from `made` to `target`.
+/// On-times of the next period, which begins `next`, for these pressures.
 pub(super) fn plan(
     model: &AxisModel,
     observer: &Observer,
-    made: Pressures,
     target: Pressures,
     next: u32,
     near: bool,
@@ -160,14 +158,14 @@ pub(super) fn plan(
         model,
         a,
         [model.choked_speed_a, model.length_a(end)],
-        target.a.saturating_sub(made.a),
+        target.a,
         next,
     );
     let [fill_b, vent_b] = pulses(
         model,
         b,
         [model.choked_speed_b, model.length_b(end)],
-        target.b.saturating_sub(made.b),
+        target.b,
         next,
     );
     let idle = |chamber: &Chamber| !chamber.fill.coil() && !chamber.vent.coil();
@@ -239,7 +237,7 @@ mod tests {
         for sign in [-1, 1] {
             let makes_a_pulse = |force: &i32| {
                 let target = targets(&model, sign * force);
-                plan(&model, &observer, observer.expected(), target, 0, true) != [0; 4]
+                plan(&model, &observer, target, 0, true) != [0; 4]
             };
             let least = (0..5_000).find(makes_a_pulse).expect("a pulse");
             let share = f64::from(least) / f64::from(model.pulse_force);

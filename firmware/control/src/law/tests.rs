@@ -76,26 +76,6 @@ fn the_hash_covers_what_is_kept() {
     }
 }
 
-/// Both chambers count as vented and may be full. A piston that does not move for all that is asked for gets all that
-/// there is for certain: the counter chamber is vented until it can hold no more air, the drive chamber filled.
-#[test]
-fn a_piston_that_does_not_move_gets_all_the_force_that_there_is() {
-    let model = model();
-    let near = |value: i32, end: i32| (value - end).abs() < 10_000 << 8;
-    for reference_mm in [20, 160] {
-        let mut law = Predictive::new(&model);
-        let mut limited = false;
-        for _ in 0..6000 {
-            limited |= law.drive(&model, &input(90, reference_mm)).limited;
-        }
-        assert!(limited);
-        let [a, b] = law.observer().bounds();
-        let (drive, counter) = if reference_mm > 90 { (a, b) } else { (b, a) };
-        assert!(near(counter[1], model.low), "{reference_mm}: {counter:?}");
-        assert!(near(drive[0], model.high), "{reference_mm}: {drive:?}");
-    }
-}
-
 /// A reference that moves is followed, not rested at.
 #[test]
 fn a_moving_reference_is_not_rested_at() {

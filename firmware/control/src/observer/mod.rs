@@ -110,25 +110,6 @@ impl Observer {
         }
     }
 
-    /// Pressures within their bounds that make the least of a force along `force`, mN: what is certain of it. What is
-    /// under way is not in the bounds.
-    #[must_use]
-    pub(crate) fn certain(&self, force: i32) -> Pressures {
-        let Pressures { a, b } = self.expected();
-        let [[low_a, high_a], [low_b, high_b]] = self.bounds();
-        if force > 0 {
-            Pressures {
-                a: a.min(low_a),
-                b: b.max(high_b),
-            }
-        } else {
-            Pressures {
-                a: a.max(high_a),
-                b: b.min(low_b),
-            }
-        }
-    }
-
     /// Where the piston is at the end of the dead time at its present speed, raw mm.
     pub(crate) fn end_of_dead_time(&self, model: &AxisModel) -> i32 {
         let ahead = mul_shr(self.motion.speed, model.dead_time, 32);
