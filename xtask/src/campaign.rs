@@ -3,10 +3,11 @@
 mod slurm;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, ensure};
 use serde_json::Value;
 
 use crate::process::{command, empty_folder, figures, output, root, run, step_folder, wheeleg};
@@ -81,36 +82,53 @@ pub(crate) fn steps(report: &mut Report) {
 }
 
 fn ask(shipped: &Shipped, folder: &Path) -> StepResult {
-    let wheeleg = wheeleg();
-    let campaigns = root().join("host-sim/campaigns");
-    let mut plan = fs::read_to_string(campaigns.join(format!("{}.toml", shipped.plan)))
-        .context("the shipped plan")?;
-    for (whole, short) in shipped.cuts {
-        if !plan.contains(whole) {
-            return Err(anyhow!("{} has no `{whole}`", shipped.plan).into());
-        }
-        plan = plan.replace(whole, short);
-    }
-    let short = folder.join(format!("{}.toml", shipped.plan));
-    fs::write(&short, plan)?;
+    let file = folder.join(format!("{}.toml", shipped.plan));
     let parts = folder.join(shipped.plan);
     let table = folder.join(format!("{}.parquet", shipped.plan));
-    run(command(&wheeleg)
-        .args(["campaign", "run"])
-        .arg(&short)
-        .arg("--out")
-        .arg(&parts))?;
-    run(command(&wheeleg)
-        .args(["campaign", "merge"])
-        .arg(&parts)
-        .arg("--out")
-        .arg(&table))?;
+    fs::write(&file, replaced(shipped.plan, shipped.cuts)?)?;
+    run(campaign("run").arg(&file).arg("--out").arg(&parts))?;
+    merged(&parts, &table)?;
     run(command(tools::python()?)
         .arg("tests/python/check_campaign.py")
         .arg(&table)
-        .arg(campaigns.join(format!("{}.sql", shipped.plan)))
+        .arg(shipped_file(&format!("{}.sql", shipped.plan)))
         .arg(shipped.rows.to_string()))?;
     Ok(())
+}
+
+fn shipped_file(name: &str) -> PathBuf {
+    root().join("host-sim/campaigns").join(name)
+}
+
+/// The text of a shipped plan with parts of it replaced.
+fn replaced(plan: &str, parts: &[(&str, &str)]) -> anyhow::Result<String> {
+    let file = shipped_file(&format!("{plan}.toml"));
+    let mut text = fs::read_to_string(file).context("the shipped plan")?;
+    for (shipped, instead) in parts {
+        ensure!(text.contains(shipped), "{plan} has no `{shipped}`");
+        text = text.replace(shipped, instead);
+    }
+    Ok(text)
+}
+
+/// `wheeleg campaign` with one of its commands.
+fn campaign(what: &str) -> Command {
+    let mut command = command(wheeleg());
+    command.args(["campaign", what]);
+    command
+}
+
+/// What a command prints as JSON.
+fn told(command: &mut Command) -> anyhow::Result<Value> {
+    let text = output(command.arg("--json"))?;
+    serde_json::from_str(&text).context("--json: not one JSON value")
+}
+
+/// Merges a folder into a table; its hash.
+fn merged(parts: &Path, table: &Path) -> anyhow::Result<String> {
+    let merged = told(campaign("merge").arg(parts).arg("--out").arg(table))?;
+    let hash = merged["hash"].as_str().context("no hash")?;
+    Ok(hash.to_owned())
 }
 
 /// 200 cases by one thread, two, seven processes, and killed at 20 random times: one hash. Then
@@ -138,26 +156,20 @@ const PAIRS: u32 = 10_000;
 /// The shipped comparison of both laws, with more robots. Its folder is kept: stopped or killed, the same command goes
 /// on, with the same program.
 pub(crate) fn pairs() -> StepResult<String> {
-    let wheeleg = rust::build_wheeleg()?;
+    rust::build_wheeleg()?;
     let folder = step_folder("pairs");
     fs::create_dir_all(&folder).context("the folder of the campaign")?;
-    let shipped = root().join("host-sim/campaigns/three-step-spread.toml");
-    let plan = fs::read_to_string(shipped).context("the shipped plan")?;
-    let plan = plan
-        .replace("samples = 100", &format!("samples = {PAIRS}"))
-        .replace("block = 8", "block = 64");
+    let samples = format!("samples = {PAIRS}");
+    let plan = replaced(
+        "three-step-spread",
+        &[("samples = 100", &samples), ("block = 8", "block = 64")],
+    )?;
     let [file, parts, table] =
         ["pairs.toml", "parts", "pairs.parquet"].map(|name| folder.join(name));
     fs::write(&file, plan).context("the plan")?;
-    let campaign = |words: &[&str]| {
-        let mut command = command(&wheeleg);
-        command.arg("campaign").args(words);
-        command
-    };
-    run(campaign(&["run"]).arg(&file).arg("--out").arg(&parts))?;
-    let merged = output(campaign(&["merge"]).arg(&parts).arg("--out").arg(&table))?;
-    let said = output(campaign(&["report", "--json"]).arg(&table))?;
-    let findings: Value = serde_json::from_str(&said).context("the report")?;
+    run(campaign("run").arg(&file).arg("--out").arg(&parts))?;
+    let hash = merged(&parts, &table)?;
+    let findings = told(campaign("report").arg(&table))?;
     let findings = &findings["findings"];
     let cells = findings["passed"].as_array().into_iter().flatten();
     let rates = cells.map(|cell| {
@@ -173,10 +185,6 @@ pub(crate) fn pairs() -> StepResult<String> {
     });
     let rates: Vec<String> = rates.collect();
     let pair = &findings["paired"][0]["passed"];
-    let hash = merged
-        .lines()
-        .find_map(|line| line.strip_prefix("hash "))
-        .unwrap_or_default();
     Ok(format!(
         "{}; of {} pairs the second alone fails {}, the first alone {}, p = {:.2e}; hash {}",
         rates.join("; "),
@@ -184,7 +192,7 @@ pub(crate) fn pairs() -> StepResult<String> {
         pair["lost"],
         pair["gained"],
         pair["p"].as_f64().unwrap_or(f64::NAN),
-        hash.trim()
+        hash
     ))
 }
 
@@ -205,53 +213,38 @@ pub(crate) fn cylinder_rows() -> StepResult<String> {
             })?,
         Err(_) => ROWS,
     };
-    let wheeleg = rust::build_wheeleg()?;
+    rust::build_wheeleg()?;
     let folder = step_folder("cylinder-rows");
     fs::create_dir_all(&folder).context("the folder of the campaign")?;
-    let shipped = root().join("host-sim/campaigns/cylinder-spread.toml");
-    let plan = fs::read_to_string(shipped).context("the shipped plan")?;
     // Four axes and two controllers to each sample.
     let samples = rows.div_ceil(8);
     let rows = 8 * samples;
-    let plan = plan.replace("samples = 250", &format!("samples = {samples}"));
+    let samples = format!("samples = {samples}");
+    let plan = replaced("cylinder-spread", &[("samples = 250", &samples)])?;
     let name = |what: &str| folder.join(format!("{rows}{what}"));
     let [file, parts, table] = [name(".toml"), name(""), name(".parquet")];
     fs::write(&file, plan).context("the plan")?;
-    let campaign = |words: &[&str]| {
-        let mut command = command(&wheeleg);
-        command.arg("campaign").args(words);
-        command
+    let count = |key: &str| -> anyhow::Result<u64> {
+        let status = told(campaign("status").arg(&parts))?;
+        status[key].as_u64().with_context(|| format!("no {key}"))
     };
-    let timed = |mut command: std::process::Command| -> anyhow::Result<(String, f64)> {
-        let begun = Instant::now();
-        let printed = output(&mut command)?;
-        Ok((printed, begun.elapsed().as_secs_f64()))
-    };
-    let mut command = campaign(&["run"]);
-    command.arg(&file).arg("--out").arg(&parts);
-    let (ran, run_s) = timed(command)?;
-    let mut command = campaign(&["merge"]);
-    command.arg(&parts).arg("--out").arg(&table);
-    let (merged, merge_s) = timed(command)?;
-    let mut command = campaign(&["report"]);
-    command.arg(&table);
-    let (_, report_s) = timed(command)?;
-    let line = |text: &str, word: &str| -> String {
-        let found = text.lines().find_map(|line| line.strip_prefix(word));
-        found.unwrap_or_default().trim().to_owned()
-    };
-    // What was there before was not computed now.
-    let found = ran.lines().next().and_then(|line| {
-        let words = line.strip_suffix(" of them found")?;
-        words.rsplit(' ').next()?.parse::<u64>().ok()
-    });
-    let computed = rows - found.unwrap_or(0);
+    // What was there before is not computed now.
+    let before = if parts.exists() { count("rows")? } else { 0 };
+    let begun = Instant::now();
+    run(campaign("run").arg(&file).arg("--out").arg(&parts))?;
+    let run_s = begun.elapsed().as_secs_f64();
+    let begun = Instant::now();
+    let hash = merged(&parts, &table)?;
+    let merge_s = begun.elapsed().as_secs_f64();
+    let begun = Instant::now();
+    run(campaign("report").arg(&table))?;
+    let report_s = begun.elapsed().as_secs_f64();
+    let computed = rows - before;
     Ok(format!(
         "{rows} rows of cylinders, {computed} computed now in {run_s:.0} s: {:.1} a second; failed {}; merged in \
-         {merge_s:.1} s, told in {report_s:.1} s; hash {}",
+         {merge_s:.1} s, told in {report_s:.1} s; hash {hash}",
         computed as f64 / run_s,
-        line(&ran, "failed "),
-        line(&merged, "hash ")
+        count("failed")?,
     ))
 }
 

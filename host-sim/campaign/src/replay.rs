@@ -14,7 +14,7 @@ use crate::cases::{Cases, Setup};
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
-use crate::simulate::{on_bench, simulate};
+use crate::simulate::simulate;
 use crate::store::{PlanFile, Store};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
@@ -35,7 +35,7 @@ pub struct Replayed {
 /// What a replay has written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Files {
-    /// Hash of the log, or of the recorded moves; none of a run that was stopped or failed.
+    /// Hash of the log; none of a run that was stopped or failed, and on the bench.
     pub hash: Option<String>,
 }
 
@@ -141,8 +141,8 @@ fn play_again(
     seed: u64,
     settings: &Settings,
 ) -> Result<Option<Finished<Files>>, CampaignError> {
-    let (_, played) = on_bench(bench, seed);
-    let Some(played) = played else {
+    // Why not stands in the row.
+    let Ok(played) = bench::play(bench, seed) else {
         return Ok(None);
     };
     let written = bench::write(bench, seed, &played, settings)?;

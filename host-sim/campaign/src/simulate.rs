@@ -8,7 +8,7 @@ use wheeleg_scene::Scene;
 use wheeleg_sim::Boards;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::Target;
-use wheeleg_studies::bench::{self, PlayedBench};
+use wheeleg_studies::bench::{self, BenchSummary, PlayedBench};
 use wheeleg_studies::run::{self, Simulated};
 use wheeleg_studies::study::Stop;
 use wheeleg_telemetry::{Keep, LogFile, Recorder};
@@ -56,36 +56,34 @@ pub fn simulate(case: &Case, limit_s: Option<f64>, stop: &Stop) -> Option<Outcom
     recorded(case, Recorder::new(Keep::nothing()), limit_s, stop)
 }
 
-/// Plays a case on the bench; without a recording it has an error.
-pub(crate) fn on_bench(bench: &Bench, seed: u64) -> (Outcome, Option<PlayedBench>) {
+/// Plays a case on the bench.
+fn on_bench(bench: &Bench, seed: u64) -> Outcome {
     let played = match bench::play(bench, seed) {
         Ok(played) => played,
-        Err(error) => return (Outcome::without(Status::Error, error.to_string()), None),
+        Err(error) => return Outcome::without(Status::Error, error.to_string()),
     };
-    let targets = bench::targets(bench, &played);
-    let faults = played.traces().map(|(_, trace)| trace.faults);
-    let faults = faults.reduce(|all, other| all.union(other));
-    let faults: Vec<&str> = faults
-        .iter()
-        .flat_map(|all| all.iter())
-        .map(|fault| fault.name())
-        .collect();
-    let outcome = Outcome {
+    let BenchSummary {
+        faults,
+        simulated_s,
+        passed,
+        targets,
+        ..
+    } = BenchSummary::of(bench, seed, &played);
+    Outcome {
         status: Status::Ok,
         error: (!faults.is_empty()).then(|| format!("fault {}", faults.join(", "))),
         log_hash: Some(hash(&played)),
-        simulated_s: Some(played.simulated_s),
-        passed: Some(targets.iter().all(|target| target.pass || !target.required)),
+        simulated_s: Some(simulated_s),
+        passed: Some(passed),
         targets,
-    };
-    (outcome, Some(played))
+    }
 }
 
 /// Hash of all that was recorded.
 fn hash(played: &PlayedBench) -> String {
     let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign bench v1");
     let mut bytes = Vec::new();
-    for (name, trace) in played.traces() {
+    for (name, trace) in played.played.traces() {
         hasher.update(name.as_bytes());
         for row in &trace.rows {
             bytes.clear();
@@ -149,7 +147,7 @@ fn recorded(
 ) -> Option<Outcome> {
     let (scenario, robot) = match &case.setup {
         Ok(Setup::Robot(both)) => (&both.0, &both.1),
-        Ok(Setup::Bench(bench)) => return Some(on_bench(bench, case.seed).0),
+        Ok(Setup::Bench(bench)) => return Some(on_bench(bench, case.seed)),
         Err(why) => return Some(Outcome::without(Status::Error, why.clone())),
     };
     let mut over = false;

@@ -1,7 +1,7 @@
 //! One factor of a plan: its target, and its values.
 
 use super::base::Setting;
-use super::distribution::{self, Distribution};
+use super::distribution::{self, Choice, Distribution};
 use super::value::{Value, list};
 use crate::reader::{Entry, NAME_LENGTH, Reader};
 
@@ -105,25 +105,24 @@ impl Factor {
     /// Whether all of its values are numbers.
     #[must_use]
     pub fn is_number(&self) -> bool {
-        match &self.values {
-            Values::Grid(list) => list.iter().all(|v| matches!(v, Value::Number(_))),
-            Values::Drawn(Distribution::Choice(list)) => {
-                (list.iter()).all(|c| matches!(c.value, Value::Number(_)))
-            }
-            Values::Drawn(_) => true,
-        }
+        self.listed().all(|value| matches!(value, Value::Number(_)))
     }
 
     /// Whether its values are names.
     #[must_use]
     pub fn is_text(&self) -> bool {
-        match &self.values {
-            Values::Grid(list) => list.iter().any(|v| matches!(v, Value::Text(_))),
-            Values::Drawn(Distribution::Choice(list)) => {
-                list.iter().any(|c| matches!(c.value, Value::Text(_)))
-            }
-            Values::Drawn(_) => false,
-        }
+        self.listed().any(|value| matches!(value, Value::Text(_)))
+    }
+
+    /// The values that the plan lists; none of a distribution of numbers.
+    fn listed(&self) -> impl Iterator<Item = &Value> {
+        let (grid, choices): (&[Value], &[Choice]) = match &self.values {
+            Values::Grid(list) => (list, &[]),
+            Values::Drawn(Distribution::Choice(list)) => (&[], list),
+            Values::Drawn(_) => (&[], &[]),
+        };
+        grid.iter()
+            .chain(choices.iter().map(|choice| &choice.value))
     }
 }
 

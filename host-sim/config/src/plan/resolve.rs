@@ -232,25 +232,10 @@ impl<'a> Resolver<'a> {
         ensure_load_share(load_share).map_err(|told| not_possible("load_share", told))?;
         let bench = Bench {
             axis: sheet.name.clone(),
-            motion: named(
-                chosen(Setting::Move),
-                Setting::Move,
-                base.motion,
-                Move::of_name,
-            )?,
-            controller: named(
-                chosen(Setting::Controller),
-                Setting::Controller,
-                base.controller,
-                Kind::of_name,
-            )?,
-            delays: named(
-                chosen(Setting::Delays),
-                Setting::Delays,
-                base.delays,
-                StartUp::of_name,
-            )?,
-            air: named(chosen(Setting::Air), Setting::Air, base.air, Air::of_name)?,
+            motion: named(factors, Setting::Move, base.motion, Move::of_name)?,
+            controller: named(factors, Setting::Controller, base.controller, Kind::of_name)?,
+            delays: named(factors, Setting::Delays, base.delays, StartUp::of_name)?,
+            air: named(factors, Setting::Air, base.air, Air::of_name)?,
             sheet: sheet.axis,
             plant: plant.axis,
             load_share,
@@ -333,12 +318,12 @@ fn change(
 
 /// The setting of a name; without one, that of the base.
 fn named<T>(
-    value: Option<&Value>,
+    factors: &[(&Factor, &Value)],
     setting: Setting,
     base: T,
     of_name: fn(&str) -> Option<T>,
 ) -> Result<T, ConfigError> {
-    let Some(value) = value else {
+    let Some(value) = chosen(factors, setting) else {
         return Ok(base);
     };
     of_name(&value.to_string()).ok_or_else(|| {

@@ -10,6 +10,9 @@ const ANR_DENSITY_KG_M3: f64 = 1.185;
 /// Width of the band that counts as settled \[m\].
 pub const SETTLED_BAND_M: f64 = 1e-3;
 
+/// Reversals in the last second from which on the end is a limit cycle.
+pub const LIMIT_CYCLE: u32 = 3;
+
 /// Figures of one move. True positions, not measured ones. Times count from the
 /// start of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -120,7 +123,7 @@ impl Metrics {
     /// Whether the end of the recording is a limit cycle.
     #[must_use]
     pub fn limit_cycle(&self) -> bool {
-        self.reversals >= 3
+        self.reversals >= LIMIT_CYCLE
     }
 }
 

@@ -47,7 +47,7 @@ pub mod valve_resolution;
 pub use design::{axis_data, design};
 pub use firmware::{Design, Firmware, Supervision, TICK};
 pub use identify::{Delays, Probe, design_with, identify};
-pub use metrics::{Metrics, SETTLED_BAND_M};
+pub use metrics::{LIMIT_CYCLE, Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
 pub use node::Node;
 pub use run::{Action, AxisSim, Board, REFERENCES_M, Row, SPEEDS_M_S, Sample, Trace};

@@ -44,7 +44,7 @@ impl BenchSummary {
     #[must_use]
     pub fn of(bench: &Bench, seed: u64, case: &PlayedBench) -> Self {
         let targets = targets(bench, case);
-        let traces = case.traces();
+        let traces = case.played.traces();
         let faults = traces
             .map(|(_, trace)| trace.faults)
             .reduce(|all, other| all.union(other));
@@ -120,7 +120,7 @@ pub fn write(
     Ok(job.finish(summary, text, None, |job, summary| {
         job.keep(job.subfolder(CSV));
         let mut figures: Vec<Figure> = Vec::new();
-        for (name, trace) in case.traces() {
+        for (name, trace) in case.played.traces() {
             job.keep(job.save(&format!("{CSV}/{name}.csv"), &trace_csv(trace)));
             figures.push(trace_figure(&name, title(&name), trace));
         }

@@ -10,7 +10,6 @@ use wheeleg_config::bench::{Air, Bench};
 pub use files::{BenchSummary, write};
 pub use targets::{targets, unmeasured};
 
-use crate::axis_sim::Trace;
 use crate::axis_sim::suite::{AxisSimError, Factors, designed, force_left_n};
 use crate::compare::{Played, play_from_power_up};
 
@@ -27,15 +26,6 @@ pub struct PlayedBench {
 
 /// Margin of a cylinder without a load.
 pub const NO_LOAD: f64 = 1e3;
-
-impl PlayedBench {
-    /// Its recordings with their names: the first move, then the measured ones.
-    pub fn traces(&self) -> impl Iterator<Item = (String, &Trace)> {
-        let measured = self.played.measured.iter().enumerate();
-        let measured = measured.map(|(k, trace)| (format!("measured-{}", k + 1), trace));
-        std::iter::once(("first".to_owned(), &self.played.first)).chain(measured)
-    }
-}
 
 /// Plays a case. The seed makes the noise of the converter, and the air where that is unknown.
 ///

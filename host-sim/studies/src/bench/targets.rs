@@ -4,11 +4,8 @@ use wheeleg_config::bench::{Bench, Move};
 
 use super::PlayedBench;
 use crate::analysis::Target;
-use crate::axis_sim::ValveResolution;
+use crate::axis_sim::{LIMIT_CYCLE, ValveResolution};
 use crate::compare::{ERROR_MM, Figures, OVERSHOOT_MM};
-
-/// Reversals in the last second from which on the end is a limit cycle.
-const CYCLE: f64 = 3.0;
 
 /// A quantity of a case: name, meaning, unit, limits if it is required, and its value.
 struct Quantity {
@@ -41,7 +38,7 @@ const QUANTITIES: [Quantity; 15] = [
         id: "reversals",
         meaning: "turns of more than 0.2 mm in the last second (3 are a limit cycle)",
         unit: "1",
-        limits: Some([NONE, CYCLE - 1.0]),
+        limits: Some([NONE, (LIMIT_CYCLE - 1) as f64]),
         value: |f| f.reversals.map(f64::from),
     },
     Quantity {

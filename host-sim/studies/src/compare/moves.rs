@@ -53,6 +53,15 @@ pub struct Played {
     pub ticks: u64,
 }
 
+impl Played {
+    /// Its recordings with their names: the first move, then the measured ones.
+    pub fn traces(&self) -> impl Iterator<Item = (String, &Trace)> {
+        let measured = self.measured.iter().enumerate();
+        let measured = measured.map(|(k, trace)| (format!("measured-{}", k + 1), trace));
+        std::iter::once(("first".to_owned(), &self.first)).chain(measured)
+    }
+}
+
 /// Time for a step \[s\].
 pub const STEP_S: f64 = 2.5;
 /// Time at rest during which switches are counted \[s\].

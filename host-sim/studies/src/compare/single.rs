@@ -77,11 +77,8 @@ impl Single {
             return Ok(job.end(Vec::new(), summary, None));
         };
         job.keep(job.subfolder(CSV));
-        let first = std::iter::once(("first".to_owned(), &played.first));
-        let measured = played.measured.iter().enumerate();
-        let all = first.chain(measured.map(|(k, t)| (format!("measured-{}", k + 1), t)));
         let mut figures = Vec::new();
-        for (name, trace) in all {
+        for (name, trace) in played.traces() {
             job.keep(job.save(&format!("{CSV}/{name}.csv"), &trace_csv(trace)));
             figures.push(trace_figure(&name, &self.row.case.id, trace));
         }
