@@ -16,6 +16,10 @@ use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, VelocityMmS};
 
 use super::firmware::{Design, Supervision};
 
+/// Widest band of rest \[mm\]: to that the predictive law's own patience widens a band, and below the error at rest
+/// of 0.5 mm that a comparison allows.
+const WIDEST_BAND_MM: f64 = 0.4;
+
 /// The designer's knowledge of an axis: its data sheet. The designer does not know the load, nor deviations
 /// from the data sheet.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +74,8 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
     let gain = |parameter: JointParam| Gain::saturating_from_num(of(parameter));
     let c = &axis.cylinder;
     // Also no less than an eighth of the smallest pulse's effect: below it, rest is luck.
-    let band_mm = of(JointParam::RestBand).max(0.13e3 * free_step_m(axis));
+    let eighth_mm = (0.13e3 * free_step_m(axis)).min(WIDEST_BAND_MM);
+    let band_mm = of(JointParam::RestBand).max(eighth_mm);
     AxisData {
         bore: fixed(JointParam::Bore),
         rod: fixed(JointParam::Rod),
@@ -243,6 +248,25 @@ mod tests {
     use super::*;
     use crate::axis_sim::{Delays, Node, design_with};
     use wheeleg_config::AxisConfig;
+
+    /// Wider valves widen the band of rest, but not beyond what counts as rest.
+    #[test]
+    fn coarse_valves_widen_the_band_of_rest_to_a_limit() {
+        let mut sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
+        let fine_mm = axis_data(&sheet).band.to_f64();
+        let mut band_mm = |times: f64| {
+            for valve in [
+                &mut sheet.cylinder.fill_valve,
+                &mut sheet.cylinder.vent_valve,
+            ] {
+                valve.flow.conductance_m3_s_pa *= times;
+            }
+            axis_data(&sheet).band.to_f64()
+        };
+        let (wider_mm, widest_mm) = (band_mm(4.0), band_mm(10.0));
+        assert!(wider_mm > 1.2 * fine_mm, "{fine_mm} {wider_mm}");
+        assert!((widest_mm - WIDEST_BAND_MM).abs() < 1e-3, "{widest_mm}");
+    }
 
     /// Valves of a few milliseconds and of forty: a board accepts every controller's design, with the delays
     /// of the sheet and with twice those delays.
