@@ -10,7 +10,7 @@ use super::base::{AxisBase, Base, Setting, ensure_load_share};
 use super::factor::{Factor, Part, Sets};
 use super::field::{Template, set};
 use super::value::Value;
-use crate::bench::{Air, Bench, Kind, Move, StartUp};
+use crate::bench::{Air, Bench, Deviation, Kind, Move, StartUp};
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
@@ -262,6 +262,7 @@ impl<'a> Resolver<'a> {
             air: named(factors, Setting::Air, base.air, Air::of_name)?,
             sheet: sheet.axis,
             plant: plant.axis,
+            deviations: Deviation::all(&sheet.parameters, &plant.parameters),
             load_share,
         };
         Ok(OnBench {
