@@ -417,7 +417,7 @@ def events_alone(page):
         const view = eventsView();
         view.root.id = "alone";
         document.body.append(view.root);
-        const event = (number, text, rest) => ({ number, t_ns: 1e9 + number, kind: "fault", code: "diagnosis", detail: "", board: 0, fault: 3, command: 0, text, ...rest });
+        const event = (number, text, rest) => ({ number, t_ns: 1e9 + number, kind: "fault", code: "diagnosis", detail: "", board: 0, fault: 3, command: 0, minor: false, text, ...rest });
         const says = (number, board, s) => event(number, `joint ${board} says why: first fault, ${s} s ago: it is hot`, { board });
         view.add(event(3, "third"));
         // Its answer was quicker than the line, on which the fourth comes after it.
@@ -428,9 +428,9 @@ def events_alone(page):
         view.add(says(7, 3, 0.25));
         view.add(event(8, "hold", { code: "hold", holder: "tablet", revoked_by: "owner" }));
         view.add(event(9, "wheel 7: faults cleared", { code: "faults_cleared", board: 7, fault: 0 }));
-        view.add(event(10, "left foot leaves the ground", { kind: "contact", code: "lift_off", fault: 0 }));
+        view.add(event(10, "left foot leaves the ground", { kind: "contact", code: "lift_off", fault: 0, minor: true }));
         for (const [number, board, s] of [[11, 1, 0.004], [12, 2, 0.017]]) view.add({ ...says(number, board, s), fault: 39 });
-        view.add(event(14, "no foot carries: the wheels slow down", { kind: "info", code: "tip_guard", fault: 0 }));
+        view.add(event(14, "no foot carries: the wheels slow down", { kind: "info", code: "tip_guard", fault: 0, minor: true }));
         view.add(event(15, "stop", { code: "hold", stopped: { via: "console", name: "ctl", session: "0", role: "control", at_us: 1 } }));
         return [...view.root.querySelectorAll("li")].map((line) => `${line.textContent.slice(4)}${line.hidden ? " (hidden)" : ""}${line.className === "bad" ? "" : " (plain)"}`).reverse();
     }""")

@@ -2,6 +2,9 @@
 
 use wheeleg_plant::axis::AxisParams;
 
+use crate::params::ParameterInfo;
+use crate::plan::factor_between;
+
 /// Names of an enum without values, each with its meaning.
 macro_rules! named {
     ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $name:ident = $key:literal,)* }) => {
@@ -103,6 +106,50 @@ named! {
 /// Allowed force on the rod, as a share of the force left at the supply on the weaker side.
 pub const LOAD_SHARES: [f64; 2] = [-0.95, 0.95];
 
+/// A number of the plant that is not what the data sheet states.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, schemars::JsonSchema)]
+pub struct Deviation {
+    /// Path in the axis file; of a list, with the place of the element.
+    pub name: String,
+    /// Unit of both values, that of the data sheet.
+    pub unit: String,
+    /// What the data sheet states.
+    pub sheet: f64,
+    /// What the plant has.
+    pub plant: f64,
+    /// The plant's over that of the sheet; none where the sheet states 0.
+    pub ratio: Option<f64>,
+}
+
+impl Deviation {
+    /// All of a plant, in the order of the axis file.
+    pub(crate) fn all(sheet: &[ParameterInfo], plant: &[ParameterInfo]) -> Vec<Self> {
+        let pairs = sheet.iter().filter_map(|info| {
+            let own = plant.iter().find(|own| own.path == info.path)?;
+            Some((info, own))
+        });
+        let of = |(info, own): (&ParameterInfo, &ParameterInfo)| -> Vec<Self> {
+            let to_sheet = factor_between(info, &own.unit);
+            let values = info.value.iter().zip(&own.value).enumerate();
+            let other = values.filter(|(_, (sheet, plant))| **sheet != **plant * to_sheet);
+            let many = info.value.len() > 1;
+            other
+                .map(|(place, (sheet, plant))| Self {
+                    name: match many {
+                        true => format!("{}[{place}]", info.path),
+                        false => info.path.clone(),
+                    },
+                    unit: info.unit.clone(),
+                    sheet: *sheet,
+                    plant: plant * to_sheet,
+                    ratio: (*sheet != 0.0).then(|| plant * to_sheet / sheet),
+                })
+                .collect()
+        };
+        pairs.flat_map(of).collect()
+    }
+}
+
 /// A cylinder on the bench: the data that its board is told, what it is in truth, and what is played.
 #[derive(Debug, Clone)]
 pub struct Bench {
@@ -112,6 +159,8 @@ pub struct Bench {
     pub sheet: AxisParams,
     /// The plant.
     pub plant: AxisParams,
+    /// Where the plant is not as the data sheet says.
+    pub deviations: Vec<Deviation>,
     /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
     pub load_share: f64,
     /// The move.

@@ -168,3 +168,35 @@ fn mistakes_are_told() {
         );
     }
 }
+
+/// A factor of the plant scales what the data sheet of a case states: its axis file's, or what another factor makes
+/// of it.
+#[test]
+fn a_scaled_plant_stays_in_the_range_of_every_data_sheet() {
+    let scaled = |most: f64, others: &str| {
+        format!(
+            "[factor.x]\nparameter = \"plant.moving.mass\"\nscale = true\ngrid = [1.0, {most:?}]\n{others}"
+        )
+    };
+    let sheet = |grid: &str| {
+        format!("[factor.sheet]\nparameter = \"axis.moving.mass\"\n{grid}\nunit = \"kg\"\n")
+    };
+    let axes = |grid: &str| format!("[factor.axis]\nparameter = \"axis\"\ngrid = [{grid}]\n");
+    let on =
+        |axis: &str, factors: &str| plan(&format!("{HEAD}[base]\naxis = \"{axis}\"\n{factors}"));
+    // Allowed are 0.02 to 200 kg. The file's 1.5 kg may be multiplied by 5, 50 kg may not.
+    let both = scaled(5.0, &sheet("grid = [1.5, 50.0]"));
+    let told = on("bench-vq110u", &both).expect_err("too heavy");
+    let wanted = "`factor.x`: 5 times 50 of `factor.sheet` is 250 kg: allowed 0.02 to 200 kg";
+    assert!(told.len() == 1 && told[0].contains(wanted), "{told:#?}");
+    // The file's 12 kg may not be multiplied by 20, and no case has them.
+    let lighter = scaled(20.0, &sheet("grid = [1.5, 2.0]"));
+    on("heavy-40x250", &lighter).expect("40 kg at most");
+    // Every axis that a case can have is asked, and no other.
+    let two = scaled(20.0, &axes("\"bench-vq110u\", \"heavy-40x250\""));
+    let told = on("bench-vq110u", &two).expect_err("too heavy");
+    let wanted = "`factor.x`: 20 times 12 of axes/heavy-40x250.toml is 240 kg";
+    assert!(told.len() == 1 && told[0].contains(wanted), "{told:#?}");
+    let light = scaled(20.0, &axes("\"bench-vq110u\", \"small-12x50\""));
+    on("heavy-40x250", &light).expect("no case has the axis of the base");
+}

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use wheeleg_master::dispatcher::Reject;
 use wheeleg_telemetry::EventSample;
 use wheeleg_telemetry::event::reject_name;
-use wheeleg_telemetry::messages::reject;
+use wheeleg_telemetry::messages::{self, reject};
 
 use crate::live::Answer;
 use wheeleg_access::reason::Reason;
@@ -21,6 +21,7 @@ pub(crate) fn event_json(number: u64, t_ns: u64, event: &EventSample) -> Value {
         "board": event.board,
         "fault": event.fault,
         "command": event.command,
+        "minor": event.kind.is_detail() || event.code.is_detail(),
         "text": event.text,
     })
 }
@@ -34,11 +35,13 @@ pub(crate) fn refused(n: u64, reason: Reason, text: &str) -> Value {
 }
 
 pub(crate) fn outcome(n: u64, time_us: u64, answer: &Answer) -> Value {
-    let rejected = |why: &Reject| refused(n, Reason::Master(reject_name(why)), &reject(why));
     match answer {
         Answer::Accepted | Answer::Done => done(n, time_us),
-        Answer::Rejected(why) => rejected(why),
-        Answer::Refused(why) => rejected(&Reject::Refused(*why)),
+        Answer::Rejected(why) => refused(n, Reason::Master(reject_name(why)), &reject(why)),
+        Answer::Refused(code, why) => {
+            let reason = Reason::Master(reject_name(&Reject::Refused(*why)));
+            refused(n, reason, &messages::refused(*code, why))
+        }
         Answer::Paused => refused(
             n,
             Reason::Paused,

@@ -11,13 +11,8 @@ const KEPT = 500;
 const ALIKE_NS = 50e6;
 /** Lines among which such a one is looked for. */
 const RECENT = 32;
-/** What the boards write for whoever looks for a cause in them: many lines, a detail that is left out at first. */
-const LOG = "log";
+/** Minor events, which are many, are left out at first. */
 const BUT_DETAILS = "but details";
-/** A foot touches the ground and leaves it, a dozen times in a step: left out at first, too. */
-const CONTACT = "contact";
-/** What a walk does about the ground, many times in it: left out at first, too. What stands in its way is not. */
-const OF_A_WALK = new Set(["tip_guard", "early_ground", "late_ground", "lost_ground", "slip", "load_share", "governor"]);
 /** What is said behind the name of one board, and behind those of several, by code. @type {Object<string, [string, string]>} */
 const SEVERAL = { board_back: [" answers", " answer"], board_lost: [" is lost", " are lost"], diagnosis: [" says why", " say why"], log: [" logs", " log"], link: [" has heard", " have heard"] };
 /** A board's own account of a stop tells no more than the stop itself. */
@@ -31,7 +26,7 @@ function cell(value) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, text: string, holder?: string, revoked_by?: string, gone?: boolean, stopped?: import("./words.js").Stopped | null}} RobotEvent */
+/** @typedef {{number: number, t_ns: number, kind: string, code: string, detail: string, board: number, fault: number, command: number, minor: boolean, text: string, holder?: string, revoked_by?: string, gone?: boolean, stopped?: import("./words.js").Stopped | null}} RobotEvent */
 /** @typedef {{events: RobotEvent[], boards: number[], before: string, after: string, root: HTMLElement, what: HTMLElement}} Line */
 
 /** List, sieve and table. @param {() => string} [own] session of this page */
@@ -57,11 +52,10 @@ export function eventsView(own = () => "") {
     return `${before}${listed(boards)}${verb}`;
   }
   function fits(line) {
-    const { kind, code } = line.events[0];
-    const detail = kind === LOG || kind === CONTACT || OF_A_WALK.has(code);
+    const { kind, minor } = line.events[0];
     const wanted = words.value.trim().toLowerCase();
     const of = board.value === "" || (board.value === "0" ? line.events[0].board === 0 : line.events.some((event) => event.board === Number(board.value)));
-    const asked = kinds.value === "" || (kinds.value === BUT_DETAILS ? !detail : kind === kinds.value);
+    const asked = kinds.value === "" || (kinds.value === BUT_DETAILS ? !minor : kind === kinds.value);
     return of && asked && line.what.textContent.toLowerCase().includes(wanted);
   }
   function sieve() {

@@ -46,8 +46,6 @@ const ended = (sentence) => (/[.!?]$/.test(sentence) ? sentence : `${sentence}.`
 /** @param {string} command @param {import("./link.js").Answer} answer @param {Around} around */
 export function refusal(command, { reason, text }, around) {
   const own = reason && Object.hasOwn(WORDS, reason) ? WORDS[reason](around) : text || reason || "";
-  // A board keeps a fault whose cause is there; all others were cleared, and disarmed.
-  if (command !== "ClearFault" || !(reason?.startsWith("board_") || reason === "no_answer")) return own;
-  const end = around.injected.length > 0 ? ` Injected: ${around.injected.join(", ")}. Press End, then Clear fault.` : "";
-  return `${ended(own)} The other boards no longer hold, and are disarmed.${end}`;
+  if (command !== "ClearFault" || around.injected.length === 0) return own;
+  return `${ended(own)} Injected: ${around.injected.join(", ")}. Press End, then Clear fault.`;
 }

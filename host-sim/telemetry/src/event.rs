@@ -17,6 +17,7 @@ use crate::samples::EventSample;
 pub use code::{EventCode, EventKind};
 pub use holds::{HoldWords, hold_words, hold_words_of, holds};
 pub(crate) use names::parameter_name;
+pub(crate) use names::refusing_board;
 pub use names::{finding_of_name, hold_name, reject_name};
 use names::{master_board, master_code, master_detail, master_kind, side_name, snake_case};
 

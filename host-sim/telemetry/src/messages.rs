@@ -19,7 +19,7 @@ use crate::event::{
     Act, Answer, BadRequest, BoardChange, Cause, Event, ServiceOutcome, hold_words, parameter_name,
 };
 use refusal::refusal;
-pub use refusal::reject;
+pub use refusal::{refused, reject};
 
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -239,25 +239,34 @@ fn draws_follow_their_distribution() {
 /// the middle of the other, but the friction at rest is below that of sliding in one of eight.
 #[test]
 fn a_case_that_cannot_be_says_why() {
-    let plan = plan_of(&format!(
-        "samples = 32\n{HEAD}{BASE}[factor.a]\nparameter = \"robot.friction.coulomb\"\n\
-         uniform = {{ min = 4.0, max = 5.0, unit = \"N\" }}\n\
-         [factor.b]\nparameter = \"robot.friction.static\"\n\
-         uniform = {{ min = 4.5, max = 5.5, unit = \"N\" }}\n"
-    ));
-    let cases = Cases::new(&plan).expect("a plan");
-    cases.ensure_possible().expect("some can be");
-    let mut wrong = 0;
-    for index in 0..32 {
-        let case = cases.case(index);
-        let fits = number(&case, 0) <= number(&case, 1);
-        assert_eq!(case.setup.is_ok(), fits, "{:?}", case.values);
-        if let Err(why) = case.setup {
-            assert!(why.contains("friction.static"), "{why}");
-            wrong += 1;
+    let cylinder = "[base]\naxis = \"bench-vq110u\"\n";
+    for (base, part, sliding_n) in [(BASE, "robot", 4.0), (cylinder, "plant", 12.0)] {
+        let factor = |name: &str, from_n: f64| {
+            format!(
+                "[factor.{name}]\nparameter = \"{part}.friction.{name}\"\n\
+                 uniform = {{ min = {from_n:?}, max = {:?}, unit = \"N\" }}\n",
+                from_n + 1.0
+            )
+        };
+        let plan = plan_of(&format!(
+            "samples = 32\n{HEAD}{base}{}{}",
+            factor("coulomb", sliding_n),
+            factor("static", sliding_n + 0.5)
+        ));
+        let cases = Cases::new(&plan).expect("a plan");
+        cases.ensure_possible().expect("some can be");
+        let mut wrong = 0;
+        for index in 0..32 {
+            let case = cases.case(index);
+            let fits = number(&case, 0) <= number(&case, 1);
+            assert_eq!(case.setup.is_ok(), fits, "{:?}", case.values);
+            if let Err(why) = case.setup {
+                assert!(why.contains("friction.static"), "{why}");
+                wrong += 1;
+            }
         }
+        assert!(wrong > 0, "{part}");
     }
-    assert!(wrong > 0);
 }
 
 /// What could be written and never read is refused with the plan: its columns and its names.

@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::base::Base;
 use super::distribution::Distribution;
 use super::factor::{Factor, Field, Part, Sets, Values};
-use super::field::{Template, factor_between};
+use super::field::{Template, factor_between, written};
 use super::resolve::Resolver;
 use super::value::Value;
 use super::{Plan, distribution};
@@ -33,7 +33,7 @@ pub(super) fn check(r: &mut Reader, plan: &Plan) -> Result<(), ConfigError> {
             continue;
         };
         for field in fields {
-            field_in_all(r, factor, field, resolver.files_of(field.part));
+            field_in_all(r, plan, factor, field, resolver.files_of(field.part));
         }
     }
     if r.is_clean() {
@@ -143,13 +143,14 @@ fn twice<'a>(r: &mut Reader, factor: &'a Factor, earlier: &mut BTreeMap<String, 
 /// others.
 fn field_in_all<'a>(
     r: &mut Reader,
+    plan: &Plan,
     factor: &Factor,
     path: &Field,
     mut bases: impl Iterator<Item = &'a Template>,
 ) {
     let before = r.problem_count();
     while let Some(base) = bases.next().filter(|_| r.problem_count() == before) {
-        field(r, factor, path, base);
+        field(r, plan, factor, path, base);
     }
 }
 
@@ -191,7 +192,7 @@ const WITHOUT_EFFECT: [(&str, &str); 8] = [
 ];
 
 /// One field that a factor sets, in one file.
-fn field(r: &mut Reader, factor: &Factor, field: &Field, base: &Template) {
+fn field(r: &mut Reader, plan: &Plan, factor: &Factor, field: &Field, base: &Template) {
     let (full, path) = (field.to_string(), field.path.as_str());
     let named = format!("`factor.{}.parameter` = \"{full}\"", factor.name);
     let at_path = span_of_path(r, factor, &full);
@@ -240,11 +241,14 @@ fn field(r: &mut Reader, factor: &Factor, field: &Field, base: &Template) {
         return;
     }
     let span = span_of(r, factor);
-    let mut scaled = info.value.iter().enumerate();
-    if factor.scale && scaled.all(|(i, v)| component.is_some_and(|c| c != i) || *v == 0.0) {
+    let scaled = scaled(plan, field, (info, component), base);
+    if factor.scale
+        && let Some(Scaled { origin, .. }) = scaled.first()
+        && scaled.iter().all(|scaled| scaled.value == 0.0)
+    {
         let message = format!(
-            "`factor.{}`: `{path}` is 0 in {}, and every multiple of it: its cases would be the same",
-            factor.name, base.file
+            "`factor.{}`: `{path}` is 0 in {origin}, and every multiple of it: its cases would be the same",
+            factor.name
         );
         let help = format!("set `{path}` instead: leave `scale` out, and give values with a unit");
         r.problem(span, message, "changes nothing", Some(help));
@@ -253,7 +257,58 @@ fn field(r: &mut Reader, factor: &Factor, field: &Field, base: &Template) {
     if !unit_fits(r, factor, info, span.clone()) {
         return;
     }
-    range(r, factor, (info, component), &full, span);
+    let scaled = if factor.scale { Some(&*scaled) } else { None };
+    range(r, factor, info, scaled, &full, span);
+}
+
+/// A number that a factor scales.
+struct Scaled {
+    /// It, in the unit of the file.
+    value: f64,
+    /// Who states it.
+    origin: String,
+}
+
+/// The numbers that a factor of this field would scale: those of the file, or of a plant, those that the data
+/// sheet of a case can state.
+fn scaled(
+    plan: &Plan,
+    field: &Field,
+    (info, component): (&ParameterInfo, Option<usize>),
+    base: &Template,
+) -> Vec<Scaled> {
+    let on_sheet = |place: usize| {
+        let (whole, one) = (info.path.clone(), format!("{}[{place}]", info.path));
+        plan.factors.iter().find(|other| {
+            let Sets::Fields(fields) = &other.sets else {
+                return false;
+            };
+            let mut own = fields.iter().filter(|field| field.part == Part::Axis);
+            own.any(|field| field.path == whole || field.path == one)
+        })
+    };
+    let places = (0..info.value.len()).filter(|place| component.is_none_or(|c| c == *place));
+    let each = places.flat_map(|place| {
+        let sheet = (field.part == Part::Plant)
+            .then(|| on_sheet(place))
+            .flatten();
+        let Some(sheet) = sheet else {
+            return vec![Scaled {
+                value: info.value[place],
+                origin: base.file.clone(),
+            }];
+        };
+        let stated = extremes(sheet).into_iter().map(|number| {
+            let (values, unit) = written(info, Some(place), sheet, number);
+            Scaled {
+                value: values[place] * factor_between(info, &unit),
+                origin: format!("`factor.{}`", sheet.name),
+            }
+        });
+        // A distribution without an end is reported with the factor of the sheet.
+        stated.filter(|scaled| scaled.value.is_finite()).collect()
+    });
+    each.collect()
 }
 
 /// A path similar to an unknown one, which this factor could set.
@@ -307,11 +362,13 @@ fn unit_fits(
     false
 }
 
-/// Whether all values lie within the range of the file's field.
+/// Whether all values lie within the range of the file's field; of a factor that scales, all multiples of what it
+/// scales.
 fn range(
     r: &mut Reader,
     factor: &Factor,
-    (info, component): (&ParameterInfo, Option<usize>),
+    info: &ParameterInfo,
+    scaled: Option<&[Scaled]>,
     name: &str,
     span: Option<Range<usize>>,
 ) {
@@ -327,40 +384,38 @@ fn range(
         let slack = 4.0 * f64::EPSILON * v.abs();
         v.is_finite() && v >= min - slack && v <= max + slack
     };
-    let scaled = |v: f64| -> Vec<f64> {
-        let of = info.value.iter().enumerate();
-        let of = of.filter(|(i, _)| component.is_none_or(|c| c == *i));
-        of.map(|(_, file)| file * v).collect()
-    };
-    let values = extremes(factor);
     let (mut wrong, mut fraction) = (None, None);
-    for v in values {
-        let made = if factor.scale { scaled(v) } else { vec![v] };
-        fraction = fraction.or_else(|| made.iter().find(|made| made.fract() != 0.0).copied());
-        if let Some(made) = made.into_iter().find(|made| !allowed(*made)) {
-            wrong = Some((v, made));
+    for v in extremes(factor) {
+        let made: Vec<(f64, Option<&Scaled>)> = match scaled {
+            Some(scaled) => scaled.iter().map(|s| (s.value * v, Some(s))).collect(),
+            None => vec![(v, None)],
+        };
+        fraction = fraction.or_else(|| made.iter().map(|m| m.0).find(|made| made.fract() != 0.0));
+        if let Some((made, of)) = made.into_iter().find(|made| !allowed(made.0)) {
+            wrong = Some((v, made, of));
             break;
         }
     }
     let range = format!("{} to {}{}", pretty(min), pretty(max), suffix(&unit));
-    if let Some((v, made)) = wrong {
-        let how = match factor.scale {
+    if let Some((v, made, of)) = wrong {
+        let how = match of {
             _ if v.is_infinite() => {
                 let end = if v > 0.0 { "upper" } else { "lower" };
-                let of = if factor.scale {
+                let of = if of.is_some() {
                     ", and the file's value times it leaves the range"
                 } else {
                     ""
                 };
                 format!("its distribution has no {end} end{of}")
             }
-            true => format!(
-                "{} times the file's value is {}{}",
+            Some(Scaled { value, origin }) => format!(
+                "{} times {} of {origin} is {}{}",
                 pretty(v),
+                pretty(*value),
                 pretty(made),
                 suffix(&unit)
             ),
-            false => format!("{}{} is out of range", pretty(v), suffix(&unit)),
+            None => format!("{}{} is out of range", pretty(v), suffix(&unit)),
         };
         let help = match v.is_infinite() {
             true => "cut the distribution with `min` and `max`".to_owned(),

@@ -114,6 +114,14 @@ impl Factor {
         self.listed().any(|value| matches!(value, Value::Text(_)))
     }
 
+    /// The names among its values.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.listed().filter_map(|value| match value {
+            Value::Text(name) => Some(name.as_str()),
+            Value::Number(_) | Value::Flag(_) => None,
+        })
+    }
+
     /// The values that the plan lists; none of a distribution of numbers.
     fn listed(&self) -> impl Iterator<Item = &Value> {
         let (grid, choices): (&[Value], &[Choice]) = match &self.values {

@@ -133,7 +133,7 @@ pub(super) fn written(
 }
 
 /// Factor from a unit to that of the file; 1 if only one is accepted.
-pub(super) fn factor_between(info: &ParameterInfo, unit: &str) -> f64 {
+pub(crate) fn factor_between(info: &ParameterInfo, unit: &str) -> f64 {
     let si = |unit: &str| info.dimension.and_then(|d: Dimension| d.factor(unit));
     match (si(unit), si(&info.unit)) {
         (Some(from), Some(to)) if unit != info.unit => from / to,

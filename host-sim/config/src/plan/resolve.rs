@@ -1,6 +1,6 @@
 //! Turns values of all factors into a scenario and a robot, or a cylinder on the bench, read and checked like files.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value as Json, json};
 use toml_edit::{DocumentMut, Item};
@@ -10,7 +10,7 @@ use super::base::{AxisBase, Base, Setting, ensure_load_share};
 use super::factor::{Factor, Part, Sets};
 use super::field::{Template, set};
 use super::value::Value;
-use crate::bench::{Air, Bench, Kind, Move, StartUp};
+use crate::bench::{Air, Bench, Deviation, Kind, Move, StartUp};
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
@@ -118,17 +118,41 @@ impl<'a> Resolver<'a> {
         Ok(Self { plan, templates })
     }
 
-    /// The files that a path may lead into.
+    /// The files that a path may lead into: those that a case can have.
     pub(super) fn files_of(&self, part: Part) -> impl Iterator<Item = &Template> {
         let kept = match part {
             Part::Scenario => Kept::Scenario,
             Part::Robot => Kept::Robot,
             Part::Axis | Part::Plant => Kept::Axis,
         };
-        self.templates
-            .get(&kept)
-            .into_iter()
-            .flat_map(BTreeMap::values)
+        let names = self.names_of(kept).into_iter();
+        names.filter_map(move |name| self.templates.get(&kept)?.get(name))
+    }
+
+    /// Names of the files of a kind that a case can have: a factor's, or else the base's.
+    fn names_of(&self, kept: Kept) -> BTreeSet<&'a str> {
+        let setting = match kept {
+            Kept::Scenario => Setting::Scenario,
+            Kept::Robot => Setting::Robot,
+            Kept::Axis => Setting::Axis,
+        };
+        let mut factors = self.plan.factors.iter();
+        if let Some(factor) = factors.find(|factor| factor.sets == Sets::Base(setting)) {
+            return factor.names().collect();
+        }
+        match (&self.plan.base, kept) {
+            (Base::Axis(base), Kept::Axis) => [base.axis.as_str()].into(),
+            (Base::Robot { scenario, .. }, Kept::Scenario) => [scenario.as_str()].into(),
+            (Base::Robot { robot, .. }, Kept::Robot) => match robot {
+                Some(robot) => [robot.as_str()].into(),
+                None => {
+                    let scenarios = self.names_of(Kept::Scenario).into_iter();
+                    let robots = scenarios.filter_map(|name| self.plan.sources.robot_of.get(name));
+                    robots.map(String::as_str).collect()
+                }
+            },
+            _ => BTreeSet::new(),
+        }
     }
 
     /// The case of one value for each factor, in their order.
@@ -238,6 +262,7 @@ impl<'a> Resolver<'a> {
             air: named(factors, Setting::Air, base.air, Air::of_name)?,
             sheet: sheet.axis,
             plant: plant.axis,
+            deviations: Deviation::all(&sheet.parameters, &plant.parameters),
             load_share,
         };
         Ok(OnBench {

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use wheeleg_config::builtin::{self, Source};
 use wheeleg_config::{ConfigError, RobotConfig, Scenario};
-use wheeleg_master::command::Command;
+use wheeleg_master::command::{Command, CommandCode};
 use wheeleg_master::dispatcher::{Refusal, Reject};
 use wheeleg_master::event::HoldReason;
 use wheeleg_master::setpoint::Phase;
@@ -204,7 +204,7 @@ pub(crate) enum Answer {
     /// Refused at the master's door.
     Rejected(Reject),
     /// Refused later.
-    Refused(Refusal),
+    Refused(CommandCode, Refusal),
     /// The clock is paused.
     Paused,
     /// The sender claims to have seen the future.

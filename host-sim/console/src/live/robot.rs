@@ -457,7 +457,7 @@ impl Loop {
         while let Some((time_us, event)) = self.machine.take_outcome() {
             let (ticket, answer) = match event {
                 Event::Done(ticket) => (ticket, Answer::Done),
-                Event::Refused { ticket, reason } => (ticket, Answer::Refused(reason)),
+                Event::Refused { ticket, reason } => (ticket, Answer::Refused(ticket.code, reason)),
                 Event::Parameter { node, id, raw } => {
                     let board = node;
                     let _ = self.reports.push(Report::Parameter { board, id, raw });

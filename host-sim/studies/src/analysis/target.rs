@@ -67,6 +67,37 @@ pub(crate) fn band_text(min: Option<f64>, max: Option<f64>) -> String {
     }
 }
 
+/// A measured value with its unit.
+pub(crate) fn measured_text(value: Option<f64>, unit: &str) -> String {
+    let unit = value.map_or("", |_| unit_text(unit));
+    let value = value_text(value);
+    format!("{value} {unit}").trim_end().to_owned()
+}
+
+/// A requirement, with the unit.
+pub(crate) fn asked_text(min: Option<f64>, max: Option<f64>, unit: &str) -> String {
+    let band = band_text(min, max);
+    let band = band.strip_prefix("= ").unwrap_or(&band);
+    format!("{band} {}", unit_text(unit)).trim_end().to_owned()
+}
+
+/// The unit for use after a value: empty for a count or a share.
+fn unit_text(unit: &str) -> &str {
+    if unit == "1" { "" } else { unit }
+}
+
+/// A value as text, four significant digits.
+fn value_text(value: Option<f64>) -> String {
+    let Some(v) = value else {
+        return "not measured".into();
+    };
+    if v.fract() == 0.0 && v.abs() < 1e6 {
+        return format!("{v:.0}");
+    }
+    let decimals = (3 - v.abs().log10().floor() as i32).clamp(0, 4) as usize;
+    format!("{v:.decimals$}")
+}
+
 impl Target {
     /// A required target. A value that could not be measured, or is not a
     /// number, fails.
@@ -103,24 +134,19 @@ impl Target {
     /// The unit for use after a value: empty for a count or a share.
     #[must_use]
     pub fn unit_text(&self) -> &'static str {
-        if self.unit == "1" { "" } else { self.unit }
+        unit_text(self.unit)
     }
 
     /// The value with its unit.
     #[must_use]
     pub fn measured_text(&self) -> String {
-        let unit = self.value.map_or("", |_| self.unit_text());
-        format!("{} {unit}", self.value_text())
-            .trim_end()
-            .to_owned()
+        measured_text(self.value, self.unit)
     }
 
     /// The requirement, with the unit.
     #[must_use]
     pub fn asked_text(&self) -> String {
-        let band = self.band_text();
-        let band = band.strip_prefix("= ").unwrap_or(&band);
-        format!("{band} {}", self.unit_text()).trim_end().to_owned()
+        asked_text(self.min, self.max, self.unit)
     }
 
     /// The measured quantity, as used in a sentence: without the explanation in brackets.
@@ -139,14 +165,7 @@ impl Target {
     /// The value as text, four significant digits.
     #[must_use]
     pub fn value_text(&self) -> String {
-        let Some(v) = self.value else {
-            return "not measured".into();
-        };
-        if v.fract() == 0.0 && v.abs() < 1e6 {
-            return format!("{v:.0}");
-        }
-        let decimals = (3 - v.abs().log10().floor() as i32).clamp(0, 4) as usize;
-        format!("{v:.decimals$}")
+        value_text(self.value)
     }
 
     /// Its judgement.

@@ -5,7 +5,7 @@ mod files;
 mod targets;
 
 use serde::Serialize;
-use wheeleg_config::bench::{Air, Bench};
+use wheeleg_config::bench::{Air, Bench, Deviation};
 
 pub use files::{BenchSummary, write};
 pub use targets::{targets, unmeasured};
@@ -63,6 +63,10 @@ pub struct About {
     pub delays: &'static str,
     /// Air at power-up.
     pub air: &'static str,
+    /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
+    pub load_share: f64,
+    /// Where the plant is not as the data sheet says.
+    pub deviations: Vec<Deviation>,
     /// Seed, a whole number as text: JSON numbers are exact only up to 2^53.
     pub seed: String,
 }
@@ -77,6 +81,8 @@ impl About {
             motion: bench.motion.name(),
             delays: bench.delays.name(),
             air: bench.air.name(),
+            load_share: bench.load_share,
+            deviations: bench.deviations.clone(),
             seed: seed.to_string(),
         }
     }

@@ -127,20 +127,9 @@ const QUANTITIES: [Quantity; 15] = [
     },
 ];
 
-/// Whether a quantity means anything for a move.
-fn applies(id: &str, motion: Move) -> bool {
-    let is_step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
-    match id {
-        "overshoot" => !matches!(motion, Move::Sine | Move::Hold),
-        "settling" | "rise" => is_step,
-        "rest-edges" => motion == Move::Hold,
-        "recovery" => motion.loses_contact(),
-        _ => true,
-    }
-}
-
 fn of_figures(motion: Move, figures: &Figures) -> impl Iterator<Item = Target> {
-    let own = QUANTITIES.iter().filter(move |q| applies(q.id, motion));
+    let own = QUANTITIES.iter();
+    let own = own.filter(move |q| Figures::has(motion, q.value));
     own.map(|q| {
         let value = (q.value)(figures);
         match q.limits {

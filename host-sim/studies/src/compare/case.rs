@@ -353,32 +353,26 @@ impl Figures {
     pub fn of(motion: Move, played: &Played, bound_s: Option<[f64; 2]>) -> Self {
         let all: Vec<Metrics> = played.measured.iter().map(Metrics::of).collect();
         let of = |f: &dyn Fn(&Metrics) -> f64| worst(all.iter().map(|m| Some(f(m))));
-        let step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
         let steady = all.iter().map(|m| m.steady_error_mm);
         let first = Metrics::of(&played.first);
         let traces = || std::iter::once(&played.first).chain(&played.measured);
         let faults = traces().fold(FaultBits::NONE, |bits, t| bits.union(t.faults));
         let fault_names: Vec<&str> = faults.iter().map(|f| f.name()).collect();
         let reversals = all.iter().map(|m| m.reversals).max();
-        Self {
+        let figures = Self {
             steady_error_mm: steady.reduce(|a, b| if b.abs() > a.abs() { b } else { a }),
-            overshoot_mm: of(&|m| m.overshoot_mm)
-                .filter(|_| motion != Move::Sine && motion != Move::Hold),
-            rise_s: worst(all.iter().map(|m| m.rise_s)).filter(|_| step),
-            settle_s: worst(all.iter().map(|m| m.settle_s)).filter(|_| step),
+            overshoot_mm: of(&|m| m.overshoot_mm),
+            rise_s: worst(all.iter().map(|m| m.rise_s)),
+            settle_s: worst(all.iter().map(|m| m.settle_s)),
             rms_mm: of(&|m| m.rms_mm),
             worst_mm: of(&|m| m.worst_mm),
-            start_delay_s: worst(all.iter().map(|m| m.start_delay_s)).filter(|_| step),
+            start_delay_s: worst(all.iter().map(|m| m.start_delay_s)),
             peak_speed_mm_s: of(&|m| m.peak_speed_mm_s),
             switches_per_s: of(&|m| m.switches_per_s),
-            rest_switches: played.measured[0]
-                .rows
-                .last()
-                .map(|r| r.switches)
-                .filter(|_| motion == Move::Hold),
+            rest_switches: played.measured[0].rows.last().map(|r| r.switches),
             air_nl: of(&|m| m.air_dm3),
-            recovery_s: recovery(&played.measured[0]).filter(|_| motion.loses_contact()),
-            contact_error_mm: contact_error(&played.measured[0]).filter(|_| motion.loses_contact()),
+            recovery_s: recovery(&played.measured[0]),
+            contact_error_mm: contact_error(&played.measured[0]),
             reversals,
             limit_cycle: Some(all.iter().any(Metrics::limit_cycle)),
             ratio_to_bound: bound_s.and_then(|bound| {
@@ -393,6 +387,52 @@ impl Figures {
             first_steady_error_mm: Some(first.steady_error_mm),
             faults: fault_names.join(" "),
             stopped: Some(traces().any(|t| !t.drove)),
+        };
+        figures.only_of(motion)
+    }
+
+    /// Whether a move has a figure.
+    #[must_use]
+    pub fn has(motion: Move, figure: fn(&Self) -> Option<f64>) -> bool {
+        let all = Self {
+            steady_error_mm: Some(0.0),
+            overshoot_mm: Some(0.0),
+            rise_s: Some(0.0),
+            settle_s: Some(0.0),
+            rms_mm: Some(0.0),
+            worst_mm: Some(0.0),
+            start_delay_s: Some(0.0),
+            peak_speed_mm_s: Some(0.0),
+            switches_per_s: Some(0.0),
+            rest_switches: Some(0),
+            air_nl: Some(0.0),
+            recovery_s: Some(0.0),
+            contact_error_mm: Some(0.0),
+            reversals: Some(0),
+            limit_cycle: Some(false),
+            ratio_to_bound: Some(0.0),
+            first_overshoot_mm: Some(0.0),
+            first_settle_s: Some(0.0),
+            first_steady_error_mm: Some(0.0),
+            faults: String::new(),
+            stopped: Some(false),
+        };
+        figure(&all.only_of(motion)).is_some()
+    }
+
+    /// Without what a move does not have.
+    fn only_of(self, motion: Move) -> Self {
+        let is_step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
+        let arrives = !matches!(motion, Move::Sine | Move::Hold);
+        Self {
+            overshoot_mm: self.overshoot_mm.filter(|_| arrives),
+            rise_s: self.rise_s.filter(|_| is_step),
+            settle_s: self.settle_s.filter(|_| is_step),
+            start_delay_s: self.start_delay_s.filter(|_| is_step),
+            rest_switches: self.rest_switches.filter(|_| motion == Move::Hold),
+            recovery_s: self.recovery_s.filter(|_| motion.loses_contact()),
+            contact_error_mm: self.contact_error_mm.filter(|_| motion.loses_contact()),
+            ..self
         }
     }
 }

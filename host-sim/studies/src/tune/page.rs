@@ -82,44 +82,34 @@ pub(super) fn figures(tuned: &Tuned) -> Vec<Figure> {
 
 type Cell = fn(&Figures) -> Option<f64>;
 
-/// Whether a move has a figure.
+/// Whether a figure of a move is shown.
 type Of = fn(Move) -> bool;
 
 fn any(_: Move) -> bool {
     true
 }
 
-/// Whether a move should settle at its target.
-fn settles(motion: Move) -> bool {
-    matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact()
+/// Whether it is the way that counts, as the move has no time to settle.
+fn tracks(motion: Move) -> bool {
+    !Figures::has(motion, |f| f.settle_s)
 }
 
-/// Figures of a test, the moves that have them, and their digits.
+/// Figures of a test, the moves of which they are shown if these have them, and their digits.
 const LINES: [(&str, Of, usize, Cell); 12] = [
     ("error at rest [mm]", any, 2, |f| {
         f.steady_error_mm.map(f64::abs)
     }),
-    (
-        "overshoot [mm]",
-        |m| !matches!(m, Move::Hold | Move::Sine),
-        2,
-        |f| f.overshoot_mm,
-    ),
-    ("rise [s]", settles, 3, |f| f.rise_s),
-    ("settled within ±1 mm [s]", settles, 3, |f| f.settle_s),
-    ("worst error [mm]", |m| !settles(m), 2, |f| f.worst_mm),
-    ("RMS error [mm]", |m| !settles(m), 2, |f| f.rms_mm),
+    ("overshoot [mm]", any, 2, |f| f.overshoot_mm),
+    ("rise [s]", any, 3, |f| f.rise_s),
+    ("settled within ±1 mm [s]", any, 3, |f| f.settle_s),
+    ("worst error [mm]", tracks, 2, |f| f.worst_mm),
+    ("RMS error [mm]", tracks, 2, |f| f.rms_mm),
     ("switches per s", any, 0, |f| f.switches_per_s),
-    (
-        "switches in 10 s at rest",
-        |m| m == Move::Hold,
-        0,
-        |f| f.rest_switches.map(|n| n as f64),
-    ),
-    ("air per move [l ANR]", any, 2, |f| f.air_nl),
-    ("recovery after contact [s]", Move::loses_contact, 2, |f| {
-        f.recovery_s
+    ("switches in 10 s at rest", any, 0, |f| {
+        f.rest_switches.map(|n| n as f64)
     }),
+    ("air per move [l ANR]", any, 2, |f| f.air_nl),
+    ("recovery after contact [s]", any, 2, |f| f.recovery_s),
     (
         "first move: overshoot [mm]",
         |m| m == Move::Step100,
@@ -191,7 +181,7 @@ fn lines(test: &Test) -> Vec<Line> {
     };
     let mut list: Vec<Line> = LINES
         .iter()
-        .filter(|(_, of, ..)| of(test.motion))
+        .filter(|(_, of, _, value)| of(test.motion) && Figures::has(test.motion, *value))
         .map(|(name, _, digits, value)| {
             let shown = |figures| or_dash(value(figures), *digits);
             Line {

@@ -5,12 +5,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use wheeleg_config::open_file;
-use wheeleg_report::number::short;
 use wheeleg_report::plain::plain;
 use wheeleg_report::results::SUMMARY;
 
 use super::content::Content;
-use crate::analysis::band_text;
+use crate::analysis::{asked_text, measured_text};
 
 /// Most bytes of a summary that is read.
 const MOST: u64 = 1 << 22;
@@ -97,21 +96,41 @@ impl Judged {
 
 impl ReadTarget {
     fn told(&self) -> Missed {
-        let unit = match self.unit.as_str() {
-            "1" => String::new(),
-            unit => format!(" {unit}"),
-        };
-        let measured = match self.value {
-            Some(value) => format!("{}{unit}", short(value)),
-            None => "not measured".to_owned(),
-        };
-        let asked = format!("{}{unit}", band_text(self.min, self.max));
+        let measured = measured_text(self.value, &self.unit);
+        let asked = asked_text(self.min, self.max, &self.unit);
         let [id, description] = [&self.id, &self.description].map(|text| plain(text));
         Missed {
             id,
             description,
             measured: plain(&measured),
             asked: plain(&asked),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::Target;
+
+    /// What the page of a log says of a target is what the report of its run says.
+    #[test]
+    fn a_target_is_told_as_in_the_report_of_its_run() {
+        for (value, unit, min, max) in [
+            (Some(26.5), "s", None, Some(20.0)),
+            (Some(2.0), "1", Some(3.0), Some(3.0)),
+            (Some(0.000_25), "mm", Some(-0.5), Some(0.5)),
+            (Some(-123_456.7), "Pa", Some(0.0), None),
+            (None, "mm", None, Some(5.0)),
+        ] {
+            let target = Target::new("X", "x", value, unit, min, max);
+            let text = serde_json::to_string(&target).expect("JSON");
+            let read: ReadTarget = serde_json::from_str(&text).expect("a target");
+            let told = read.told();
+            assert_eq!(
+                (told.measured, told.asked),
+                (target.measured_text(), target.asked_text())
+            );
         }
     }
 }

@@ -39,6 +39,13 @@ impl EventKind {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
+    /// Whether such events are many, and matter only to whoever looks for a cause in them: a foot touches the ground
+    /// and leaves it a dozen times in a step.
+    #[must_use]
+    pub const fn is_detail(self) -> bool {
+        matches!(self, Self::Log | Self::Contact)
+    }
+
     /// Lower-case name, as logged.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -145,6 +152,21 @@ codes! {
 }
 
 impl EventCode {
+    /// Whether it is what a walk does about the ground, many times in it; what stands in its way is not.
+    #[must_use]
+    pub const fn is_detail(self) -> bool {
+        matches!(
+            self,
+            Self::TipGuard
+                | Self::EarlyGround
+                | Self::LateGround
+                | Self::LostGround
+                | Self::Slip
+                | Self::LoadShare
+                | Self::Governor
+        )
+    }
+
     /// The code of this name, as logged; none of a later version.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {

@@ -159,7 +159,8 @@ pub(super) const fn master_board(event: &MasterEvent) -> Option<u8> {
     }
 }
 
-const fn refusing_board(reason: &Refusal) -> Option<u8> {
+/// The board whose refusal it is.
+pub(crate) const fn refusing_board(reason: &Refusal) -> Option<u8> {
     match *reason {
         Refusal::NodeMissing { node }
         | Refusal::SchemaMismatch { node, .. }

@@ -1,10 +1,12 @@
 //! Why a command is not carried out, and what to do about it.
 
+use wheeleg_master::command::CommandCode;
 use wheeleg_master::dispatcher::{DEADLINE_MAX_US, Refusal, Reject};
 use wheeleg_master::finding::Finding;
 use wheeleg_protocol::{Fault, FaultBits, NackReason};
 
 use super::{board, other_interface};
+use crate::event::refusing_board;
 
 /// A command that was accepted and then not carried out.
 pub(super) fn refusal(reason: &Refusal) -> String {
@@ -92,6 +94,18 @@ pub(super) fn refusal(reason: &Refusal) -> String {
     }
 }
 
+/// Why a command was refused after it had been accepted, and what to do about it.
+#[must_use]
+pub fn refused(code: CommandCode, reason: &Refusal) -> String {
+    let why = refusal(reason);
+    if code != CommandCode::ClearFault || refusing_board(reason).is_none() {
+        return why;
+    }
+    // A board keeps a fault whose cause is there; all others were cleared, and disarmed.
+    let stop = if why.ends_with('.') { "" } else { "." };
+    format!("{why}{stop} The other boards no longer hold, and are disarmed")
+}
+
 /// Why a command was refused at the door, and what to do about it.
 #[must_use]
 pub fn reject(reason: &Reject) -> String {
@@ -109,5 +123,30 @@ pub fn reject(reason: &Reject) -> String {
             "the queue to layer {} is full: give fewer commands at a time",
             layer as u8
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A clear that one board refuses has cleared the others; any other refusal has done nothing to them.
+    #[test]
+    fn a_board_that_keeps_its_fault_is_told_with_the_others() {
+        let reason = NackReason::FaultLatched;
+        let kept = Refusal::NodeRefused { node: 3, reason };
+        let silent = Refusal::NoAnswer { node: 3 };
+        for by_board in [kept, silent] {
+            let told = refused(CommandCode::ClearFault, &by_board);
+            assert!(
+                told.ends_with(". The other boards no longer hold, and are disarmed")
+                    && !told.contains(".."),
+                "{told}"
+            );
+            let told = refused(CommandCode::SaveParameters, &by_board);
+            assert_eq!(told, refusal(&by_board));
+        }
+        let told = refused(CommandCode::ClearFault, &Refusal::NotInControl);
+        assert_eq!(told, refusal(&Refusal::NotInControl));
     }
 }

@@ -27,7 +27,7 @@ use wheeleg_protocol::{Address, Fault};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::view::plain;
 use wheeleg_telemetry::event::{hold_name, hold_words_of};
-use wheeleg_telemetry::{EventCode, EventKind, channels, placed};
+use wheeleg_telemetry::{EventCode, channels, placed};
 
 use super::exit::{self, LOST};
 use super::{fitted, print, say, show, stop_on_signals, tell, tell_error, whole};
@@ -361,11 +361,9 @@ fn events(reach: &Reach, key: &Key, last: u32, all: bool) -> miette::Result<Exit
 
 /// Whether an event is one of many that would push out what counts: after a stop each board tells of it four times.
 fn is_detail(event: &Value) -> bool {
-    let kinds = [EventKind::Log, EventKind::Contact].map(EventKind::name);
     let of_board = event["board"] != 0;
     let of_stop = event["fault"] == Fault::EmergencyStop.code();
-    kinds.iter().any(|kind| event["kind"] == *kind)
-        || of_board && (of_stop || event["code"] == EventCode::Mode.name())
+    event["minor"] == true || of_board && (of_stop || event["code"] == EventCode::Mode.name())
 }
 
 fn event_line(event: &Value) -> String {
@@ -613,11 +611,6 @@ fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
     if !matches!(end, Outcome::Refused { .. }) || reach.url().is_exposed() {
         return Ok(());
     }
-    if let Outcome::Refused { reason, .. } = end
-        && (reason.starts_with("board_") || reason == "no_answer")
-    {
-        tell("the other boards no longer hold, and are disarmed");
-    }
     let key = reach.key(CONTROL_FILE)?;
     let (_, state) = http(&reach.url(), "GET", "state", &key)?;
     for fault in state["faults"].as_array().into_iter().flatten() {
@@ -701,19 +694,19 @@ mod tests {
     #[test]
     fn events_of_a_stop_are_its_command_and_the_hold() {
         let (stop, range) = (Fault::EmergencyStop.code(), Fault::SensorRange.code());
-        for (kind, code, board, fault, detail) in [
-            ("command", "command_accepted", 0, 0, false),
-            ("fault", "hold", 0, 0, false),
-            ("fault", "hold", 3, range, false),
-            ("fault", "fault_latched", 3, range, false),
-            ("fault", "fault_latched", 3, stop, true),
-            ("fault", "diagnosis", 3, stop, true),
-            ("mode", "mode", 3, 0, true),
-            ("mode", "armed", 0, 0, false),
-            ("log", "log", 3, 0, true),
-            ("contact", "lift_off", 0, 0, true),
+        for (code, board, fault, minor, detail) in [
+            ("command_accepted", 0, 0, false, false),
+            ("hold", 0, 0, false, false),
+            ("hold", 3, range, false, false),
+            ("fault_latched", 3, range, false, false),
+            ("fault_latched", 3, stop, false, true),
+            ("diagnosis", 3, stop, false, true),
+            ("mode", 3, 0, false, true),
+            ("armed", 0, 0, false, false),
+            ("log", 3, 0, true, true),
+            ("tip_guard", 0, 0, true, true),
         ] {
-            let event = json!({ "kind": kind, "code": code, "board": board, "fault": fault });
+            let event = json!({ "code": code, "board": board, "fault": fault, "minor": minor });
             assert_eq!(is_detail(&event), detail, "{event}");
         }
     }
