@@ -403,6 +403,9 @@ fn limits_are_those_of_the_scenario_that_asks() {
     let findings = report::Report::of(&table, None).expect("a table").findings;
     let column = &findings.targets[0].column;
     assert!(column.required && column.max == Some(4.0), "{column:?}");
+    let cells = findings.targets[0].cells.iter();
+    let met: Vec<_> = cells.map(|c| (c.rate.met, c.rate.of)).collect();
+    assert_eq!(met, [(0, 0), (1, 1)], "only one was asked");
     let nearest: Vec<_> = findings
         .worst
         .iter()
