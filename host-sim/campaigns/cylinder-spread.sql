@@ -1,6 +1,7 @@
 -- Questions to the table of `cylinder-spread`, for DuckDB. Before it:
 --     SET VARIABLE cases = 'cases.parquet';
--- The columns of factors are "f.NAME"; each target has a value, "ID", and a verdict, "ID.pass".
+-- The columns of factors are "f.NAME"; each target has a value, "ID", and a verdict, "ID.pass". `passed` is NULL in a
+-- case without a result, which has not met its targets.
 
 -- How many cases miss, by axis and controller, and how long does a move take?
 SELECT
@@ -28,8 +29,8 @@ ORDER BY controller, load_third, delay_third;
 
 -- Pairs with the same noise: what one controller meets and the other does not.
 SELECT
-    a.passed AS paper,
-    b.passed AS predictive,
+    coalesce(a.passed, false) AS paper,
+    coalesce(b.passed, false) AS predictive,
     count(*) AS pairs
 FROM read_parquet(getvariable('cases')) AS a
 JOIN read_parquet(getvariable('cases')) AS b USING ("f.axis", sample, replicate)

@@ -28,7 +28,7 @@ ORDER BY ground, nails_mm, law;
 -- What ends a climb: too slow, wheels that spin, or the tail on the ground.
 SELECT
     "f.ground" AS ground, "f.law" AS law,
-    count(*) FILTER (NOT passed) AS failed,
+    count(*) FILTER (NOT coalesce(passed, false)) AS failed,
     count(*) FILTER (NOT "speed.pass") AS too_slow,
     count(*) FILTER (NOT "slip.pass") AS spinning,
     count(*) FILTER (NOT "chassis-force.pass") AS on_its_tail,

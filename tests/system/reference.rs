@@ -12,7 +12,7 @@ use wheeleg_campaign::{Column, Columns};
 use wheeleg_config::bench::Move;
 use wheeleg_config::faults::{KINDS, NOT_IMPLEMENTED};
 use wheeleg_config::keys::{self, Key};
-use wheeleg_config::{Measure, TARGETS, builtin};
+use wheeleg_config::{AxisConfig, Measure, ParameterInfo, TARGETS, axis, builtin};
 use wheeleg_studies::analysis::{Analyser, Target};
 use wheeleg_studies::bench::unmeasured;
 use wheeleg_telemetry::{channels, derived};
@@ -99,12 +99,16 @@ fn faults_page() {
     page("faults.md", "Faults", intro, &body);
 }
 
-#[test]
-fn parameters_page() {
-    let robot = builtin::robot(builtin::DEFAULT_ROBOT).expect("built in");
+/// A number without what its conversion to another unit has left in its last digits.
+fn decimal(value: f64) -> f64 {
+    format!("{value:.9e}").parse().expect("a number")
+}
+
+/// A table for each section of a file.
+fn parameter_tables(parameters: &[ParameterInfo]) -> String {
     let mut body = String::new();
     let mut section = "";
-    for p in &robot.parameters {
+    for p in parameters {
         let of = p.path.rsplit_once('.').map_or("", |(section, _)| section);
         if of != section {
             section = of;
@@ -115,7 +119,7 @@ fn parameters_page() {
             );
         }
         let name = p.path.rsplit('.').next().unwrap_or(&p.path);
-        let range = format!("{} to {}", p.min, p.max);
+        let range = format!("{} to {}", decimal(p.min), decimal(p.max));
         row(
             &mut body,
             &[
@@ -128,6 +132,39 @@ fn parameters_page() {
             ],
         );
     }
+    body
+}
+
+#[test]
+fn axis_fields_page() {
+    let (first, ..) = axis::AXES[0];
+    let parameters = AxisConfig::load(first).expect("built in").parameters;
+    // No other built-in axis has a field that this one lacks.
+    for (name, ..) in axis::AXES {
+        let other = AxisConfig::load(name).expect("built in").parameters;
+        let paths = |list: &[ParameterInfo]| -> BTreeSet<String> {
+            list.iter().map(|p| p.path.clone()).collect()
+        };
+        assert_eq!(paths(&other), paths(&parameters), "{name}");
+    }
+    let intro = format!(
+        "Every field of an axis file, one cylinder on the bench, with the values of `{first}`. A factor of a campaign \
+         names them as `axis.SECTION.FIELD` or `plant.SECTION.FIELD`. Pressures are absolute. Ranges are in the unit of \
+         the value; a file may use others."
+    );
+    let body = parameter_tables(&parameters);
+    page(
+        "axis-fields.md",
+        "Fields of an axis file",
+        &intro,
+        body.trim_start(),
+    );
+}
+
+#[test]
+fn parameters_page() {
+    let robot = builtin::robot(builtin::DEFAULT_ROBOT).expect("built in");
+    let body = parameter_tables(&robot.parameters);
     let intro = "Every parameter of a robot file, with the values of `wheeleg-2003`, the paper's \
                  robot. `wheeleg params` prints the same.";
     page(
@@ -204,6 +241,21 @@ fn target_rows(body: &mut String, targets: Vec<Target>, known: &mut BTreeSet<Str
     }
 }
 
+/// What the words of the bench's targets leave open.
+const BENCH: &str = "\
+A value is the worse of the measured moves. The first move after power-up, in which the board learns, is not one of them: \
+it has `first-overshoot` and `first-settling`, and counts in `stopped` and `faults`. [What each move \
+is](../guide/campaigns.md#what-is-played-and-judged).
+
+- `rest-error` is reference − stroke: positive, the rod has come out too little.
+- `margin` is the force left, as [`load_share`](../guide/campaigns.md#the-load) means it, divided by the magnitude of the load \
+at rest; the load of a contact is not in it.
+- `valve-resolution` is of the data sheet, whatever the plant is.
+- A column exists if a move of the plan has it, and is NULL in cases of other moves: `rest-edges` is of `hold`; `recovery` of \
+`contact` and `contact-helped`; `settling` and `rise` of these two and of steps; `overshoot` of all but `sine` and `hold`.
+
+";
+
 #[test]
 fn campaign_table_page() {
     let mut body = String::from("## Columns of every table\n\n");
@@ -235,10 +287,20 @@ fn campaign_table_page() {
     );
     row(
         &mut body,
-        &["`ID.pass`", "", "whether it lies within its limits"],
+        &[
+            "`ID.pass`",
+            "",
+            "whether it lies within its limits; of a target without limits, whether it could be measured",
+        ],
+    );
+    body.push_str(
+        "\nA case without a result (`status` is not `ok`) has neither values nor verdicts: its cells are NULL in SQL and \
+         `None` in pandas, which both leave out of a mean. The report counts it as not met. So does \
+         `avg(coalesce(passed, false)::INT)`, and in pandas `df[\"passed\"].eq(True).mean()`.\n",
     );
     const HEAD: [&str; 4] = ["target", "unit", "what", "required"];
     body.push_str("\n## Targets of a cylinder on the bench\n\n");
+    body.push_str(BENCH);
     head(&mut body, &HEAD);
     let mut known = BTreeSet::new();
     for motion in Move::ALL {

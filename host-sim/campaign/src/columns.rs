@@ -62,6 +62,11 @@ impl Column {
         }
     }
 
+    /// Whether it is a target with a limit: of the others a verdict says only that there is a value.
+    pub(crate) fn has_limits(&self) -> bool {
+        self.min.is_some() || self.max.is_some()
+    }
+
     /// The limits of a target in words, after a comma; empty where it has none.
     pub(crate) fn limits(&self) -> String {
         let unit = match self.unit.as_str() {
@@ -132,7 +137,7 @@ const BETWEEN: [(&str, Kind, &str, &str); 5] = [
         "passed",
         Kind::Flag,
         "",
-        "whether all required targets are met",
+        "whether all required targets are met; NULL of a case without a result, which has not met them",
     ),
 ];
 
@@ -163,15 +168,19 @@ impl Columns {
         for values in probes(plan) {
             for target in targets_of(&resolver.resolve(&values)?) {
                 if targets.contains(&target.id) {
-                    // Of several scenarios one may ask for what another only tells.
+                    // Of several scenarios or moves one may ask for what another only tells.
                     let known = all.iter_mut().find(|column| column.name == target.id);
-                    if let Some(known) = known {
-                        known.required |= target.required;
+                    if let Some(known) = known.filter(|known| target.required && !known.required) {
+                        known.required = true;
+                        (known.min, known.max) = (target.min, target.max);
                     }
                     continue;
                 }
                 let verdict = format!("{}.pass", target.id);
-                let meaning = format!("whether {} lies within its limits", target.id);
+                let meaning = format!(
+                    "whether {} lies within its limits; without limits, whether it could be measured",
+                    target.id
+                );
                 all.push(Column {
                     min: target.min,
                     max: target.max,

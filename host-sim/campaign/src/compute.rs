@@ -1,6 +1,7 @@
 //! The row of a case, whatever becomes of it.
 
 use crate::cases::{Case, Cases};
+use crate::columns::Column;
 use crate::panics::caught;
 use crate::row::{self, Figure, Row, Status};
 use crate::simulate::Outcome;
@@ -33,11 +34,16 @@ pub(crate) fn row(
 
 /// The row of a case and its outcome.
 pub(crate) fn row_of(cases: &Cases<'_>, case: &Case, block: u64, outcome: Outcome) -> Row {
-    let figures = cases.columns().targets.iter().map(|id| {
+    let columns = cases.columns();
+    let figures = columns.targets.iter().map(|id| {
         let target = outcome.targets.iter().find(|target| target.id == *id);
+        let column = columns.all.iter().find(|column| column.name == *id);
+        // Where another scenario or move has limits and this one has none, there is nothing to meet.
+        let others = column.is_some_and(Column::has_limits);
+        let judged = target.filter(|target| !others || target.min.or(target.max).is_some());
         Figure {
             value: target.and_then(|target| target.value),
-            pass: target.map(|target| target.pass),
+            pass: judged.map(|target| target.pass),
         }
     });
     Row {

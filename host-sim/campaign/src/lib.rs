@@ -62,7 +62,7 @@ pub use isolate::isolated;
 pub use merge::{Merged, merge, merge_partial};
 pub use place::Place;
 pub use program::program;
-pub use replay::{Files, Replayed, replay};
+pub use replay::{Files, Recording, Replayed, replay};
 pub use row::{Figure, Row, Status};
 pub use run::{Options, Ran, SAVE_EVERY, run};
 pub use shard::Shard;

@@ -14,7 +14,7 @@ use crate::cases::{Cases, Setup};
 use crate::identity::CaseId;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
-use crate::simulate::simulate;
+use crate::simulate::{hash, simulate};
 use crate::store::{PlanFile, Store};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
@@ -28,6 +28,8 @@ pub struct Replayed {
     pub before: Option<Row>,
     /// Program that computed it.
     pub program: String,
+    /// Columns in which the row is not what it was, to the bit.
+    pub differs: Vec<String>,
     /// Its files; none of a case that cannot be simulated.
     pub files: Option<Finished<Files>>,
 }
@@ -35,30 +37,40 @@ pub struct Replayed {
 /// What a replay has written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Files {
-    /// Hash of the log; none of a run that was stopped or failed, and on the bench.
+    /// What was recorded.
+    pub recording: Recording,
+    /// Its hash; none of a run that was stopped or failed.
     pub hash: Option<String>,
+}
+
+/// What is recorded of a case, and has a hash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recording {
+    /// The log of a robot.
+    Log,
+    /// The moves of a cylinder on the bench.
+    Moves,
 }
 
 impl Replayed {
     /// Whether the row is what it was, to the bit; none if there was none.
     #[must_use]
     pub fn same_row(&self) -> Option<bool> {
-        let before = self.before.as_ref()?;
-        let bits = |row: &Row| -> Vec<Option<u64>> {
-            let values = row.figures.iter().map(|f| f.value);
-            let values = values.chain([row.simulated_s]);
-            values.map(|v| v.map(f64::to_bits)).collect()
-        };
-        Some(*before == self.row && bits(before) == bits(&self.row))
+        self.before.as_ref().map(|_| self.differs.is_empty())
     }
 
-    /// Whether the log of the full run has the hash of the row; none of a row without one, or of a
-    /// case that was given up: its log ends before that of the full run.
+    /// Whether the recording of the full run, a log or moves, has the hash of the row; none of a row without one, or
+    /// of a case that was given up: its log ends before that of the full run.
     #[must_use]
-    pub fn same_log(&self) -> Option<bool> {
+    pub fn same_recording(&self) -> Option<bool> {
         let files = self.files.as_ref();
         let files = files.filter(|_| self.row.status == Status::Ok)?;
-        let hash = self.row.log_hash.as_ref()?;
+        let hash = self
+            .before
+            .as_ref()
+            .unwrap_or(&self.row)
+            .log_hash
+            .as_ref()?;
         Some(files.result.hash.as_ref()? == hash)
     }
 }
@@ -114,7 +126,10 @@ pub fn replay(
         Ok(Setup::Bench(bench)) => play_again(bench, case.seed, &settings)?,
         Err(_) => None,
     };
+    let differs = before.as_ref();
+    let differs = differs.map(|before| row::differing(cases.columns(), before, &row));
     Ok(Some(Replayed {
+        differs: differs.unwrap_or_default(),
         row,
         before,
         program: plan_file.program,
@@ -131,6 +146,7 @@ fn run_again(
 ) -> Result<Finished<Files>, CampaignError> {
     let run = run_read(scenario, robot, seed, settings)?;
     Ok(run.map(|run| Files {
+        recording: Recording::Log,
         hash: run.summary.complete.then_some(run.summary.hash),
     }))
 }
@@ -146,8 +162,10 @@ fn play_again(
         return Ok(None);
     };
     let written = bench::write(bench, seed, &played, settings)?;
-    // The row's own hash, which is compared with that of the row before, is of these recordings: nothing else to compare.
-    Ok(Some(written.map(|_| Files { hash: None })))
+    Ok(Some(written.map(|_| Files {
+        recording: Recording::Moves,
+        hash: Some(hash(&played)),
+    })))
 }
 
 /// The plan in a merged table.

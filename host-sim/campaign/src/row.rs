@@ -97,6 +97,47 @@ impl Row {
     }
 }
 
+/// Names of the columns in which two rows of a case differ, to the bit.
+pub(crate) fn differing(columns: &Columns, one: &Row, other: &Row) -> Vec<String> {
+    let bits = |value: Option<f64>| value.map(f64::to_bits);
+    let fixed = [
+        ("case", one.case != other.case),
+        ("index", one.index != other.index),
+        ("block", one.block != other.block),
+        ("sample", one.sample != other.sample),
+        ("replicate", one.replicate != other.replicate),
+        ("seed", one.seed != other.seed),
+        ("status", one.status != other.status),
+        ("error", one.error != other.error),
+        ("log_hash", one.log_hash != other.log_hash),
+        (
+            "simulated_s",
+            bits(one.simulated_s) != bits(other.simulated_s),
+        ),
+        ("passed", one.passed != other.passed),
+    ];
+    let fixed = fixed.into_iter().filter(|(_, differs)| *differs);
+    let mut names: Vec<String> = fixed.map(|(name, _)| name.to_owned()).collect();
+    let factors = one.factors.iter().zip(&other.factors);
+    let factors = columns.factors.iter().zip(factors);
+    let factors = factors.filter(|(_, (a, b))| a != b);
+    names.extend(factors.map(|(name, _)| format!("f.{name}")));
+    let figures = one.figures.iter().zip(&other.figures);
+    for (name, (a, b)) in columns.targets.iter().zip(figures) {
+        if bits(a.value) != bits(b.value) {
+            names.push(name.clone());
+        }
+        if a.pass != b.pass {
+            names.push(format!("{name}.pass"));
+        }
+    }
+    let lengths = |row: &Row| (row.factors.len(), row.figures.len());
+    if lengths(one) != lengths(other) {
+        names.push("the columns themselves".to_owned());
+    }
+    names
+}
+
 /// Longest text of what went wrong, bytes.
 pub(crate) const ERROR_MOST: usize = 400;
 
@@ -218,6 +259,54 @@ pub(crate) fn rows(table: &Table) -> Option<Vec<Row>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::columns::{Column, Kind};
+
+    /// Each column is compared, and a number to its last bit.
+    #[test]
+    fn rows_that_differ_say_where() {
+        let columns = Columns::read(
+            ["f.load", "speed", "speed.pass"]
+                .map(|name| Column::new(name, Kind::Number, "", ""))
+                .to_vec(),
+        );
+        let row = Row {
+            case: "044f1d1a0af2183bb3b31813bface27d".parse().expect("a case"),
+            index: 0,
+            block: 0,
+            sample: 0,
+            replicate: 0,
+            seed: 1,
+            factors: vec![Value::Number(0.5)],
+            status: Status::Ok,
+            error: None,
+            log_hash: Some("a".to_owned()),
+            simulated_s: Some(0.1 + 0.2),
+            passed: Some(true),
+            figures: vec![Figure {
+                value: Some(0.0),
+                pass: Some(true),
+            }],
+        };
+        assert!(differing(&columns, &row, &row.clone()).is_empty());
+        let mut other = row.clone();
+        other.simulated_s = Some(0.3);
+        other.log_hash = Some("b".to_owned());
+        other.factors = vec![Value::Number(0.6)];
+        other.figures[0] = Figure {
+            value: Some(-0.0),
+            pass: Some(false),
+        };
+        assert_eq!(
+            differing(&columns, &row, &other),
+            ["log_hash", "simulated_s", "f.load", "speed", "speed.pass"]
+        );
+        other = row.clone();
+        other.figures.clear();
+        assert_eq!(
+            differing(&columns, &row, &other),
+            ["the columns themselves"]
+        );
+    }
 
     #[test]
     fn a_long_error_is_cut_between_characters() {

@@ -94,6 +94,7 @@ pub fn run(
         lined: Mutex::new(Instant::now()),
         is_terminal: std::io::stderr().is_terminal(),
         found: AtomicU64::new(0),
+        failed_before: AtomicU64::new(0),
     };
     if !options.json {
         progress.begin("cases", of);
@@ -107,7 +108,7 @@ pub fn run(
         first,
         save_every: options.save_every,
         program: options.program.as_deref(),
-        found: &|cases| live.found(cases),
+        found: &|cases, failed| live.found(cases, failed),
         on_row: &|row| {
             live.computed(cases.columns(), row);
             keep_log(store, cases, row, &options.stop)
@@ -171,7 +172,10 @@ struct Live<'a> {
     of: u64,
     begun: Instant,
     found: AtomicU64,
+    /// Of those found, how many had failed.
+    failed_before: AtomicU64,
     computed: AtomicU64,
+    /// Of those computed.
     failed: AtomicU64,
     causes: Mutex<Causes>,
     last: Mutex<Option<Instant>>,
@@ -197,8 +201,9 @@ impl Live<'_> {
         }
     }
 
-    fn found(&self, cases: u64) {
+    fn found(&self, cases: u64, failed: u64) {
         self.found.fetch_add(cases, Ordering::Relaxed);
+        self.failed_before.fetch_add(failed, Ordering::Relaxed);
         self.tell(false);
     }
 
@@ -222,7 +227,9 @@ impl Live<'_> {
         *last = Some(Instant::now());
         let computed = self.computed.load(Ordering::Relaxed);
         let done = computed + self.found.load(Ordering::Relaxed);
-        let failed = self.failed.load(Ordering::Relaxed);
+        // Of all that are done, also by earlier processes.
+        let failed =
+            self.failed.load(Ordering::Relaxed) + self.failed_before.load(Ordering::Relaxed);
         let rate = computed as f64 / self.begun.elapsed().as_secs_f64().max(1e-3);
         let left_s = (computed > 0).then(|| (self.of.saturating_sub(done)) as f64 / rate);
         if self.json {

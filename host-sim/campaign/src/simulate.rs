@@ -80,7 +80,7 @@ fn on_bench(bench: &Bench, seed: u64) -> Outcome {
 }
 
 /// Hash of all that was recorded.
-fn hash(played: &PlayedBench) -> String {
+pub(crate) fn hash(played: &PlayedBench) -> String {
     let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign bench v1");
     let mut bytes = Vec::new();
     for (name, trace) in played.played.traces() {

@@ -62,8 +62,8 @@ pub(crate) struct Work<'a> {
     pub(crate) save_every: Duration,
     /// Program for cases that may end the process.
     pub(crate) program: Option<&'a Path>,
-    /// Told of cases that have a row already.
-    pub(crate) found: &'a (dyn Fn(u64) + Sync),
+    /// Told of cases that have a row already, and how many of them failed.
+    pub(crate) found: &'a (dyn Fn(u64, u64) + Sync),
     /// Told of every row that is computed.
     pub(crate) on_row: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
     /// Told of a part that was set aside.
@@ -166,7 +166,9 @@ impl Work<'_> {
             Ok(Some(table)) => {
                 let pilot =
                     (table.rows() as u64).min(self.first - self.store.cases_of(number).start);
-                (self.found)(pilot);
+                let passed = table.flags("passed").iter().take(pilot as usize);
+                let failed = passed.filter(|passed| **passed != Some(true)).count();
+                (self.found)(pilot, failed as u64);
                 return Ok(None);
             }
             Ok(None) => {}
@@ -183,8 +185,9 @@ impl Work<'_> {
         for row in kept {
             rows.insert(row.index, row);
         }
-        let found = rows.keys().filter(|index| **index < self.first).count();
-        (self.found)(found as u64);
+        let found = || rows.values().filter(|row| row.index < self.first);
+        let failed = found().filter(|row| row.is_failed()).count();
+        (self.found)(found().count() as u64, failed as u64);
         let left = wanted.iter().copied();
         let left: VecDeque<u64> = left.filter(|index| !rows.contains_key(index)).collect();
         let block = Block {

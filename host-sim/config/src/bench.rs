@@ -7,13 +7,13 @@ use crate::plan::factor_between;
 
 /// Names of an enum without values, each with its meaning.
 macro_rules! named {
-    ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $name:ident = $key:literal,)* }) => {
+    ($(#[$about:meta])* $type:ident { $($(#[doc = $doc:literal])* $name:ident = $key:literal,)* }) => {
         $(#[$about])*
         #[derive(
             Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, schemars::JsonSchema,
         )]
         pub enum $type {
-            $($(#[$doc])* #[serde(rename = $key)] $name,)*
+            $($(#[doc = $doc])* #[serde(rename = $key)] $name,)*
         }
 
         impl $type {
@@ -24,6 +24,12 @@ macro_rules! named {
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$name => $key,)* }
+            }
+
+            /// What it is, in a sentence.
+            #[must_use]
+            pub fn about(self) -> &'static str {
+                match self { $(Self::$name => concat!($($doc),*).trim(),)* }
             }
 
             /// The one with this name.

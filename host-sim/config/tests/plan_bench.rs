@@ -97,7 +97,7 @@ fn mistakes_are_told() {
         ),
         (
             format!("{HEAD}{BASE}[[bars]]\nmeasure = \"speed\"\nmin = \"20 mm/s\"\n"),
-            "`bars` are of a robot's travel",
+            "`[[bars]]` do not exist on the bench",
         ),
         (
             factor("parameter = \"plant.moving.mas\"\ngrid = [1.0]\nunit = \"kg\"\n"),
@@ -123,7 +123,7 @@ fn mistakes_are_told() {
         ),
         (
             factor("parameter = \"controller\"\ngrid = [\"pid\"]\n"),
-            "pid is not known: allowed are on-off, pwm-p",
+            "`factor.x` = pid: no such controller: allowed are on-off, pwm-p",
         ),
         (
             factor("parameter = \"load_share\"\nuniform = { min = 0.0, max = 1.5 }\n"),
@@ -199,4 +199,46 @@ fn a_scaled_plant_stays_in_the_range_of_every_data_sheet() {
     assert!(told.len() == 1 && told[0].contains(wanted), "{told:#?}");
     let light = scaled(20.0, &axes("\"bench-vq110u\", \"small-12x50\""));
     on("heavy-40x250", &light).expect("no case has the axis of the base");
+}
+
+/// Limits of one's own are the first mistake on the bench: their measures are not judged as a robot's.
+#[test]
+fn bars_on_the_bench_are_one_mistake_whatever_they_say() {
+    for measure in ["overshoot", "speed", "rest-error"] {
+        let bars = format!("[[bars]]\nmeasure = \"{measure}\"\nmax = \"2 mm\"\n");
+        let told = plan(&format!("{HEAD}{BASE}{bars}")).expect_err("no bars");
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert!(
+            told[0].contains("`[[bars]]` do not exist on the bench"),
+            "{told:?}"
+        );
+    }
+}
+
+/// A name that is not known: the value once, and what may be meant.
+#[test]
+fn a_controller_that_is_not_known_is_told_once_with_what_may_be_meant() {
+    let problem = |text: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("plan.toml");
+        fs::write(&path, text).expect("written");
+        let plan = Sources::load(&path.to_string_lossy()).and_then(Plan::of);
+        let error = plan.expect_err("not known");
+        let [problem] = error.problems() else {
+            panic!("{:?}", error.problems())
+        };
+        let help = problem.help_text().unwrap_or_default().to_owned();
+        (problem.summary(), help)
+    };
+    let factor = "[factor.c]\nparameter = \"controller\"\ngrid = [\"predictive\", \"fuzzy\"]\n";
+    for text in [
+        format!("{HEAD}{BASE}{factor}"),
+        format!("{HEAD}{BASE}controller = \"fuzzy\"\n"),
+    ] {
+        let (told, help) = problem(&text);
+        // The list of names has `fuzzy-pd` and `fuzzy-id`.
+        let named = told.replace("fuzzy-pd", "").replace("fuzzy-id", "");
+        assert_eq!(named.matches("fuzzy").count(), 1, "{told}");
+        assert_eq!(help, "did you mean \"fuzzy-pd\"?", "{told}");
+    }
 }

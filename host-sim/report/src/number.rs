@@ -66,6 +66,31 @@ pub fn short(value: f64) -> String {
     }
 }
 
+/// A probability of a test, which is never 0: with three decimals, below 0.001 as a power of ten that it lies below.
+#[must_use]
+pub fn p_value(p: f64) -> String {
+    minus(&p_text(p))
+}
+
+/// The same with the minus of a keyboard and an equals sign, for sentences on terminals: `p = 0.012`, `p < 1e-6`.
+#[must_use]
+pub fn p_equals(p: f64) -> String {
+    let text = p_text(p);
+    match text.starts_with('<') {
+        true => format!("p {text}"),
+        false => format!("p = {text}"),
+    }
+}
+
+fn p_text(p: f64) -> String {
+    if p >= 1e-3 {
+        return format!("{p:.3}");
+    }
+    // Of more than a thousand pairs on one side alone it is below the smallest number.
+    let power = p.max(f64::MIN_POSITIVE).log10().floor() + 1.0;
+    format!("< 1e{power:.0}")
+}
+
 /// A count with a thin space between groups of three digits.
 #[must_use]
 pub fn grouped(count: u64) -> String {
@@ -120,7 +145,7 @@ fn filter(
 }
 
 /// Filters `fixed`, `ms` (of seconds), `percent` (of a share), `signed`, each with the
-/// number of decimals; `trimmed`, `short`, `grouped`, `minus`.
+/// number of decimals; `trimmed`, `p_value`, `short`, `grouped`, `minus`.
 pub(crate) fn add_filters(env: &mut Environment<'_>) {
     type None = Option<String>;
     env.add_filter("fixed", |v: Value, digits: usize, none: None| {
@@ -138,6 +163,7 @@ pub(crate) fn add_filters(env: &mut Environment<'_>) {
     env.add_filter("trimmed", |v: Value, digits: usize| {
         filter(&v, None, |v| trimmed(v, digits))
     });
+    env.add_filter("p_value", |v: Value| filter(&v, None, p_value));
     env.add_filter("short", |v: Value, none: None| filter(&v, none, short));
     env.add_filter("grouped", |v: Value| {
         if v.is_none() {
@@ -204,6 +230,22 @@ mod tests {
             [trimmed(100.0, 0), trimmed(0.25, 6), trimmed(-0.0, 6)],
             ["100", "0.25", "0"]
         );
+    }
+
+    #[test]
+    fn a_probability_is_never_nothing() {
+        for (p, told) in [
+            (1.0, "p = 1.000"),
+            (0.0123, "p = 0.012"),
+            (1e-3, "p = 0.001"),
+            (9.99e-4, "p < 1e-3"),
+            (3.2e-7, "p < 1e-6"),
+            (4e-247, "p < 1e-246"),
+            (0.0, "p < 1e-307"),
+        ] {
+            assert_eq!(p_equals(p), told);
+        }
+        assert_eq!([p_value(0.5), p_value(2e-9)], ["0.500", "< 1e−8"]);
     }
 
     #[test]

@@ -12,6 +12,7 @@ use super::cells::{self, Cell};
 use super::pairs::{self, Paired};
 use super::worst::{Worst, worst};
 use crate::columns::Column;
+use crate::reasons;
 use crate::row::Status;
 use crate::table::Table;
 use crate::{CampaignError, Cases, Setup};
@@ -158,7 +159,8 @@ pub struct Findings {
     pub shared: Vec<String>,
     /// Each target.
     pub targets: Vec<OfTarget>,
-    /// Errors by kind, the most frequent first.
+    /// Errors by kind, the most frequent first, each by an example: those that differ in their numbers alone are of
+    /// one kind.
     pub errors: Vec<(String, u64)>,
     /// What the scenarios stand on; empty of cylinders on the bench.
     pub grounds: Vec<OfScenario>,
@@ -359,12 +361,13 @@ fn quantile(sorted: &[f64], share: f64) -> Option<Quantile> {
 }
 
 fn errors(merged: &Merged) -> Vec<(String, u64)> {
-    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    let mut counts: BTreeMap<String, (&str, u64)> = BTreeMap::new();
     for error in merged.table.texts("error").iter().flatten() {
-        *counts.entry(error).or_default() += 1;
+        let (_, count) = counts.entry(reasons::kind(error)).or_insert((error, 0));
+        *count += 1;
     }
     let mut counts: Vec<(String, u64)> = counts
-        .into_iter()
+        .into_values()
         .map(|(error, count)| (error.to_owned(), count))
         .collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));

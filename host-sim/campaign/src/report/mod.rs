@@ -19,7 +19,7 @@ use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
 pub use findings::{Findings, OfScenario, Rate};
-pub use pairs::{Paired, Pairs};
+pub use pairs::{Change, Paired, Pairs};
 pub use worst::Worst;
 
 /// A merged table with its plan.

@@ -28,10 +28,18 @@ pub struct Split {
 /// One target of pairs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TargetSplit {
-    /// Its column.
-    pub column: Column,
+    /// Its value.
+    #[serde(flatten)]
+    pub change: Change,
     /// Verdicts.
     pub split: Split,
+}
+
+/// How a value differs in pairs.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Change {
+    /// Column of the value.
+    pub column: Column,
     /// Mean of after − before.
     pub mean: Option<f64>,
     /// Its interval, 95 %, by drawing pairs; of very many by the normal distribution.
@@ -47,8 +55,10 @@ pub struct Paired {
     pub pairs: u64,
     /// All required targets met.
     pub passed: Split,
-    /// Each target.
+    /// Each target with limits.
     pub targets: Vec<TargetSplit>,
+    /// Each target without: nothing can be lost or gained.
+    pub values: Vec<Change>,
 }
 
 /// Pairs of two tables.
@@ -165,7 +175,7 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
         }))
     };
     let columns = after.columns.all.iter();
-    let targets = columns
+    let changes = columns
         .filter(|column| after.columns.targets.contains(&column.name))
         .map(|column| {
             let numbers = |of: &Merged, row: usize| -> Option<f64> {
@@ -175,17 +185,23 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
                 .iter()
                 .filter_map(|(i, j)| Some(numbers(after, *j)? - numbers(before, *i)?))
                 .collect();
-            TargetSplit {
-                split: flags(&format!("{}.pass", column.name)),
+            Change {
                 mean: stats::mean(&differences),
                 interval: interval_of_mean(&differences),
                 column: column.clone(),
             }
         });
+    let (limited, values): (Vec<Change>, Vec<Change>) =
+        changes.partition(|change| change.column.has_limits());
+    let targets = limited.into_iter().map(|change| TargetSplit {
+        split: flags(&format!("{}.pass", change.column.name)),
+        change,
+    });
     Paired {
         what,
         pairs: rows.len() as u64,
         targets: targets.collect(),
+        values,
         passed: flags("passed"),
     }
 }

@@ -1,4 +1,5 @@
-//! The cases that are furthest outside of a limit; of those that passed, the nearest to one.
+//! The cases without a result, then those furthest outside of a required limit; of those that passed, the nearest
+//! to one.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -26,7 +27,8 @@ pub struct Worst {
     pub passed: bool,
     /// Values of the factors.
     pub factors: Vec<String>,
-    /// Targets outside of their limits, and by how much of the limit's value.
+    /// Required targets outside of their limits, and by how much of the limit's value; those that were not measured
+    /// first, then the furthest outside.
     pub missed: Vec<String>,
     /// Of a case that passed, the required target nearest to a limit, and by how much of the limit's
     /// value it was met.
@@ -79,65 +81,89 @@ fn percent(share: f64) -> String {
 /// A target with its values and verdicts.
 type Judged<'a> = (&'a Column, &'a [Option<f64>], &'a [Option<bool>]);
 
+/// How bad a case is: the later, the worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Class {
+    /// It met all that is required.
+    Passed,
+    /// It missed a required target.
+    Missed,
+    /// A required target could not be measured.
+    NotMeasured,
+    /// It has no result.
+    NoResult,
+}
+
+/// A required target that a case missed, and by how much of the limit's value; none where it was not measured.
+type Miss<'a> = (&'a Column, Option<f64>);
+
 pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
     let table = &merged.table;
     let (statuses, passed) = (table.texts("status"), table.flags("passed"));
-    let targets: Vec<Judged<'_>> = merged
+    // What only informs makes no case bad.
+    let required: Vec<Judged<'_>> = merged
         .columns
         .all
         .iter()
-        .filter(|column| merged.columns.targets.contains(&column.name))
+        .filter(|column| column.required && merged.columns.targets.contains(&column.name))
         .map(|column| {
             let verdicts = table.flags(&format!("{}.pass", column.name));
             (column, table.numbers(&column.name), verdicts)
         })
         .collect();
-    let missed_in = |row: usize| -> Vec<(&Column, f64)> {
-        let missed = targets.iter().filter(|(.., pass)| pass[row] == Some(false));
-        let missed = missed.map(|(column, values, _)| {
-            // What could not be measured is as bad as can be.
-            let by = values[row].map_or(f64::INFINITY, |value| excess(value, column));
-            (*column, by)
+    let missed_in = |row: usize| -> Vec<Miss<'_>> {
+        let missed = required
+            .iter()
+            .filter(|(.., pass)| pass[row] == Some(false));
+        let missed = missed
+            .map(|(column, values, _)| (*column, values[row].map(|value| excess(value, column))));
+        let mut missed: Vec<Miss<'_>> = missed.collect();
+        missed.sort_by(|(_, a), (_, b)| {
+            let by = |by: &Option<f64>| by.unwrap_or(f64::INFINITY);
+            by(b).total_cmp(&by(a))
         });
-        missed.collect()
-    };
-    // Without a result first, then by the largest excess.
-    let score = |row: usize| -> f64 {
-        if statuses[row].as_deref() != Some(Status::Ok.name()) {
-            return f64::INFINITY;
-        }
-        let by = missed_in(row).into_iter().map(|(_, by)| by);
-        by.fold(0.0, f64::max)
+        missed
     };
     // Of one that passed, the required target with the least room, as a share of the limit.
     let nearest = |row: usize| -> Option<(&Column, f64)> {
-        let required = targets.iter().filter(|(column, ..)| column.required);
-        let rooms =
-            required.filter_map(|(column, values, _)| Some((*column, room(values[row]?, column)?)));
+        let rooms = required
+            .iter()
+            .filter_map(|(column, values, _)| Some((*column, room(values[row]?, column)?)))
+            // Where the case passed without room, its own scenario or move did not ask for it.
+            .filter(|(_, room)| *room >= 0.0);
         rooms.min_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let is_passed = |row: usize| passed[row] == Some(true);
-    // Those that passed come behind all others, and lower with more room.
-    let mut ranked: Vec<(usize, bool, f64)> = (0..table.rows())
-        .map(|row| match is_passed(row) {
-            true => (
-                row,
-                true,
-                -nearest(row).map_or(f64::INFINITY, |(_, room)| room),
-            ),
-            false => (row, false, score(row)),
-        })
-        .collect();
-    ranked.sort_by(|a, b| a.1.cmp(&b.1).then(b.2.total_cmp(&a.2)).then(a.0.cmp(&b.0)));
+    // Within a class by what is measured; less room is worse.
+    let rank = |row: usize| -> (Class, f64) {
+        if statuses[row].as_deref() != Some(Status::Ok.name()) {
+            return (Class::NoResult, 0.0);
+        }
+        if passed[row] == Some(true) {
+            let room = nearest(row).map_or(f64::INFINITY, |(_, room)| room);
+            return (Class::Passed, -room);
+        }
+        let missed = missed_in(row);
+        let furthest = missed.iter().filter_map(|(_, by)| *by).fold(0.0, f64::max);
+        match missed.iter().any(|(_, by)| by.is_none()) {
+            true => (Class::NotMeasured, furthest),
+            false => (Class::Missed, furthest),
+        }
+    };
+    let mut ranked: Vec<(usize, (Class, f64))> =
+        (0..table.rows()).map(|row| (row, rank(row))).collect();
+    // Stable: what is as bad stays in the order of the plan.
+    ranked.sort_by(|(_, (a, by_a)), (_, (b, by_b))| b.cmp(a).then(by_b.total_cmp(by_a)));
     let cases = table.texts("case");
     ranked
         .into_iter()
         .take(WORST)
-        .map(|(row, passed, _)| Worst {
-            passed,
-            nearest: nearest(row).filter(|_| passed).map(|(column, room)| {
-                format!("{} within its limit by {}", column.name, percent(room))
-            }),
+        .map(|(row, (class, _))| Worst {
+            passed: class == Class::Passed,
+            nearest: nearest(row)
+                .filter(|_| class == Class::Passed)
+                .map(|(column, room)| {
+                    format!("{} within its limit by {}", column.name, percent(room))
+                }),
             case: cases[row].clone().unwrap_or_default(),
             status: statuses[row].clone().unwrap_or_default(),
             factors: merged
@@ -153,11 +179,11 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
             missed: missed_in(row)
                 .into_iter()
                 .map(
-                    |(column, by)| match merged.table.numbers(&column.name)[row] {
-                        Some(value) if by.is_finite() => {
+                    |(column, by)| match table.numbers(&column.name)[row].zip(by) {
+                        Some((value, by)) => {
                             format!("{} by {}", column.name, amount(value, by, column))
                         }
-                        _ => format!("{} not measured", column.name),
+                        None => format!("{} not measured", column.name),
                     },
                 )
                 .collect(),

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 use wheeleg_campaign::report::Report;
-use wheeleg_campaign::{Case, Cases, Outcome, Setup, Status, merge, replay, simulate};
+use wheeleg_campaign::{Case, Cases, Outcome, Recording, Setup, Status, merge, replay, simulate};
 use wheeleg_config::bench::Bench;
 use wheeleg_config::plan::Plan;
 use wheeleg_report::number::short;
@@ -120,9 +120,11 @@ fn rows_of_cylinders_are_the_same_however_they_are_run_and_replayed() {
     let replayed = replay(&table, "3", Some(&out), false, &Stop::default());
     let replayed = replayed.expect("replayed").expect("not stopped");
     assert_eq!(
-        (replayed.same_row(), replayed.same_log()),
-        (Some(true), None)
+        (replayed.same_row(), replayed.same_recording()),
+        (Some(true), Some(true))
     );
+    let files = replayed.files.expect("it can be played");
+    assert_eq!(files.result.recording, Recording::Moves);
     for file in [
         "report.html",
         "summary.json",

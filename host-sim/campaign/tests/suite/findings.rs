@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use wheeleg_campaign::{Outcome, Status, merge, report};
+use wheeleg_campaign::{Column, Outcome, Status, merge, report};
+use wheeleg_config::builtin;
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::Stop;
 
@@ -98,6 +99,12 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
         let [least, most] = findings.drawn_between[place].expect("80 values");
         assert!(least <= low && high <= most);
     }
+    // A value without limits is neither lost nor gained.
+    let limited = |column: &Column| column.min.is_some() || column.max.is_some();
+    assert!(pair.targets.iter().all(|t| limited(&t.change.column)));
+    assert!(!pair.values.iter().any(|value| limited(&value.column)));
+    let all = pair.targets.len() + pair.values.len();
+    assert_eq!(all, findings.targets.len());
     let pairs = pairs.expect("compared");
     assert_eq!(
         (pairs.paired.pairs, pairs.same_log, pairs.only_here),
@@ -116,6 +123,8 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
         "Wilson",
         "Spearman",
         "McNemar",
+        "&lt; 1e−", // p is never 0
+        "the first in the factor’s <code>grid</code>",
         "campaign replay",
         "<svg",
     ] {
@@ -293,4 +302,114 @@ fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
         assert!(worst.missed.contains(&"R1 by 132".to_owned()), "{worst:?}");
     }
     assert_eq!(findings.worst.len(), 4);
+}
+
+/// A target that only informs ranks no case, even where it could not be measured; one that is required and could not
+/// be measured stands between the cases without a result and those that missed.
+#[test]
+fn the_worst_cases_are_ranked_by_what_is_required() {
+    let plan = spread(20);
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = merged(folder.path(), &plan, &|index, mut outcome| {
+        // Nothing that only informs was measured in the first cases.
+        for target in &mut outcome.targets {
+            target.pass = target.required || index > 10;
+            target.value = (index > 10).then_some(0.0);
+        }
+        let mut miss = |id: &str, value: Option<f64>| {
+            let target = outcome.targets.iter_mut().find(|target| target.id == id);
+            let target = target.unwrap_or_else(|| panic!("no target {id}"));
+            assert!(target.required && target.max == Some(5.0), "{target:?}");
+            (target.value, target.pass) = (value, false);
+        };
+        // R2 and R3 are allowed up to 5 mm.
+        match index {
+            0 | 3 => miss("R2", Some(37.5)),
+            5 => miss("R2", Some(70.0)),
+            7 => miss("R3", None),
+            9 => {
+                return Outcome {
+                    status: Status::Error,
+                    error: Some("planted".to_owned()),
+                    passed: None,
+                    targets: Vec::new(),
+                    ..outcome
+                };
+            }
+            _ => {}
+        }
+        outcome.passed = Some(![0, 3, 5, 7].contains(&index));
+        outcome
+    });
+    let report = report::Report::of(&table, None).expect("a table");
+    let read = report::Merged::read(&table).expect("a table").table;
+    let cases = read.texts("case");
+    let place = |case: &str| {
+        cases
+            .iter()
+            .position(|known| known.as_deref() == Some(case))
+    };
+    let worst = &report.findings.worst;
+    let places: Vec<_> = worst.iter().map(|w| place(&w.case)).collect();
+    assert_eq!(places[..5], [9, 7, 5, 0, 3].map(Some), "{worst:?}");
+    let told: Vec<String> = worst[..5].iter().map(|w| w.missed.join(", ")).collect();
+    let expected = [
+        "",
+        "R3 not measured",
+        "R2 by 1300 %",
+        "R2 by 650 %",
+        "R2 by 650 %",
+    ];
+    assert_eq!(told, expected);
+    assert!(worst[5..].iter().all(|w| w.passed && w.missed.is_empty()));
+    // The page has the same order.
+    let page = folder.path().join("cases.html");
+    report.write(&page).expect("a page");
+    let html = fs::read_to_string(&page).expect("there");
+    let at = |text: &str| html.rfind(text).unwrap_or_else(|| panic!("no {text}"));
+    assert!(at("R3 not measured") < at("R2 by 1300 %") && at("R2 by 1300 %") < at("R2 by 650 %"));
+}
+
+/// A target that one scenario only tells and the next asks for has the limits of the one that asks; a case that passed
+/// because nobody asked is near to none.
+#[test]
+fn limits_are_those_of_the_scenario_that_asks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let walk = builtin::scenario_source("walk").expect("built in").text;
+    let (head, _) = walk.split_once("[[bars]]").expect("its bars");
+    let scenario = |name: &str, bar: &str| {
+        let path = folder.path().join(name);
+        let text = format!("{head}[[bars]]\nmeasure = \"roll\"\n{bar}\n");
+        fs::write(&path, text).expect("written");
+        path.to_string_lossy().replace('\\', "/")
+    };
+    let [tells, asks] = [
+        ("tells.toml", "info = true"),
+        ("asks.toml", "max = \"4 deg\""),
+    ]
+    .map(|(name, bar)| scenario(name, bar));
+    let plan = plan_of(&format!(
+        "{HEAD}[base]\nscenario = \"{tells}\"\n[factor.scenario]\nparameter = \"scenario\"\n\
+         grid = [\"{tells}\", \"{asks}\"]\n"
+    ));
+    let table = merged(folder.path(), &plan, &|index, mut outcome| {
+        for target in &mut outcome.targets {
+            assert_eq!((target.id.as_str(), target.required), ("roll", index == 1));
+            (target.value, target.pass) = (Some([8.0, 3.0][index as usize]), true);
+        }
+        outcome.passed = Some(true);
+        outcome
+    });
+    let findings = report::Report::of(&table, None).expect("a table").findings;
+    let column = &findings.targets[0].column;
+    assert!(column.required && column.max == Some(4.0), "{column:?}");
+    let cells = findings.targets[0].cells.iter();
+    let met: Vec<_> = cells.map(|c| (c.rate.met, c.rate.of)).collect();
+    assert_eq!(met, [(0, 0), (1, 1)], "only one was asked");
+    let nearest: Vec<_> = findings
+        .worst
+        .iter()
+        .map(|w| w.nearest.as_deref())
+        .collect();
+    assert_eq!(nearest, [Some("roll within its limit by 25 %"), None]);
 }

@@ -245,11 +245,15 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         Some(_) => r.quantity(&top, &limit).map(|s| s.first().copied()),
         None => Some(None),
     };
-    let bars = bars(r, sources);
     let base = base::read(r);
-    if let Some(Base::Axis(_)) = base {
-        ensure_bench_has(r, keep, limit_s, bars.as_ref());
-    }
+    // Bars on the bench are none, whatever they say.
+    let bars = match r.table("base").is_some_and(|base| base.has("axis")) {
+        true => {
+            ensure_bench_has(r, keep, limit_s);
+            None
+        }
+        false => bars(r, sources),
+    };
     let factors = factor::read_all(r);
     let plan = Plan {
         name: name?,
@@ -294,12 +298,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
 }
 
 /// A move on the bench has its own length and its own limits, and is played again in a moment.
-fn ensure_bench_has(
-    r: &mut Reader,
-    keep: Option<KeepLogs>,
-    limit_s: Option<Option<f64>>,
-    bars: Option<&ArrayOfTables>,
-) {
+fn ensure_bench_has(r: &mut Reader, keep: Option<KeepLogs>, limit_s: Option<Option<f64>>) {
     let top = r.table("");
     let none = "not of a cylinder on the bench";
     let mut told = |key: &str, why: &str, help: &str| {
@@ -313,13 +312,11 @@ fn ensure_bench_has(
         let why = "`limit` is of a scenario's time: a move on the bench has its own";
         told("limit", why, "leave `limit` out");
     }
-    if bars.is_some() {
-        let why = "`bars` are of a robot's travel: a cylinder on the bench has limits of its own";
-        told(
-            "bars",
-            why,
-            "leave `bars` out, and judge the columns of the table",
-        );
+    if top.as_ref().is_some_and(|top| top.has("bars")) {
+        let why = "`[[bars]]` do not exist on the bench: they are limits of a robot's travel, and a move has its own";
+        let help = "leave `[[bars]]` out; for limits of your own ask the table, as in \
+            `SELECT count(*) FILTER (abs(\"rest-error\") <= 0.2) FROM 'cases.parquet'`";
+        told("bars", why, help);
     }
     if keep.is_some_and(|keep| keep != KeepLogs::None) {
         let why = "`keep`: a case on the bench has no log; allowed is \"none\"";

@@ -14,6 +14,7 @@ use crate::bench::{Air, Bench, Deviation, Kind, Move, StartUp};
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
+use crate::suggest::closest;
 use crate::terrain::Files;
 use crate::{AxisConfig, RobotConfig, Scenario};
 
@@ -253,7 +254,7 @@ impl<'a> Resolver<'a> {
             Some(Value::Number(share)) => *share,
             _ => base.load_share,
         };
-        ensure_load_share(load_share).map_err(|told| not_possible("load_share", told))?;
+        ensure_load_share(load_share).map_err(|told| not_possible("load_share", told, None))?;
         let bench = Bench {
             axis: sheet.name.clone(),
             motion: named(factors, Setting::Move, base.motion, Move::of_name)?,
@@ -351,17 +352,25 @@ fn named<T>(
     let Some(value) = chosen(factors, setting) else {
         return Ok(base);
     };
-    of_name(&value.to_string()).ok_or_else(|| {
-        let names = setting.names().join(", ");
+    let name = value.to_string();
+    of_name(&name).ok_or_else(|| {
+        let names = setting.names();
+        let help = closest(&name, names.iter().copied());
         not_possible(
             setting.name(),
-            format!("{value} is not known: allowed are {names}"),
+            // Who asked names the value.
+            format!(
+                "no such {}: allowed are {}",
+                setting.name(),
+                names.join(", ")
+            ),
+            help.map(|word| format!("did you mean \"{word}\"?")),
         )
     })
 }
 
-fn not_possible(key: &str, told: String) -> ConfigError {
-    let problem = Problem::whole(&format!("base.{key}"), told, None);
+fn not_possible(key: &str, told: String, help: Option<String>) -> ConfigError {
+    let problem = Problem::whole(&format!("base.{key}"), told, help);
     ConfigError::new("the case is not possible", vec![problem])
 }
 

@@ -7,7 +7,7 @@ use super::judged::{ERROR_MM, Judged, Quantile, judging_root};
 use super::{Comparison, Move, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
-use wheeleg_report::number::{DASH, counted, fixed, listed, or_dash, signed};
+use wheeleg_report::number::{DASH, counted, fixed, listed, or_dash, p_value, signed};
 use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -229,7 +229,7 @@ impl Combined {
                     paired.worse,
                     paired.better,
                     paired.pairs,
-                    fixed(paired.p, 3)
+                    p_value(paired.p)
                 )
             }),
         }

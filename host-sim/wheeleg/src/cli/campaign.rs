@@ -396,7 +396,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode, CampaignError> {
         return Ok(ExitCode::from(stopped()));
     };
     show(&print::replayed(&replayed))?;
-    let same = replayed.same_row() != Some(false) && replayed.same_log() != Some(false);
+    let same = replayed.same_row() != Some(false) && replayed.same_recording() != Some(false);
     if let Some(files) = replayed.files {
         if !tell_unwritten(files.unwritten) {
             return Ok(ExitCode::from(CANNOT_WRITE));

@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Drawing, end, place, settings, whole};
 use wheeleg_config::axis::AXES;
+use wheeleg_report::number::p_equals;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::{Kind, ValveResolution};
 use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
@@ -24,11 +26,11 @@ pub(super) struct CompareArgs {
     #[arg(long = "axis", value_name = "AXIS")]
     axes: Vec<String>,
     /// Controller; may be given several times [default: all].
-    #[arg(long = "controller", value_name = "NAME", value_parser = controller)]
+    #[arg(long = "controller", value_name = "NAME", value_parser = controller())]
     controllers: Vec<Kind>,
     /// Move; may be given several times [default: all with the data-sheet values;
     /// step-100 and s-curve with changed factors].
-    #[arg(long = "move", value_name = "MOVE", value_parser = motion)]
+    #[arg(long = "move", value_name = "MOVE", value_parser = motion())]
     moves: Vec<Move>,
     /// Number of seeds for the cases with the data-sheet values.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
@@ -71,13 +73,15 @@ pub(super) struct CompareArgs {
     json: bool,
 }
 
-/// A controller by its name.
-pub(super) fn controller(name: &str) -> Result<Kind, String> {
-    Kind::of_name(name).ok_or_else(|| format!("known: {}", Kind::ALL.map(Kind::name).join(", ")))
+/// A controller by its name; the help lists them.
+pub(super) fn controller() -> impl TypedValueParser<Value = Kind> {
+    let names = PossibleValuesParser::new(Kind::ALL.map(Kind::name));
+    names.map(|name| Kind::of_name(&name).expect("one of the names"))
 }
 
-fn motion(name: &str) -> Result<Move, String> {
-    Move::of_name(name).ok_or_else(|| format!("known: {}", Move::ALL.map(Move::name).join(", ")))
+fn motion() -> impl TypedValueParser<Value = Move> {
+    let names = PossibleValuesParser::new(Move::ALL.map(Move::name));
+    names.map(|name| Move::of_name(&name).expect("one of the names"))
 }
 
 /// What was given, each once; all if nothing was.
@@ -216,8 +220,11 @@ fn combinations(comparison: &Comparison) -> String {
         if let Some(paired) = judged.paired {
             let _ = write!(
                 out,
-                "; against the other version {} worse, {} better of {}, p {:.3}",
-                paired.worse, paired.better, paired.pairs, paired.p
+                "; against the other version {} worse, {} better of {}, {}",
+                paired.worse,
+                paired.better,
+                paired.pairs,
+                p_equals(paired.p)
             );
         }
         out.push('\n');

@@ -59,7 +59,7 @@ struct FmuArgs {
     #[arg(long, value_enum, default_value = "2")]
     fmi: Version,
     /// Control law of a controlled unit.
-    #[arg(long, value_name = "LAW", default_value = "predictive", value_parser = controller)]
+    #[arg(long, value_name = "LAW", default_value = "predictive", value_parser = controller())]
     law: Law,
     /// The unit's shared library [default: beside this program].
     #[arg(long, value_name = "FILE")]

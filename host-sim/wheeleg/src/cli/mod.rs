@@ -85,7 +85,7 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Run a scenario many times: factors, shards, one table, replay.
     Campaign(campaign::CampaignArgs),
-    /// List the built-in scenarios and robots.
+    /// List what is built in: scenarios, robots, axes, plans, moves and controllers.
     List(list::ListArgs),
     /// Print every parameter of a robot: value, unit, range, source, meaning.
     Params(params::ParamsArgs),

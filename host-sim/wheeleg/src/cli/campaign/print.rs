@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
 use wheeleg_campaign::{
-    CAUSES, Cases, Causes, MergeForm, Merged, Ran, Replayed, ReportForm, Shard, State, Status,
-    StatusForm, Store, Submission,
+    CAUSES, Cases, Causes, MergeForm, Merged, Ran, Recording, Replayed, ReportForm, Shard, State,
+    Status, StatusForm, Store, Submission,
 };
+use wheeleg_report::number::p_equals;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::schema;
 
@@ -206,7 +207,11 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
         "row     {}",
         match replayed.same_row() {
             Some(true) => "bit-identical".to_owned(),
-            Some(false) => format!("DIFFERS from that of `{}`", replayed.program),
+            Some(false) => format!(
+                "DIFFERS from that of `{}` in {}",
+                replayed.program,
+                in_short(&replayed.differs)
+            ),
             None => "none before".to_owned(),
         }
     );
@@ -214,13 +219,30 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
         let _ = writeln!(out, "hash    {hash}");
     }
     if let Some(files) = &replayed.files {
-        let log = match replayed.same_log() {
+        let same = match replayed.same_recording() {
             Some(true) => "bit-identical",
             Some(false) => "DIFFERS",
             None => "not compared",
         };
-        let _ = writeln!(out, "log     {log}");
+        let what = match files.result.recording {
+            Recording::Log => "log  ",
+            Recording::Moves => "moves",
+        };
+        let _ = writeln!(out, "{what}   {same}");
         let _ = writeln!(out, "report  {}", files.report.display());
+    }
+    out
+}
+
+/// Columns that are named where a row differs.
+const COLUMNS: usize = 8;
+
+/// The first columns of a list, and how many more there are.
+fn in_short(columns: &[String]) -> String {
+    let more = columns.len().saturating_sub(COLUMNS);
+    let mut out = columns[..columns.len() - more].join(", ");
+    if more > 0 {
+        let _ = write!(out, " and {more} more columns");
     }
     out
 }
@@ -300,8 +322,12 @@ fn listed(lines: impl ExactSizeIterator<Item = String>, before: &str, after: &st
 
 fn pair(p: &Paired) -> String {
     format!(
-        "paired  {}: {} lost, {} gained, {} the same (p = {:.3})",
-        p.what, p.passed.lost, p.passed.gained, p.passed.same, p.passed.p
+        "paired  {}: {} lost, {} gained, {} the same ({})",
+        p.what,
+        p.passed.lost,
+        p.passed.gained,
+        p.passed.same,
+        p_equals(p.passed.p)
     )
 }
 
@@ -323,6 +349,17 @@ mod tests {
             own.len(),
             own.last().copied().unwrap_or_default().to_owned(),
         )
+    }
+
+    #[test]
+    fn of_many_columns_that_differ_the_first_are_named() {
+        let columns: Vec<String> = (0..10).map(|i| format!("c{i}")).collect();
+        assert_eq!(in_short(&columns[..2]), "c0, c1");
+        let told = in_short(&columns);
+        assert!(
+            told.starts_with("c0, ") && told.ends_with("c7 and 2 more columns"),
+            "{told}"
+        );
     }
 
     #[test]
