@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::columns::{Column, Columns};
-use crate::reasons;
 use crate::row::{Figure, Row, Status};
 use crate::table::Table;
 
-/// Kinds that are told apart.
+/// Kinds that are told apart; messages of errors may all differ.
 const KINDS: usize = 1000;
 
 /// What made a case fail. Those without a result come first.
@@ -17,8 +16,8 @@ pub enum Cause {
     NoResult {
         /// How it ended.
         status: Status,
-        /// What it said, with a `#` for each number: of the same kind are those that differ in nothing else.
-        kind: String,
+        /// What it said.
+        message: String,
     },
     /// A required target lies outside of its limits.
     Missed {
@@ -37,9 +36,6 @@ pub enum Cause {
 pub struct Causes {
     required: Vec<Column>,
     counts: BTreeMap<Cause, u64>,
-    /// Of each kind of cases without a result, what one of them said: the first by the alphabet, whatever the order
-    /// in which they are counted.
-    examples: BTreeMap<Cause, String>,
     /// Of kinds beyond the most that are told apart.
     others: u64,
 }
@@ -119,21 +115,12 @@ impl Causes {
     #[must_use]
     pub fn message(&self, cause: &Cause) -> String {
         match cause {
-            Cause::NoResult { status, .. } => {
-                let example = self.example(cause).unwrap_or_default();
-                format!("{}: {example}", status.name())
-            }
+            Cause::NoResult { status, message } => format!("{}: {message}", status.name()),
             Cause::Missed { target } => format!("{target} missed{}", self.asked(target)),
             Cause::NotMeasured { target } => {
                 format!("{target} not measured{}", self.asked(target))
             }
         }
-    }
-
-    /// What one of the cases without a result said; none of a target.
-    #[must_use]
-    pub fn example(&self, cause: &Cause) -> Option<&str> {
-        self.examples.get(cause).map(String::as_str)
     }
 
     fn asked(&self, target: &str) -> String {
@@ -157,20 +144,8 @@ impl Causes {
         figures: impl Iterator<Item = (&'a str, Figure)>,
     ) {
         if status != Status::Ok {
-            let message = error.unwrap_or_default();
-            let kind = reasons::kind(message);
-            let cause = Cause::NoResult { status, kind };
-            self.one(cause.clone());
-            if self.counts.contains_key(&cause) {
-                let example = self
-                    .examples
-                    .entry(cause)
-                    .or_insert_with(|| message.to_owned());
-                if message < example.as_str() {
-                    message.clone_into(example);
-                }
-            }
-            return;
+            let message = error.unwrap_or_default().to_owned();
+            return self.one(Cause::NoResult { status, message });
         }
         for (target, figure) in figures {
             let required = self.required.iter().any(|column| column.name == target);

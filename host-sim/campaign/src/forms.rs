@@ -53,7 +53,7 @@ pub struct CauseForm {
     /// Target that was missed or not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
-    /// What one of the cases without a result reported; others may differ in its numbers.
+    /// What a case without a result reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
     /// Number of cases.
@@ -80,16 +80,14 @@ impl StatusForm {
         let causes = state.causes.first(CAUSES).into_iter();
         let causes = causes.map(|(cause, cases)| {
             let (cause, target, message) = match cause {
-                Cause::NoResult { status, .. } => {
-                    (status.name(), None, state.causes.example(cause))
-                }
+                Cause::NoResult { status, message } => (status.name(), None, Some(message)),
                 Cause::Missed { target } => ("missed", Some(target), None),
                 Cause::NotMeasured { target } => ("not-measured", Some(target), None),
             };
             CauseForm {
                 cause,
                 target: target.cloned(),
-                message: message.map(str::to_owned),
+                message: message.cloned(),
                 cases,
             }
         });

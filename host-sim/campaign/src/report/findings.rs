@@ -12,7 +12,6 @@ use super::cells::{self, Cell};
 use super::pairs::{self, Paired};
 use super::worst::{Worst, worst};
 use crate::columns::Column;
-use crate::reasons;
 use crate::row::Status;
 use crate::table::Table;
 use crate::{CampaignError, Cases, Setup};
@@ -159,8 +158,7 @@ pub struct Findings {
     pub shared: Vec<String>,
     /// Each target.
     pub targets: Vec<OfTarget>,
-    /// Errors by kind, the most frequent first, each by an example: those that differ in their numbers alone are of
-    /// one kind.
+    /// Errors by kind, the most frequent first.
     pub errors: Vec<(String, u64)>,
     /// What the scenarios stand on; empty of cylinders on the bench.
     pub grounds: Vec<OfScenario>,
@@ -361,13 +359,12 @@ fn quantile(sorted: &[f64], share: f64) -> Option<Quantile> {
 }
 
 fn errors(merged: &Merged) -> Vec<(String, u64)> {
-    let mut counts: BTreeMap<String, (&str, u64)> = BTreeMap::new();
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for error in merged.table.texts("error").iter().flatten() {
-        let (_, count) = counts.entry(reasons::kind(error)).or_insert((error, 0));
-        *count += 1;
+        *counts.entry(error).or_default() += 1;
     }
     let mut counts: Vec<(String, u64)> = counts
-        .into_values()
+        .into_iter()
         .map(|(error, count)| (error.to_owned(), count))
         .collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));

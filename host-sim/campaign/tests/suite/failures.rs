@@ -2,9 +2,7 @@
 
 use std::fs;
 
-use wheeleg_campaign::{
-    CampaignError, Cause, Outcome, Shard, Status, Store, merge, report, status,
-};
+use wheeleg_campaign::{CampaignError, Cause, Outcome, Shard, Status, Store, merge, status};
 use wheeleg_studies::study::Stop;
 
 use crate::common::{computed, options, parts, run_in, spread};
@@ -42,9 +40,9 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
     assert!(state.failed >= 3 && state.missing.is_empty());
     // Those without a result first, then targets; whoever ran it is told the same.
     let causes = state.causes.first(20);
-    let no_result = |status, kind: &str| Cause::NoResult {
+    let no_result = |status, message: &str| Cause::NoResult {
         status,
-        kind: kind.to_owned(),
+        message: message.to_owned(),
     };
     let told: Vec<(String, u64)> = causes
         .iter()
@@ -73,47 +71,6 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
     assert!(told.starts_with("planted in 3 (failures.rs:"), "{told}");
     assert_eq!(errors[5].as_deref(), Some("planted"));
     assert_eq!(read.flags("passed")[5], None);
-}
-
-/// Reasons that differ in their numbers alone are one, told by an example, on the console and on the page.
-#[test]
-fn reasons_that_differ_in_their_numbers_are_one() {
-    let plan = spread(10);
-    let folder = tempfile::tempdir().expect("a folder");
-    let (ran, _) = run_in(folder.path(), &plan, &options(2), &|case| {
-        let index = case.place.index;
-        let outcome = computed(case);
-        let told = match index {
-            0..8 => format!("`friction.static` ({}.5 N) is too small", 13 + index),
-            8 => "`friction.coulomb` (13.5 N) is too small".to_owned(),
-            _ => return Some(outcome),
-        };
-        Some(Outcome {
-            status: Status::Error,
-            error: Some(told),
-            passed: None,
-            targets: Vec::new(),
-            ..outcome
-        })
-    });
-    let causes = ran.expect("it runs").causes;
-    let state = status(&Store::open(folder.path()).expect("a folder"), Shard::ALL);
-    assert_eq!(state.expect("readable").causes, causes);
-    let told: Vec<(String, u64)> = causes
-        .first(2)
-        .iter()
-        .map(|(cause, cases)| (causes.message(cause), *cases))
-        .collect();
-    let expected = [
-        ("error: `friction.static` (13.5 N) is too small", 8),
-        ("error: `friction.coulomb` (13.5 N) is too small", 1),
-    ];
-    assert_eq!(told, expected.map(|(told, n)| (told.to_owned(), n)));
-    let table = folder.path().join("cases.parquet");
-    merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
-    let findings = report::Report::of(&table, None).expect("a table").findings;
-    let counts: Vec<u64> = findings.errors.iter().map(|(_, cases)| *cases).collect();
-    assert_eq!(counts, [8, 1], "{:?}", findings.errors);
 }
 
 #[test]
