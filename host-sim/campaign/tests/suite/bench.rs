@@ -291,3 +291,24 @@ fn the_shipped_plan_makes_cases() {
         assert!(case.setup.is_ok(), "{index}: {:?}", case.setup.err());
     }
 }
+
+/// What no law can keep informs; of moves that keep their load it is required.
+#[test]
+fn a_move_is_judged_by_the_limits_that_are_meant_for_it() {
+    let plan = plan_of(&format!(
+        "{HEAD}[base]\naxis = \"bench-vq110u\"\n[factor.m]\nparameter = \"move\"\n\
+         grid = [\"contact-helped\", \"step-100\"]\n"
+    ));
+    let cases = Cases::new(&plan).expect("a plan");
+    let column = cases.columns().all.iter().find(|c| c.name == "overshoot");
+    let column = column.expect("both have it");
+    assert_eq!((column.required, column.max), (true, Some(6.0)));
+    for index in 0..2 {
+        let outcome = played(&cases.case(index)).expect("not stopped");
+        let overshoot = outcome.targets.iter().find(|t| t.id == "overshoot");
+        let overshoot = overshoot.expect("measured");
+        assert_eq!(overshoot.required, index == 1, "{overshoot:?}");
+        assert_eq!(outcome.passed, Some(true), "{:?}", outcome.targets);
+    }
+    assert!(figures(&plan, "overshoot")[0] > Some(6.0));
+}
