@@ -150,7 +150,7 @@ const QUANTITIES: [Quantity; 15] = [
 fn of_figures(motion: Move, figures: &Figures) -> impl Iterator<Item = Target> {
     let own = QUANTITIES.iter();
     let own = own.filter(move |q| Figures::has(motion, q.value));
-    own.map(|q| {
+    own.map(move |q| {
         let value = (q.value)(figures);
         match q.limits.of(motion) {
             Some([min, max]) => {
