@@ -3,7 +3,6 @@
 use wheeleg_plant::axis::AxisParams;
 
 use crate::params::ParameterInfo;
-use crate::plan::factor_between;
 
 /// Names of an enum without values, each with its meaning.
 macro_rules! named {
@@ -135,7 +134,7 @@ impl Deviation {
             Some((info, own))
         });
         let of = |(info, own): (&ParameterInfo, &ParameterInfo)| -> Vec<Self> {
-            let to_sheet = factor_between(info, &own.unit);
+            let to_sheet = info.factor_from(&own.unit);
             let values = info.value.iter().zip(&own.value).enumerate();
             let other = values.filter(|(_, (sheet, plant))| **sheet != **plant * to_sheet);
             let many = info.value.len() > 1;

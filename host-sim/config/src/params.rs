@@ -140,6 +140,15 @@ impl ParameterInfo {
         }
     }
 
+    /// Factor from a unit to that of the file; 1 if only one is accepted.
+    pub(crate) fn factor_from(&self, unit: &str) -> f64 {
+        let si = |unit: &str| self.dimension.and_then(|d| d.factor(unit));
+        match (si(unit), si(&self.unit)) {
+            (Some(from), Some(to)) if unit != self.unit => from / to,
+            _ => 1.0,
+        }
+    }
+
     /// The allowed range as text.
     #[must_use]
     pub fn range_text(&self) -> String {

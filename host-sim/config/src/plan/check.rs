@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::base::Base;
 use super::distribution::Distribution;
 use super::factor::{Factor, Field, Part, Sets, Values};
-use super::field::{Template, factor_between, written};
+use super::field::{Template, written};
 use super::resolve::Resolver;
 use super::value::Value;
 use super::{Plan, distribution};
@@ -301,7 +301,7 @@ fn scaled(
         let stated = extremes(sheet).into_iter().map(|number| {
             let (values, unit) = written(info, Some(place), sheet, number);
             Scaled {
-                value: values[place] * factor_between(info, &unit),
+                value: values[place] * info.factor_from(&unit),
                 origin: format!("`factor.{}`", sheet.name),
             }
         });
@@ -378,7 +378,7 @@ fn range(
         factor.unit.clone()
     };
     // Units of the file in one of the factor.
-    let to_file = factor_between(info, &unit);
+    let to_file = info.factor_from(&unit);
     let (min, max) = (info.min / to_file, info.max / to_file);
     let allowed = |v: f64| {
         let slack = 4.0 * f64::EPSILON * v.abs();

@@ -11,7 +11,6 @@ use crate::LawChoice;
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
-use crate::quantity::Dimension;
 use crate::terrain::Data;
 
 /// A file that factors change: its name, its text, and every quantity in it.
@@ -127,16 +126,7 @@ pub(super) fn written(
         return (vec![number], unit);
     }
     // The other components are in the file's unit.
-    let number = number * factor_between(info, &unit);
+    let number = number * info.factor_from(&unit);
     let mixed = each.map(|(i, v)| if at(i) { number } else { *v });
     (mixed.collect(), info.unit.clone())
-}
-
-/// Factor from a unit to that of the file; 1 if only one is accepted.
-pub(crate) fn factor_between(info: &ParameterInfo, unit: &str) -> f64 {
-    let si = |unit: &str| info.dimension.and_then(|d: Dimension| d.factor(unit));
-    match (si(unit), si(&info.unit)) {
-        (Some(from), Some(to)) if unit != info.unit => from / to,
-        _ => 1.0,
-    }
 }

@@ -24,7 +24,6 @@ mod value;
 pub use base::{AxisBase, Base, Setting};
 pub use distribution::{Choice, Distribution};
 pub use factor::{Factor, Field, Part, Sets, Values};
-pub(crate) use field::factor_between;
 pub use resolve::{OnBench, OnRobot, Resolved, Resolver};
 pub use sources::{Sources, Text};
 pub use value::Value;
