@@ -247,10 +247,8 @@ A value is the worse of the measured moves. The first move after power-up, in wh
 it has `first-overshoot` and `first-settling`, and counts in `stopped` and `faults`. [What each move \
 is](../guide/campaigns.md#what-is-played-and-judged).
 
-- `rest-error` is reference − stroke: positive, the rod has come out too little.
-- `margin` is the force left, as [`load_share`](../guide/campaigns.md#the-load) means it, divided by the magnitude of the load \
-at rest; the load of a contact is not in it.
-- `valve-resolution` is of the data sheet, whatever the plant is.
+- A positive `rest-error`: the rod has come out too little.
+- The force left of `margin` is that of [`load_share`](../guide/campaigns.md#the-load); the load of a contact is not in it.
 - A column exists if a move of the plan has it, and is NULL in cases of other moves: `rest-edges` is of `hold`; `recovery` of \
 `contact` and `contact-helped`; `settling` and `rise` of these two and of steps; `overshoot` of all but `sine` and `hold`.
 

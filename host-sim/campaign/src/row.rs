@@ -93,8 +93,13 @@ impl Row {
     /// Whether it counts as failed: a required target missed, or no result.
     #[must_use]
     pub fn is_failed(&self) -> bool {
-        self.passed != Some(true)
+        is_failed(self.passed)
     }
+}
+
+/// Whether a row whose column `passed` says this counts as failed: also one without a result.
+pub(crate) fn is_failed(passed: Option<bool>) -> bool {
+    passed != Some(true)
 }
 
 /// Names of the columns in which two rows of a case differ, to the bit.

@@ -7,7 +7,7 @@ use crate::CampaignError;
 use crate::attempts::Attempts;
 use crate::causes::Causes;
 use crate::part;
-use crate::row::Status;
+use crate::row::{Status, is_failed};
 use crate::shard::Shard;
 use crate::store::Store;
 
@@ -93,7 +93,7 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
                 }
                 state.rows += 1;
                 state.partial += u64::from(unfinished);
-                state.failed += u64::from(*passed != Some(true));
+                state.failed += u64::from(is_failed(*passed));
                 state.causes.add_seen(&why, at);
                 let known = status.as_deref().and_then(Status::named);
                 if let Some(known) = known {

@@ -13,7 +13,7 @@ use crate::cases::Cases;
 use crate::compute::{Simulate, row, row_of};
 use crate::isolate::{Isolated, isolate};
 use crate::part::{self, Effort};
-use crate::row::{Row, Status};
+use crate::row::{Row, Status, is_failed};
 use crate::simulate::Outcome;
 use crate::store::{Store, write_whole};
 
@@ -167,7 +167,7 @@ impl Work<'_> {
                 let pilot =
                     (table.rows() as u64).min(self.first - self.store.cases_of(number).start);
                 let passed = table.flags("passed").iter().take(pilot as usize);
-                let failed = passed.filter(|passed| **passed != Some(true)).count();
+                let failed = passed.filter(|passed| is_failed(**passed)).count();
                 (self.found)(pilot, failed as u64);
                 return Ok(None);
             }

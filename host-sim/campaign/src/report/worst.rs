@@ -97,6 +97,14 @@ enum Class {
 /// A required target that a case missed, and by how much of the limit's value; none where it was not measured.
 type Miss<'a> = (&'a Column, Option<f64>);
 
+/// Misses in the order in which they are told: those that were not measured, then the furthest.
+fn furthest_first<'a>(missed: impl Iterator<Item = Miss<'a>>) -> Vec<Miss<'a>> {
+    let mut missed: Vec<Miss<'a>> = missed.collect();
+    let by = |(_, by): &Miss<'_>| by.unwrap_or(f64::INFINITY);
+    missed.sort_by(|a, b| by(b).total_cmp(&by(a)));
+    missed
+}
+
 pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
     let table = &merged.table;
     let (statuses, passed) = (table.texts("status"), table.flags("passed"));
@@ -111,18 +119,13 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
             (column, table.numbers(&column.name), verdicts)
         })
         .collect();
-    let missed_in = |row: usize| -> Vec<Miss<'_>> {
+    let missed_in = |row: usize| {
         let missed = required
             .iter()
-            .filter(|(.., pass)| pass[row] == Some(false));
-        let missed = missed
-            .map(|(column, values, _)| (*column, values[row].map(|value| excess(value, column))));
-        let mut missed: Vec<Miss<'_>> = missed.collect();
-        missed.sort_by(|(_, a), (_, b)| {
-            let by = |by: &Option<f64>| by.unwrap_or(f64::INFINITY);
-            by(b).total_cmp(&by(a))
-        });
-        missed
+            .filter(move |(.., pass)| pass[row] == Some(false));
+        missed.map(move |(column, values, _)| -> Miss<'_> {
+            (*column, values[row].map(|value| excess(value, column)))
+        })
     };
     // Of one that passed, the required target with the least room, as a share of the limit.
     let nearest = |row: usize| -> Option<(&Column, f64)> {
@@ -142,9 +145,8 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
             let room = nearest(row).map_or(f64::INFINITY, |(_, room)| room);
             return (Class::Passed, -room);
         }
-        let missed = missed_in(row);
-        let furthest = missed.iter().filter_map(|(_, by)| *by).fold(0.0, f64::max);
-        match missed.iter().any(|(_, by)| by.is_none()) {
+        let furthest = missed_in(row).filter_map(|(_, by)| by).fold(0.0, f64::max);
+        match missed_in(row).any(|(_, by)| by.is_none()) {
             true => (Class::NotMeasured, furthest),
             false => (Class::Missed, furthest),
         }
@@ -176,7 +178,7 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
                     None => String::new(),
                 })
                 .collect(),
-            missed: missed_in(row)
+            missed: furthest_first(missed_in(row))
                 .into_iter()
                 .map(
                     |(column, by)| match table.numbers(&column.name)[row].zip(by) {
