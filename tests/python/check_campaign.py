@@ -40,6 +40,15 @@ def check_cylinder(rows, failed, axes, thirds, pairs, worst) -> None:
     assert len(worst) <= min(5, failed), worst
 
 
+def check_first_step(rows, failed, axes, regions, worst) -> None:
+    assert sum(row[2] for row in axes) == rows, axes
+    assert failed == sum(row[3] for row in axes), axes
+    assert sum(row[3] for row in regions) == rows // 2, regions
+    for *_, cases, missed, low, high in regions:
+        assert low - 1e-9 <= 100 * missed / cases <= high + 1e-9, regions
+    assert len(worst) <= min(5, failed), worst
+
+
 def check_leg(rows, failed, *answers) -> None:
     # Macros and views answer nothing.
     *_, legs, sets, ratios, terrains, told = answers
@@ -101,6 +110,7 @@ def main() -> int:
         "how-steep": check_steep,
         "leg-design": check_leg,
         "cylinder-spread": check_cylinder,
+        "first-step": check_first_step,
     }[Path(sql).stem]
     check(rows, failed, *answers)
     print(f"duckdb {duckdb.__version__}: {rows} rows, {len(columns)} columns, {answers[0]}")

@@ -66,6 +66,11 @@ const SHIPPED: [Shipped; 4] = [
         cuts: &[("samples = 250", "samples = 4")],
         rows: 32,
     },
+    Shipped {
+        plan: "first-step",
+        cuts: &[("samples = 250", "samples = 8")],
+        rows: 64,
+    },
 ];
 
 /// The shipped plans, cut short, their tables and their SQL in DuckDB.
@@ -200,7 +205,7 @@ pub(crate) fn pairs() -> StepResult<String> {
 const ROWS: u64 = 1_000_000;
 const ROWS_VARIABLE: &str = "WHEELEG_CYLINDER_ROWS";
 
-/// The shipped spread of cylinders, with more samples: run, merged and told. Its folder is kept: stopped or killed,
+/// The shipped first steps, with more samples: run, merged and told. Its folder is kept: stopped or killed,
 /// the same command goes on, with the same program and number.
 pub(crate) fn cylinder_rows() -> StepResult<String> {
     let rows = match std::env::var(ROWS_VARIABLE) {
@@ -220,7 +225,10 @@ pub(crate) fn cylinder_rows() -> StepResult<String> {
     let samples = rows.div_ceil(8);
     let rows = 8 * samples;
     let samples = format!("samples = {samples}");
-    let plan = replaced("cylinder-spread", &[("samples = 250", &samples)])?;
+    let plan = replaced(
+        "first-step",
+        &[("samples = 250", &samples), ("block = 500", "block = 4000")],
+    )?;
     let name = |what: &str| folder.join(format!("{rows}{what}"));
     let [file, parts, table] = [name(".toml"), name(""), name(".parquet")];
     fs::write(&file, plan).context("the plan")?;

@@ -63,6 +63,8 @@ named! {
 named! {
     /// Motion of a case.
     Move {
+        /// 100 mm from power-up, in 2 s, with nothing learnt.
+        FirstStep = "first-step",
         /// 20 mm back and out.
         Step20 = "step-20",
         /// 100 mm back and out.
@@ -81,6 +83,17 @@ named! {
 }
 
 impl Move {
+    /// Those that follow a first move, in which the board learns: what is compared and tuned by.
+    pub const LEARNT: [Self; 7] = [
+        Self::Step20,
+        Self::Step100,
+        Self::SCurve,
+        Self::Sine,
+        Self::Hold,
+        Self::Contact,
+        Self::ContactHelped,
+    ];
+
     /// Whether contact is lost and regained.
     #[must_use]
     pub const fn loses_contact(self) -> bool {

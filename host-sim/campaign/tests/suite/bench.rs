@@ -282,14 +282,44 @@ fn the_simulated_time_is_that_of_all_moves() {
 
 /// All cases of the first samples can be simulated.
 #[test]
-fn the_shipped_plan_makes_cases() {
-    let plan = Plan::load("cylinder-spread").expect("built in");
-    let cases = Cases::new(&plan).expect("a plan");
-    cases.ensure_possible().expect("some can be");
-    for index in 0..16 {
-        let case = cases.case(index);
-        assert!(case.setup.is_ok(), "{index}: {:?}", case.setup.err());
+fn the_shipped_plans_make_cases() {
+    for name in ["cylinder-spread", "first-step"] {
+        let plan = Plan::load(name).expect("built in");
+        let cases = Cases::new(&plan).expect("a plan");
+        cases.ensure_possible().expect("some can be");
+        for index in 0..16 {
+            let case = cases.case(index);
+            assert!(
+                case.setup.is_ok(),
+                "{name}, {index}: {:?}",
+                case.setup.err()
+            );
+        }
     }
+}
+
+/// The first step is what is measured: nothing is played before it, and nothing after.
+#[test]
+fn the_first_step_is_judged_itself() {
+    let plan = plan_of(&format!(
+        "{HEAD}[base]\naxis = \"bench-vq110u\"\nmove = \"first-step\"\n"
+    ));
+    let case = Cases::new(&plan).expect("a plan").case(0);
+    let played = wheeleg_studies::bench::play(&bench_of(&case), case.seed).expect("it plays");
+    let names: Vec<String> = played.played.traces().map(|(name, _)| name).collect();
+    assert_eq!(names, ["measured-1"]);
+    assert!((played.simulated_s - 2.0).abs() < 1e-6);
+    let trace = &played.played.measured[0];
+    let start = &trace.rows[0];
+    let end = &trace.rows[trace.rows.len() - 1];
+    assert!((start.stroke_m - 0.04).abs() < 1e-4, "{}", start.stroke_m);
+    assert!((end.stroke_m - 0.14).abs() < 5e-4, "{}", end.stroke_m);
+    let outcome = self::played(&case).expect("not stopped");
+    assert_eq!(outcome.passed, Some(true), "{:?}", outcome.targets);
+    let rise = outcome.targets.iter().find(|t| t.id == "rise");
+    let rise_s = rise.and_then(|t| t.value).expect("measured");
+    assert!((0.05..0.5).contains(&rise_s), "{rise_s}");
+    assert!(!outcome.targets.iter().any(|t| t.id.starts_with("first-")));
 }
 
 /// What no law can keep informs; of moves that keep their load it is required.

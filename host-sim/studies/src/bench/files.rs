@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_config::bench::Bench;
+use wheeleg_config::bench::{Bench, Move};
 use wheeleg_report::number::{counted, listed};
 use wheeleg_report::plot::Figure;
 use wheeleg_report::results::CSV;
@@ -122,15 +122,16 @@ pub fn write(
         let mut figures: Vec<Figure> = Vec::new();
         for (name, trace) in case.played.traces() {
             job.keep(job.save(&format!("{CSV}/{name}.csv"), &trace_csv(trace)));
-            figures.push(trace_figure(&name, title(&name), trace));
+            figures.push(trace_figure(&name, title(bench.motion, &name), trace));
         }
         let drawn = job.draw(figures);
         (render(summary, &drawn), drawn)
     }))
 }
 
-fn title(name: &str) -> &str {
+fn title(motion: Move, name: &str) -> &str {
     match name {
+        _ if motion == Move::FirstStep => "The first move after power-up",
         "first" => "The first move after power-up",
         "measured-1" => "The first measured move",
         _ => "The second measured move",

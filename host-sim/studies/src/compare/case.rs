@@ -354,8 +354,8 @@ impl Figures {
         let all: Vec<Metrics> = played.measured.iter().map(Metrics::of).collect();
         let of = |f: &dyn Fn(&Metrics) -> f64| worst(all.iter().map(|m| Some(f(m))));
         let steady = all.iter().map(|m| m.steady_error_mm);
-        let first = Metrics::of(&played.first);
-        let traces = || std::iter::once(&played.first).chain(&played.measured);
+        let first = played.first.as_ref().map(Metrics::of);
+        let traces = || played.first.iter().chain(&played.measured);
         let faults = traces().fold(FaultBits::NONE, |bits, t| bits.union(t.faults));
         let fault_names: Vec<&str> = faults.iter().map(|f| f.name()).collect();
         let reversals = all.iter().map(|m| m.reversals).max();
@@ -382,9 +382,9 @@ impl Figures {
                         .map(|(m, b)| m.settle_s.map(|s| s / b)),
                 )
             }),
-            first_overshoot_mm: Some(first.overshoot_mm),
-            first_settle_s: first.settle_s,
-            first_steady_error_mm: Some(first.steady_error_mm),
+            first_overshoot_mm: first.as_ref().map(|m| m.overshoot_mm),
+            first_settle_s: first.as_ref().and_then(|m| m.settle_s),
+            first_steady_error_mm: first.as_ref().map(|m| m.steady_error_mm),
             faults: fault_names.join(" "),
             stopped: Some(traces().any(|t| !t.drove)),
         };
@@ -422,7 +422,8 @@ impl Figures {
 
     /// Without what a move does not have.
     fn only_of(self, motion: Move) -> Self {
-        let is_step = matches!(motion, Move::Step20 | Move::Step100) || motion.loses_contact();
+        let is_step = matches!(motion, Move::FirstStep | Move::Step20 | Move::Step100) || motion.loses_contact();
+        let learnt = motion != Move::FirstStep;
         let arrives = !matches!(motion, Move::Sine | Move::Hold);
         Self {
             overshoot_mm: self.overshoot_mm.filter(|_| arrives),
@@ -432,6 +433,9 @@ impl Figures {
             rest_switches: self.rest_switches.filter(|_| motion == Move::Hold),
             recovery_s: self.recovery_s.filter(|_| motion.loses_contact()),
             contact_error_mm: self.contact_error_mm.filter(|_| motion.loses_contact()),
+            first_overshoot_mm: self.first_overshoot_mm.filter(|_| learnt),
+            first_settle_s: self.first_settle_s.filter(|_| learnt),
+            first_steady_error_mm: self.first_steady_error_mm.filter(|_| learnt),
             ..self
         }
     }

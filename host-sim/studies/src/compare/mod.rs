@@ -412,7 +412,7 @@ fn plan(options: &Options, axes: &[AxisConfig]) -> Vec<(usize, Variation, u64)> 
 fn moves_of(options: &Options, variation: Variation) -> Vec<Move> {
     match (&options.moves, variation) {
         (Some(moves), _) => moves.clone(),
-        (None, Variation::Nominal) => Move::ALL.to_vec(),
+        (None, Variation::Nominal) => Move::LEARNT.to_vec(),
         (None, Variation::Combination(_) | Variation::Drawn(_)) => vec![Move::Step100],
         (None, _) => VARIED.to_vec(),
     }

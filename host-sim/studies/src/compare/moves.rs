@@ -45,8 +45,8 @@ impl Sizes {
 /// A played move: the first move after power-up, then the measured ones.
 #[derive(Debug, Clone)]
 pub struct Played {
-    /// The first move, in which the board learns.
-    pub first: Trace,
+    /// The first move, in which the board learns; none where it is the measured one.
+    pub first: Option<Trace>,
     /// The measured moves, in the order of the name's description.
     pub measured: Vec<Trace>,
     /// Ticks of all moves, also of one between the first and the measured ones, which is not kept.
@@ -58,12 +58,15 @@ impl Played {
     pub fn traces(&self) -> impl Iterator<Item = (String, &Trace)> {
         let measured = self.measured.iter().enumerate();
         let measured = measured.map(|(k, trace)| (format!("measured-{}", k + 1), trace));
-        std::iter::once(("first".to_owned(), &self.first)).chain(measured)
+        let first = self.first.iter().map(|trace| ("first".to_owned(), trace));
+        first.chain(measured)
     }
 }
 
 /// Time for a step \[s\].
 pub const STEP_S: f64 = 2.5;
+/// Time for a step of which nothing else is played \[s\]: a second to arrive, and one at rest that is judged.
+pub const FIRST_STEP_S: f64 = 2.0;
 /// Time at rest during which switches are counted \[s\].
 pub const REST_S: f64 = 10.0;
 /// When the load goes and returns, from the start of the recording \[s\].
@@ -106,7 +109,8 @@ fn play(
     let mut steps = |list: &[f64]| -> Result<Vec<Trace>, AxisSimError> {
         list.iter().map(|to_m| rig.step(*to_m, STEP_S)).collect()
     };
-    let (mut moves, measured) = match motion {
+    let (moves, measured) = match motion {
+        Move::FirstStep => (Vec::new(), vec![rig.step(high_m, FIRST_STEP_S)?]),
         Move::Step20 => (steps(&[high_m])?, steps(&[high_m - sizes.small_m, high_m])?),
         Move::Step100 => (steps(&[high_m])?, steps(&[low_m, high_m])?),
         Move::SCurve => {
@@ -158,7 +162,7 @@ fn play(
     let ticks = (moves.iter().chain(&measured).map(|m| m.rows.len() as u64)).sum();
     Ok(Played {
         ticks,
-        first: moves.remove(0),
+        first: moves.into_iter().next(),
         measured,
     })
 }

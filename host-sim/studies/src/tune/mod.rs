@@ -232,7 +232,7 @@ impl Tuned {
         let before = defaults(&design(plant, Kind::Predictive));
         let list = commission(&after).map_err(failed)?;
 
-        let runs: Vec<(Move, &Design)> = Move::ALL
+        let runs: Vec<(Move, &Design)> = Move::LEARNT
             .into_iter()
             .flat_map(|motion| [(motion, &before), (motion, &after)])
             .collect();
@@ -241,7 +241,7 @@ impl Tuned {
         })?;
         // A test that was played with only one of the two boards shows nothing.
         let mut played = played.into_iter();
-        let tests = Move::ALL.into_iter().filter_map(|motion| {
+        let tests = Move::LEARNT.into_iter().filter_map(|motion| {
             let (before, after) = (played.next()?, played.next()?);
             let pair = [before?, after?];
             Some(Test {
@@ -252,7 +252,7 @@ impl Tuned {
             })
         });
         let tests: Vec<Test> = tests.collect();
-        let stopped = progress.stopped(tests.len() as u64, Move::ALL.len() as u64, "tests");
+        let stopped = progress.stopped(tests.len() as u64, Move::LEARNT.len() as u64, "tests");
         let source = format!("DERIVED: wheeleg tune {}", config.name);
         Ok(Self {
             seed,

@@ -28,7 +28,7 @@ pub(super) struct CompareArgs {
     /// Controller; may be given several times [default: all].
     #[arg(long = "controller", value_name = "NAME", value_parser = controller())]
     controllers: Vec<Kind>,
-    /// Move; may be given several times [default: all with the data-sheet values;
+    /// Move; may be given several times [default: all but first-step with the data-sheet values;
     /// step-100 and s-curve with changed factors].
     #[arg(long = "move", value_name = "MOVE", value_parser = motion())]
     moves: Vec<Move>,
