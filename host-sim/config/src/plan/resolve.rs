@@ -1,5 +1,6 @@
 //! Turns values of all factors into a scenario and a robot, or a cylinder on the bench, read and checked like files.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value as Json, json};
@@ -22,6 +23,8 @@ use crate::{AxisConfig, RobotConfig, Scenario};
 pub struct Resolver<'a> {
     plan: &'a Plan,
     templates: BTreeMap<Kept, BTreeMap<&'a str, Template>>,
+    /// The axes as their files state them.
+    axes: BTreeMap<&'a str, AxisConfig>,
 }
 
 /// Kind of a file that a plan holds.
@@ -111,12 +114,18 @@ impl<'a> Resolver<'a> {
             let template = Template::read(source, robot.parameters)?;
             keep(Kept::Robot, name, template);
         }
+        let mut axes = BTreeMap::new();
         for (name, source) in &plan.sources.axes {
             let axis = AxisConfig::parse(&source.file, &source.text)?;
-            let template = Template::read(source, axis.parameters)?;
+            let template = Template::read(source, axis.parameters.clone())?;
             keep(Kept::Axis, name, template);
+            axes.insert(name.as_str(), axis);
         }
-        Ok(Self { plan, templates })
+        Ok(Self {
+            plan,
+            templates,
+            axes,
+        })
     }
 
     /// The files that a path may lead into: those that a case can have.
@@ -228,27 +237,32 @@ impl<'a> Resolver<'a> {
         base: &AxisBase,
     ) -> Result<OnBench, ConfigError> {
         let chosen = |setting| chosen(factors, setting);
+        let any = |part| factors.iter().any(|(factor, _)| sets(factor, part));
         let name = chosen(Setting::Axis).map_or_else(|| base.axis.clone(), ToString::to_string);
         let mut template = self.known(Kept::Axis, &name)?;
-        let sheet_text = changed(template, factors, Part::Axis)?;
-        let sheet = AxisConfig::parse(&template.file, &sheet_text.to_string())?;
+        let file = self.axes.get(name.as_str()).filter(|_| !any(Part::Axis));
         // The plant is off its data sheet, whatever that says.
         let stated;
-        if factors.iter().any(|(factor, _)| sets(factor, Part::Axis)) {
-            stated = Template {
-                file: template.file.clone(),
-                document: sheet_text,
-                listing: sheet.parameters.clone(),
-                data: BTreeMap::new(),
-            };
-            template = &stated;
-        }
-        let plant = match factors.iter().any(|(factor, _)| sets(factor, Part::Plant)) {
-            true => {
-                let text = changed(template, factors, Part::Plant)?;
-                AxisConfig::parse(&template.file, &text.to_string())?
+        let sheet = match file {
+            Some(sheet) => Cow::Borrowed(sheet),
+            None => {
+                let document = changed(template, factors, Part::Axis)?;
+                let sheet = AxisConfig::parse(&template.file, &document.to_string())?;
+                stated = Template {
+                    file: template.file.clone(),
+                    document,
+                    listing: sheet.parameters.clone(),
+                    data: BTreeMap::new(),
+                };
+                template = &stated;
+                Cow::Owned(sheet)
             }
-            false => sheet.clone(),
+        };
+        let plant = if any(Part::Plant) {
+            let text = changed(template, factors, Part::Plant)?;
+            Cow::Owned(AxisConfig::parse(&template.file, &text.to_string())?)
+        } else {
+            Cow::Borrowed(&*sheet)
         };
         let load_share = match chosen(Setting::LoadShare) {
             Some(Value::Number(share)) => *share,
@@ -261,8 +275,8 @@ impl<'a> Resolver<'a> {
             controller: named(factors, Setting::Controller, base.controller, Kind::of_name)?,
             delays: named(factors, Setting::Delays, base.delays, StartUp::of_name)?,
             air: named(factors, Setting::Air, base.air, Air::of_name)?,
-            sheet: sheet.axis,
-            plant: plant.axis,
+            sheet: sheet.axis.clone(),
+            plant: plant.axis.clone(),
             deviations: Deviation::all(&sheet.parameters, &plant.parameters),
             load_share,
         };

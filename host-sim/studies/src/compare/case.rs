@@ -422,7 +422,8 @@ impl Figures {
 
     /// Without what a move does not have.
     fn only_of(self, motion: Move) -> Self {
-        let is_step = matches!(motion, Move::FirstStep | Move::Step20 | Move::Step100) || motion.loses_contact();
+        let is_step = matches!(motion, Move::FirstStep | Move::Step20 | Move::Step100)
+            || motion.loses_contact();
         let learnt = motion != Move::FirstStep;
         let arrives = !matches!(motion, Move::Sine | Move::Hold);
         Self {

@@ -66,7 +66,7 @@ impl Played {
 /// Time for a step \[s\].
 pub const STEP_S: f64 = 2.5;
 /// Time for a step of which nothing else is played \[s\]: a second to arrive, and one at rest that is judged.
-pub const FIRST_STEP_S: f64 = 2.0;
+const FIRST_STEP_S: f64 = 2.0;
 /// Time at rest during which switches are counted \[s\].
 pub const REST_S: f64 = 10.0;
 /// When the load goes and returns, from the start of the recording \[s\].
