@@ -99,21 +99,14 @@ impl Eliminated {
 /// Solves the symmetric positive definite 6 × 6 in place by L D Lᵀ.
 #[inline]
 pub(super) fn solve_block(block: &mut Packed, x: &mut [f64; 6]) -> Result<(), DynamicsError> {
-    let mut inverse = [0.0; 6];
-    for j in 0..6 {
-        let pivot = block[at(j, j)];
-        if pivot.is_nan() || pivot <= 0.0 {
-            return Err(DynamicsError::Singular { pivot });
-        }
-        inverse[j] = 1.0 / pivot;
-        for i in j + 1..6 {
-            let factor = block[at(i, j)] * inverse[j];
-            for k in j + 1..=i {
-                block[at(i, k)] -= factor * block[at(k, j)];
-            }
-            x[i] -= factor * x[j];
-        }
-    }
+    let inverse = [
+        clear_column::<0>(block, x)?,
+        clear_column::<1>(block, x)?,
+        clear_column::<2>(block, x)?,
+        clear_column::<3>(block, x)?,
+        clear_column::<4>(block, x)?,
+        clear_column::<5>(block, x)?,
+    ];
     // block now holds L D below the diagonal.
     for j in (0..6).rev() {
         let mut value = x[j];
@@ -123,6 +116,28 @@ pub(super) fn solve_block(block: &mut Packed, x: &mut [f64; 6]) -> Result<(), Dy
         x[j] = value * inverse[j];
     }
     Ok(())
+}
+
+/// Eliminates one column below its pivot, and returns the pivot's inverse. A function for each
+/// column: its loops are of known length then.
+#[inline(always)]
+fn clear_column<const J: usize>(
+    block: &mut Packed,
+    x: &mut [f64; 6],
+) -> Result<f64, DynamicsError> {
+    let pivot = block[at(J, J)];
+    if pivot.is_nan() || pivot <= 0.0 {
+        return Err(DynamicsError::Singular { pivot });
+    }
+    let inverse = 1.0 / pivot;
+    for i in J + 1..6 {
+        let factor = block[at(i, J)] * inverse;
+        for k in J + 1..i + 1 {
+            block[at(i, k)] -= factor * block[at(k, J)];
+        }
+        x[i] -= factor * x[J];
+    }
+    Ok(inverse)
 }
 
 /// Left plus right leg, in the axes of the chassis: a sign under the mirror for each entry.
