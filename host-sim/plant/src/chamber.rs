@@ -14,14 +14,11 @@
 //! and neither needs a power function.
 
 use serde::{Deserialize, Serialize};
-use wide::f64x2;
 
+use crate::both::Both;
 use crate::error::{PlantError, check};
 use crate::flow::GasParams;
 use crate::hash::StateHasher;
-
-/// A number of chamber A and of chamber B: both are computed side by side, each as it would be alone.
-pub(crate) type Both = f64x2;
 
 /// How the gas in a chamber exchanges heat.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -18,6 +18,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::both::{Both, both, each, same};
 use crate::error::{PlantError, check};
 use crate::terrain::Material;
 
@@ -134,11 +135,12 @@ impl ContactLaw {
     #[inline]
     pub fn force(&self, stretch_m: &mut Vector3<f64>, touch: &Touch) -> ContactForce {
         let n = &touch.normal;
-        let closing = -n.dot(&touch.velocity_m_s);
-        let slide = touch.velocity_m_s + closing * n;
-        let normal_n = self.normal_force_n(touch.depth_m, closing);
-        let moved = *stretch_m + touch.moved_m;
-        let laid = moved - n.dot(&moved) * n;
+        // Speed, and where the bristle's end has come to: along the surface.
+        let motion = both(&touch.velocity_m_s, &(*stretch_m + touch.moved_m));
+        let normal: Vector3<Both> = same(n);
+        let away = normal.x * motion.x + normal.y * motion.y + normal.z * motion.z;
+        let [slide, laid] = each(&(motion - normal * away));
+        let normal_n = self.normal_force_n(touch.depth_m, -away.to_array()[0]);
         let elastic = -self.bristle_stiffness_n_m * laid;
         let pull = elastic - self.bristle_damping_n_s_m * slide;
 

@@ -1,7 +1,8 @@
 //! Gas rates and forces of one cylinder, with everything a step needs precomputed.
 
 use super::{CylinderParams, CylinderState};
-use crate::chamber::{Both, ChamberRates, ChamberState, Contents, GasModel};
+use crate::both::Both;
+use crate::chamber::{ChamberRates, ChamberState, Contents, GasModel};
 use crate::error::{PlantError, check_state};
 use crate::flow::{GasParams, Restrictor, leak_kg_s};
 use crate::friction::FrictionParams;

@@ -3,29 +3,10 @@
 //! Axes (a, b, z): a along the cylinder, b to its left, z up; a = \[sin, −cos\] and b = \[cos, sin\]
 //! of the yaw angle (θ1 or θ4) in chassis axes. Moments are about the yaw axis's point O.
 
-use std::ops::Neg;
+use nalgebra::Vector3;
 
-use nalgebra::{ClosedAddAssign, ClosedMulAssign, ClosedSubAssign, Scalar, Vector3};
-use wide::f64x2;
-
+use crate::both::{Both, Number, same};
 use crate::dynamics::params::BodyParams;
-
-/// A number of the left and of the right leg: both are computed side by side, each as it would be alone.
-pub(super) type Both = f64x2;
-
-/// One number, or one of each leg.
-pub(super) trait Number:
-    Scalar + Copy + ClosedAddAssign + ClosedSubAssign + ClosedMulAssign + Neg<Output = Self>
-{
-}
-
-impl Number for f64 {}
-impl Number for Both {}
-
-/// The same vector for both legs.
-pub(super) fn same(v: &Vector3<f64>) -> Vector3<Both> {
-    v.map(Both::splat)
-}
 
 /// Symmetric 3 × 3.
 #[derive(Debug, Clone, Copy, Default)]

@@ -5,11 +5,12 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use wheeleg_kinematics::LegPosture;
 
 use super::contact::{Contacts, Wrench};
-use super::group::{Both, Sym3};
+use super::group::Sym3;
 use super::leg::{LegTerms, joined};
 use super::mirror;
 use super::solve::{MIRROR, Packed, add_mirrored, assemble, at, eliminate, solve_block};
 use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::both::{Both, Number, same};
 use crate::dynamics::error::{DynamicsError, finite};
 
 /// Linear momentum, and angular momentum about the mass centre, in world axes.
@@ -224,25 +225,36 @@ impl FloatingKin {
     #[must_use]
     #[inline]
     pub fn twist(&self, body: usize, velocity: &Velocity) -> [Vector3<f64>; 2] {
-        let omega = Vector3::new(velocity[0], velocity[1], velocity[2]);
+        self.twist_at(body, |i| velocity[i])
+    }
+
+    /// The same at two velocities.
+    #[inline]
+    pub(crate) fn twists(&self, body: usize, velocities: [&Velocity; 2]) -> [Vector3<Both>; 2] {
+        self.twist_at(body, |i| Both::new(velocities.map(|v| v[i])))
+    }
+
+    #[inline]
+    fn twist_at<T: Number>(&self, body: usize, velocity: impl Fn(usize) -> T) -> [Vector3<T>; 2] {
+        let omega = Vector3::new(velocity(0), velocity(1), velocity(2));
         let mut turning = omega;
-        let mut moving = Vector3::new(velocity[3], velocity[4], velocity[5]);
-        moving += omega.cross(&self.local_points()[body]);
+        let mut moving = Vector3::new(velocity(3), velocity(4), velocity(5));
+        moving += omega.cross(&same(&self.local_points()[body]));
         match body {
             0 | 1 => {
-                let (s, posture) = (mirror::sign(body), &self.postures[body]);
-                let (s4, c4) = (posture.sin4, posture.cos4);
+                let (s, posture) = (T::of(mirror::sign(body)), &self.postures[body]);
+                let (s4, c4) = (T::of(posture.sin4), T::of(posture.cos4));
                 let k = LEG + 3 * body;
-                let yaw = posture.phi_prime * velocity[k];
-                let arm = posture.lengths.b5_m * yaw;
+                let yaw = T::of(posture.phi_prime) * velocity(k);
+                let arm = T::of(posture.lengths.b5_m) * yaw;
                 turning.z += s * yaw;
                 moving += Vector3::new(
-                    arm * c4 + s4 * velocity[k + 1],
-                    s * (arm * s4 - c4 * velocity[k + 1]),
-                    -velocity[k + 2],
+                    arm * c4 + s4 * velocity(k + 1),
+                    s * (arm * s4 - c4 * velocity(k + 1)),
+                    -velocity(k + 2),
                 );
             }
-            2 | 3 => turning.y += velocity[WHEEL + body - 2],
+            2 | 3 => turning.y += velocity(WHEEL + body - 2),
             _ => {}
         }
         [
@@ -348,11 +360,12 @@ fn one_by_one(both: &[Both; 3]) -> [[f64; 3]; 2] {
 
 /// R v. The general product of matrices is no faster than its loops.
 #[inline]
-fn turned(r: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+fn turned<T: Number>(r: &Matrix3<f64>, v: &Vector3<T>) -> Vector3<T> {
+    let row = |a, b, c| T::of(a) * v.x + T::of(b) * v.y + T::of(c) * v.z;
     Vector3::new(
-        r.m11 * v.x + r.m12 * v.y + r.m13 * v.z,
-        r.m21 * v.x + r.m22 * v.y + r.m23 * v.z,
-        r.m31 * v.x + r.m32 * v.y + r.m33 * v.z,
+        row(r.m11, r.m12, r.m13),
+        row(r.m21, r.m22, r.m23),
+        row(r.m31, r.m32, r.m33),
     )
 }
 

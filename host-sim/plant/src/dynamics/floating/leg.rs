@@ -7,7 +7,8 @@
 use nalgebra::Vector3;
 use wheeleg_kinematics::LegPosture;
 
-use super::group::{AXES, Both, GroupBody, Motion, Number, Sym3, Yaw, same};
+use super::group::{AXES, GroupBody, Motion, Sym3, Yaw};
+use crate::both::{Both, Number, same};
 use crate::dynamics::params::RobotDynamicsParams;
 
 /// The constant data, the same for both legs.

@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::group::Both;
+use crate::both::Both;
 
 /// +1 for the left leg, −1 for the right one.
 pub(super) fn sign(leg: usize) -> f64 {

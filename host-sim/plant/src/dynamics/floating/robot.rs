@@ -4,7 +4,7 @@ use nalgebra::{SVector, Vector3};
 use wheeleg_kinematics::{LegGeometry, LegLengths, LegPosture};
 
 use super::contact::Contacts;
-use super::group::{Both, Sym3};
+use super::group::Sym3;
 use super::kin::FloatingKin;
 use super::leg::{LegModel, LegTerms, joined};
 use super::mirror;
@@ -12,6 +12,7 @@ use super::params::FloatingParams;
 use super::reference::check_inputs;
 use super::solve::MIRROR;
 use super::state::{DOF, FloatingState, LEG, Velocity};
+use crate::both::Both;
 use crate::dynamics::error::{DynamicsError, finite};
 
 /// Model of the floating robot: built once, read only, no allocation per call.

@@ -4,9 +4,9 @@
 //! Within a leg b6 couples with neither b2 nor b5, and the (b5, b5) and (b6, b6) entries are
 //! constant masses, so a leg is eliminated by three rank-one updates of the chassis block.
 
-use super::group::Both;
 use super::leg::LegTerms;
 use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::both::Both;
 use crate::dynamics::error::DynamicsError;
 
 /// Lower triangle of a symmetric 6 × 6, row by row.
