@@ -113,9 +113,10 @@ impl ContactLaw {
     /// Static and kinetic friction on a material: of two the smaller.
     #[inline]
     pub(crate) fn friction_on(&self, material: &Material) -> [f64; 2] {
+        let less = |own: f64, other: f64| if other < own { other } else { own };
         [
-            self.mu_static.min(material.mu_static),
-            self.mu_kinetic.min(material.mu_kinetic),
+            less(self.mu_static, material.mu_static),
+            less(self.mu_kinetic, material.mu_kinetic),
         ]
     }
 
@@ -148,7 +149,7 @@ impl ContactLaw {
         let [mu_static, mu_kinetic] = self.friction_on(&touch.material);
         let sure = mu_kinetic * normal_n;
         let (stretched, pulled) = (elastic.norm_squared(), pull.norm_squared());
-        let (friction, slipping) = if stretched.max(pulled) <= sure * sure {
+        let (friction, slipping) = if stretched <= sure * sure && pulled <= sure * sure {
             *stretch_m = laid;
             (pull, false)
         } else {

@@ -140,7 +140,9 @@ impl<'a> Pressing<'a> {
         let Some(slot) = slot else { return };
         self.touched[slot] = true;
         grips[slot].part = number;
-        self.deepest_m = self.deepest_m.max(depth_m);
+        if depth_m > self.deepest_m {
+            self.deepest_m = depth_m;
+        }
         let point = near.point_m - self.radius_m * near.normal;
         let arm = point - sum.reference_m;
         let [now, during] = sum.velocities(&arm);
