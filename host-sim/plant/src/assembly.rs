@@ -15,6 +15,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::chamber::Contents;
 use crate::cylinder::{CylinderForces, CylinderModel, CylinderRates, CylinderState};
 use crate::error::PlantError;
 use crate::hash::StateHasher;
@@ -197,8 +198,8 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         let supply_pa = self.supply.pressure_pa(state.supply.mass_kg);
         let first: [CylinderRates; C] = std::array::from_fn(|i| {
             let c = &state.cylinders[i];
-            let chambers = [c.chamber_a.content(), c.chamber_b.content()];
-            self.cylinders[i].rates(c, chambers, before[i], rate[i], supply_pa)
+            let contents = Contents::of(&c.chamber_a, &c.chamber_b);
+            self.cylinders[i].rates(c, contents, before[i], rate[i], supply_pa)
         });
         let source = self.supply.rates(&state.supply, state.supply.mass_kg);
         let taken: f64 = first.iter().map(|r| r.supply_kg_s).sum();
@@ -210,13 +211,12 @@ impl<M: Mechanics<C>, const C: usize> Assembly<M, C> {
         for i in 0..C {
             let (model, one) = (&self.cylinders[i], &first[i]);
             let c = &mut state.cylinders[i];
-            let predicted = [
-                c.chamber_a.predicted(&one.a, model.exponent, h),
-                c.chamber_b.predicted(&one.b, model.exponent, h),
-            ];
+            let (rates, exponent) = (&one.chambers, model.exponent);
+            let contents = Contents::of(&c.chamber_a, &c.chamber_b);
+            let predicted = contents.predicted(rates, exponent, h);
             let two = model.rates(c, predicted, after[i], rate[i], supply_pa);
-            c.chamber_a.apply(&one.a.mean(&two.a), model.exponent, h);
-            c.chamber_b.apply(&one.b.mean(&two.b), model.exponent, h);
+            let chambers = [&mut c.chamber_a, &mut c.chamber_b];
+            rates.mean(&two.chambers).advance(chambers, exponent, h);
             let from_supply = 0.5 * h * (one.supply_kg_s + two.supply_kg_s);
             c.supply_mass_kg += from_supply;
             c.vented_mass_kg += 0.5 * h * (one.vent_kg_s + two.vent_kg_s);

@@ -15,6 +15,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::both::Both;
 use crate::error::{PlantError, check};
 use crate::flow::GasParams;
 use crate::hash::StateHasher;
@@ -79,24 +80,24 @@ pub struct ChamberState {
     pub ledger: Ledger,
 }
 
-/// Contents of a chamber, without its ledger.
+/// Contents of both chambers, without their ledgers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Content {
-    pub(crate) pv_j: f64,
-    pub(crate) mass_kg: f64,
+pub(crate) struct Contents {
+    pub(crate) pv_j: Both,
+    pub(crate) mass_kg: Both,
 }
 
-/// Time derivatives of a chamber, by origin.
+/// Time derivatives of both chambers, by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ChamberRates {
+pub(crate) struct ChamberRates {
     /// Net mass flow in \[kg/s\].
-    pub mass_kg_s: f64,
+    pub(crate) mass_kg_s: Both,
     /// n R Σ T mdot \[W\].
-    pub inflow_w: f64,
+    pub(crate) inflow_w: Both,
     /// p dV/dt \[W\].
-    pub work_w: f64,
+    pub(crate) work_w: Both,
     /// Heat from the wall \[W\].
-    pub heat_w: f64,
+    pub(crate) heat_w: Both,
 }
 
 impl ChamberState {
@@ -109,35 +110,6 @@ impl ChamberState {
             mass_kg: pv_j / (gas.gas_constant_j_kg_k * gas.ambient_temperature_k),
             ledger: Ledger::default(),
         }
-    }
-
-    /// The present contents of the chamber.
-    #[inline]
-    pub(crate) fn content(&self) -> Content {
-        Content {
-            pv_j: self.pv_j,
-            mass_kg: self.mass_kg,
-        }
-    }
-
-    /// The contents of the chamber `h` seconds later.
-    #[inline]
-    pub(crate) fn predicted(&self, rates: &ChamberRates, exponent: f64, h: f64) -> Content {
-        Content {
-            pv_j: self.pv_j + h * rates.pv_w(exponent),
-            mass_kg: self.mass_kg + h * rates.mass_kg_s,
-        }
-    }
-
-    /// Advances by `h` seconds with rates constant over it.
-    #[inline]
-    pub fn apply(&mut self, rates: &ChamberRates, exponent: f64, h: f64) {
-        self.mass_kg += h * rates.mass_kg_s;
-        self.pv_j += h * rates.pv_w(exponent);
-        self.ledger.mass_in_kg += h * rates.mass_kg_s;
-        self.ledger.inflow_j += h * rates.inflow_w;
-        self.ledger.work_j += h * rates.work_w;
-        self.ledger.heat_j += h * rates.heat_w;
     }
 
     /// Adds the state to a hash in declaration order.
@@ -155,22 +127,59 @@ impl ChamberState {
     }
 }
 
+impl Contents {
+    /// The present contents of chambers A and B.
+    #[inline]
+    pub(crate) fn of(a: &ChamberState, b: &ChamberState) -> Self {
+        Self {
+            pv_j: Both::new([a.pv_j, b.pv_j]),
+            mass_kg: Both::new([a.mass_kg, b.mass_kg]),
+        }
+    }
+
+    /// The contents `h` seconds later.
+    #[inline]
+    pub(crate) fn predicted(&self, rates: &ChamberRates, exponent: f64, h: f64) -> Self {
+        Self {
+            pv_j: self.pv_j + rates.pv_w(exponent) * h,
+            mass_kg: self.mass_kg + rates.mass_kg_s * h,
+        }
+    }
+}
+
 impl ChamberRates {
     /// dY/dt \[W\].
     #[inline]
-    fn pv_w(&self, exponent: f64) -> f64 {
-        self.inflow_w + (exponent - 1.0) * (self.heat_w - self.work_w)
+    fn pv_w(&self, exponent: f64) -> Both {
+        self.inflow_w + (self.heat_w - self.work_w) * (exponent - 1.0)
     }
 
     /// Mean of two rates, for Heun's corrector.
-    #[must_use]
     #[inline]
-    pub fn mean(&self, other: &Self) -> Self {
+    pub(crate) fn mean(&self, other: &Self) -> Self {
         Self {
-            mass_kg_s: 0.5 * (self.mass_kg_s + other.mass_kg_s),
-            inflow_w: 0.5 * (self.inflow_w + other.inflow_w),
-            work_w: 0.5 * (self.work_w + other.work_w),
-            heat_w: 0.5 * (self.heat_w + other.heat_w),
+            mass_kg_s: (self.mass_kg_s + other.mass_kg_s) * 0.5,
+            inflow_w: (self.inflow_w + other.inflow_w) * 0.5,
+            work_w: (self.work_w + other.work_w) * 0.5,
+            heat_w: (self.heat_w + other.heat_w) * 0.5,
+        }
+    }
+
+    /// Advances chambers A and B by `h` seconds with rates constant over it.
+    #[inline]
+    pub(crate) fn advance(&self, chambers: [&mut ChamberState; 2], exponent: f64, h: f64) {
+        let mass_kg = (self.mass_kg_s * h).to_array();
+        let pv_j = (self.pv_w(exponent) * h).to_array();
+        let inflow_j = (self.inflow_w * h).to_array();
+        let work_j = (self.work_w * h).to_array();
+        let heat_j = (self.heat_w * h).to_array();
+        for (i, chamber) in chambers.into_iter().enumerate() {
+            chamber.mass_kg += mass_kg[i];
+            chamber.pv_j += pv_j[i];
+            chamber.ledger.mass_in_kg += mass_kg[i];
+            chamber.ledger.inflow_j += inflow_j[i];
+            chamber.ledger.work_j += work_j[i];
+            chamber.ledger.heat_j += heat_j[i];
         }
     }
 }

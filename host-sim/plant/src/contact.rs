@@ -18,6 +18,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::both::{Both, both, each, same};
 use crate::error::{PlantError, check};
 use crate::terrain::Material;
 
@@ -112,9 +113,10 @@ impl ContactLaw {
     /// Static and kinetic friction on a material: of two the smaller.
     #[inline]
     pub(crate) fn friction_on(&self, material: &Material) -> [f64; 2] {
+        let less = |own: f64, other: f64| if other < own { other } else { own };
         [
-            self.mu_static.min(material.mu_static),
-            self.mu_kinetic.min(material.mu_kinetic),
+            less(self.mu_static, material.mu_static),
+            less(self.mu_kinetic, material.mu_kinetic),
         ]
     }
 
@@ -134,11 +136,12 @@ impl ContactLaw {
     #[inline]
     pub fn force(&self, stretch_m: &mut Vector3<f64>, touch: &Touch) -> ContactForce {
         let n = &touch.normal;
-        let closing = -n.dot(&touch.velocity_m_s);
-        let slide = touch.velocity_m_s + closing * n;
-        let normal_n = self.normal_force_n(touch.depth_m, closing);
-        let moved = *stretch_m + touch.moved_m;
-        let laid = moved - n.dot(&moved) * n;
+        // Speed, and where the bristle's end has come to: along the surface.
+        let motion = both(&touch.velocity_m_s, &(*stretch_m + touch.moved_m));
+        let normal: Vector3<Both> = same(n);
+        let away = normal.x * motion.x + normal.y * motion.y + normal.z * motion.z;
+        let [slide, laid] = each(&(motion - normal * away));
+        let normal_n = self.normal_force_n(touch.depth_m, -away.to_array()[0]);
         let elastic = -self.bristle_stiffness_n_m * laid;
         let pull = elastic - self.bristle_damping_n_s_m * slide;
 
@@ -146,7 +149,7 @@ impl ContactLaw {
         let [mu_static, mu_kinetic] = self.friction_on(&touch.material);
         let sure = mu_kinetic * normal_n;
         let (stretched, pulled) = (elastic.norm_squared(), pull.norm_squared());
-        let (friction, slipping) = if stretched.max(pulled) <= sure * sure {
+        let (friction, slipping) = if stretched <= sure * sure && pulled <= sure * sure {
             *stretch_m = laid;
             (pull, false)
         } else {

@@ -23,6 +23,7 @@
 pub mod assembly;
 pub mod axis;
 pub mod body;
+mod both;
 pub mod chamber;
 pub mod contact;
 pub mod cylinder;

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::contacts::{DISCS, RobotContacts, Ruts, SOFT_SLOTS, SPHERES, Step, Steps};
-use super::sum::{Noted, Sum, across, velocity};
+use super::sum::{Noted, Sum, across};
+use crate::both::each;
 use crate::soil::Soil;
 use crate::soil::rolling::{Motion, Rolled, RollingLaw};
 use crate::soil::sole::{SoleLaw, Stepped};
@@ -143,11 +144,12 @@ impl Soft {
             };
         }
         let arm = near.point_m - radius_m * near.normal - sum.reference_m;
+        let [now, during] = sum.velocities(&arm);
         let touch = Stepped {
             depth_m,
             normal: near.normal,
-            velocity_m_s: velocity(&sum.now, &arm),
-            moved_m: sum.step_s * velocity(&sum.during, &arm),
+            velocity_m_s: now,
+            moved_m: sum.step_s * during,
         };
         let force = law.force(&mut steps[slot].print, &touch);
         *normal_n += force.normal_n;
@@ -224,19 +226,21 @@ impl Soft {
             let forward = axis.cross(&normal).normalize();
             let left = normal.cross(&forward);
             let arm = patch.point_m / patch.depth_m - sum.reference_m;
-            let motion = |twist: &[Vector3<f64>; 2]| Motion {
-                travel: twist[1].dot(&forward),
-                tread: self.shear_radius_m * twist[0].dot(axis),
-                left: velocity(twist, &arm).dot(&left),
+            let [turning, moving] = sum.twists.each_ref().map(each);
+            let velocities = sum.velocities(&arm);
+            let motion = |i: usize| Motion {
+                travel: moving[i].dot(&forward),
+                tread: self.shear_radius_m * turning[i].dot(axis),
+                left: velocities[i].dot(&left),
             };
-            let mut moved = motion(&sum.during);
+            let mut moved = motion(1);
             moved.travel *= sum.step_s;
             moved.tread *= sum.step_s;
             moved.left *= sum.step_s;
             let touch = Rolled {
                 depth_m,
-                closing_m_s: -velocity(&sum.now, &arm).dot(&normal),
-                speed: motion(&sum.now),
+                closing_m_s: -velocities[0].dot(&normal),
+                speed: motion(0),
                 moved,
             };
             let force = laws.wheel.force(&mut ruts[slot].rolling, &touch);

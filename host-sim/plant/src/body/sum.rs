@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::contacts::{Grip, Grips, SLOTS};
 use super::points::{ContactPoint, Notes, Toucher};
+use crate::both::{Both, each, same};
 use crate::contact::{ContactLaw, Touch};
 use crate::dynamics::floating::Wrench;
 use crate::terrain::{Material, Near};
@@ -12,10 +13,8 @@ use crate::terrain::{Material, Near};
 pub(super) struct Sum<'n> {
     /// Point about which the body's twists are \[m\].
     pub(super) reference_m: Vector3<f64>,
-    /// Twist now.
-    pub(super) now: [Vector3<f64>; 2],
-    /// Twist over the step that has just ended.
-    pub(super) during: [Vector3<f64>; 2],
+    /// Twist now, and over the step that has just ended.
+    pub(super) twists: [Vector3<Both>; 2],
     /// Length of that step \[s\]; 0: grips stay unchanged.
     pub(super) step_s: f64,
     pub(super) wrench: Wrench,
@@ -46,13 +45,14 @@ pub(super) fn across(velocity_m_s: &Vector3<f64>, normal: &Vector3<f64>) -> f64 
     (velocity_m_s - velocity_m_s.dot(normal) * normal).norm()
 }
 
-/// Velocity of a point at `arm` from the reference of a twist.
-#[inline]
-pub(super) fn velocity(twist: &[Vector3<f64>; 2], arm: &Vector3<f64>) -> Vector3<f64> {
-    twist[1] + twist[0].cross(arm)
-}
-
 impl Sum<'_> {
+    /// Velocities of a point at `arm` from the reference, now and over the step.
+    #[inline]
+    pub(super) fn velocities(&self, arm: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let [turning, moving] = &self.twists;
+        each(&(moving + turning.cross(&same(arm))))
+    }
+
     /// Adds a force that acts at `arm` from the reference.
     #[inline]
     pub(super) fn add(
@@ -140,14 +140,17 @@ impl<'a> Pressing<'a> {
         let Some(slot) = slot else { return };
         self.touched[slot] = true;
         grips[slot].part = number;
-        self.deepest_m = self.deepest_m.max(depth_m);
+        if depth_m > self.deepest_m {
+            self.deepest_m = depth_m;
+        }
         let point = near.point_m - self.radius_m * near.normal;
         let arm = point - sum.reference_m;
+        let [now, during] = sum.velocities(&arm);
         let touch = Touch {
             depth_m,
             normal: near.normal,
-            velocity_m_s: velocity(&sum.now, &arm),
-            moved_m: sum.step_s * velocity(&sum.during, &arm),
+            velocity_m_s: now,
+            moved_m: sum.step_s * during,
             material: *material,
         };
         let force = law.force(&mut grips[slot].stretch_m, &touch);
@@ -164,7 +167,7 @@ impl<'a> Pressing<'a> {
 
     /// Releases parts no longer touched; returns the deepest penetration \[m\].
     #[inline]
-    pub(super) fn end(self) -> f64 {
+    pub(super) fn end(&mut self) -> f64 {
         for (grip, touched) in self.grips.iter_mut().zip(self.touched) {
             if !touched && grip.part != 0 {
                 *grip = Grip::default();

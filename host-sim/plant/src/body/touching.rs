@@ -12,6 +12,7 @@ use super::contacts::{
 use super::points::{ContactPoint, Notes, Toucher};
 use super::soft::{Patches, Soft};
 use super::sum::{Pressing, SECOND, Sum};
+use crate::both::each;
 use crate::contact::ContactLaw;
 use crate::dynamics::floating::{Contacts, FloatingKin, Velocity, Wrench};
 use crate::terrain::{Disc, Index, Near, Part, Rim, Shape, Surface, Terrain};
@@ -136,8 +137,7 @@ impl<'a> Moving<'a> {
     fn sum(&self, body: usize, reference_m: Vector3<f64>) -> Sum<'a> {
         Sum {
             reference_m,
-            now: self.kin.twist(body, self.now),
-            during: self.kin.twist(body, self.during),
+            twists: self.kin.twists(body, [self.now, self.during]),
             step_s: self.step_s,
             wrench: Wrench::ZERO,
             normal_n: 0.0,
@@ -402,7 +402,7 @@ impl Touching {
                 }
             }
         });
-        for (k, sphere) in spheres.into_iter().enumerate() {
+        for (k, sphere) in spheres.iter_mut().enumerate() {
             let depth = sphere.end();
             let left = steps[k].iter_mut().zip(touched[k]).filter(|(_, t)| !t);
             left.for_each(|(step, _)| lift(std::slice::from_mut(step)));
@@ -471,14 +471,15 @@ impl Touching {
                     self.press_disc(&mut sum, pressing, &mut patches, (rim, disc), part);
                 }
             });
-            for disc in pressings {
+            for disc in &mut pressings {
                 disc.end();
             }
         }
         let hard_n = sum.normal_n;
         sum.toucher = Toucher::Wheel(side, 1);
         load.sinkage_m = self.soft.wheel(&mut sum, ruts, &patches, &axis);
-        let spin = sum.now[0].dot(&axis);
+        let [turning, moving] = sum.twists.each_ref().map(|pair| each(pair)[0]);
+        let spin = turning.dot(&axis);
         let forward = if sum.normal_n > 0.0 {
             let along = axis.cross(&sum.support_n);
             along.try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
@@ -490,7 +491,7 @@ impl Touching {
         } else {
             r
         };
-        load.slip_m_s = tread * spin - sum.now[1].dot(&forward);
+        load.slip_m_s = tread * spin - moving.dot(&forward);
         load.normal_n = sum.normal_n;
         let rolling =
             wheel.rolling_resistance * hard_n * r * libm::tanh(spin / wheel.rolling_blend_rad_s);
@@ -537,7 +538,7 @@ impl Touching {
                 }
             }
         });
-        for point in points {
+        for point in &mut points {
             point.end();
         }
         *normal_n = sum.normal_n;

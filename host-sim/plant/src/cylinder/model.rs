@@ -1,7 +1,8 @@
 //! Gas rates and forces of one cylinder, with everything a step needs precomputed.
 
 use super::{CylinderParams, CylinderState};
-use crate::chamber::{ChamberRates, ChamberState, Content, GasModel};
+use crate::both::Both;
+use crate::chamber::{ChamberRates, ChamberState, Contents, GasModel};
 use crate::error::{PlantError, check_state};
 use crate::flow::{GasParams, Restrictor, leak_kg_s};
 use crate::friction::FrictionParams;
@@ -31,12 +32,40 @@ impl CylinderForces {
 /// Gas rates of a cylinder and the flows they take from its surroundings.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CylinderRates {
-    pub(crate) a: ChamberRates,
-    pub(crate) b: ChamberRates,
+    pub(crate) chambers: ChamberRates,
     /// From the supply \[kg/s\].
     pub(crate) supply_kg_s: f64,
     /// To the atmosphere \[kg/s\].
     pub(crate) vent_kg_s: f64,
+}
+
+/// What valves and leaks bring to chambers A and B.
+#[derive(Debug, Clone, Copy, Default)]
+struct Flows {
+    mass_kg_s: [f64; 2],
+    inflow_w: [f64; 2],
+    supply_kg_s: f64,
+    vent_kg_s: f64,
+}
+
+impl Flows {
+    /// `m` kg/s into a chamber, each with a `warmth` of n R T upstream \[J/kg\].
+    #[inline]
+    fn exchange(&mut self, chamber: usize, m: f64, warmth: f64) {
+        self.mass_kg_s[chamber] += m;
+        self.inflow_w[chamber] += warmth * m;
+    }
+}
+
+/// Constants of chambers A and B.
+#[derive(Debug, Clone, Copy)]
+struct BothChambers {
+    /// Volume at stroke 0 \[m³\].
+    volume0_m3: Both,
+    /// How it grows with the stroke \[m²\].
+    area_m2: Both,
+    /// Wall area without the bore's \[m²\].
+    wall_m2: Both,
 }
 
 /// One cylinder with everything a step needs precomputed.
@@ -49,6 +78,7 @@ pub struct CylinderModel {
     rod_area_m2: f64,
     volume_a0_m3: f64,
     volume_b0_m3: f64,
+    both: BothChambers,
     restrictors: [Restrictor; 4],
     pub(crate) timing: [ValveTiming; 4],
     /// n of the gas balance.
@@ -93,16 +123,22 @@ impl CylinderModel {
                 heat_transfer_w_m2_k,
             } => (gas.heat_capacity_ratio, Some(heat_transfer_w_m2_k)),
         };
+        let volume_a0_m3 = params.dead_volume_a_m3 + params.line_volume_m3;
+        let volume_b0_m3 =
+            params.dead_volume_b_m3 + params.line_volume_m3 + (bore - rod) * params.stroke_m;
         Ok(Self {
             params: params.clone(),
             gas: *gas,
             area_a_m2: bore,
             area_b_m2: bore - rod,
             rod_area_m2: rod,
-            volume_a0_m3: params.dead_volume_a_m3 + params.line_volume_m3,
-            volume_b0_m3: params.dead_volume_b_m3
-                + params.line_volume_m3
-                + (bore - rod) * params.stroke_m,
+            volume_a0_m3,
+            volume_b0_m3,
+            both: BothChambers {
+                volume0_m3: Both::new([volume_a0_m3, volume_b0_m3]),
+                area_m2: Both::new([bore, -(bore - rod)]),
+                wall_m2: Both::splat(params.dead_wall_area_m2 + 2.0 * bore),
+            },
             restrictors: [fill, vent, fill, vent],
             timing,
             exponent,
@@ -294,80 +330,111 @@ impl CylinderModel {
     pub(crate) fn rates(
         &self,
         state: &CylinderState,
-        chambers: [Content; 2],
+        contents: Contents,
         stroke_m: f64,
         v_m_s: f64,
         supply_pa: f64,
     ) -> CylinderRates {
         let gas = &self.gas;
         let ambient = (gas.ambient_pressure_pa, gas.ambient_temperature_k);
-        let p = [
-            chambers[0].pv_j / self.volume_a_m3(stroke_m),
-            chambers[1].pv_j / self.volume_b_m3(stroke_m),
-        ];
+        let both = &self.both;
+        let pressures_pa = contents.pv_j / (both.volume0_m3 + both.area_m2 * stroke_m);
         let mut out = CylinderRates::default();
-        out.a.work_w = p[0] * self.area_a_m2 * v_m_s;
-        out.b.work_w = -p[1] * self.area_b_m2 * v_m_s;
+        out.chambers.work_w = pressures_pa * both.area_m2 * v_m_s;
         if state.open_mask == 0 && !self.has_leak && self.thermal.is_none() {
             return out;
         }
         let (mut t, mut sqrt_t) = ([ambient.1; 2], [self.sqrt_ambient_t; 2]);
         if let Some(h) = self.thermal {
-            let bore = self.params.bore_m;
-            let ends = 2.0 * self.area_a_m2;
-            let wall = self.params.dead_wall_area_m2;
-            let side = std::f64::consts::PI * bore;
-            let areas = [
-                wall + ends + side * stroke_m,
-                wall + ends + side * (self.params.stroke_m - stroke_m),
-            ];
-            for i in 0..2 {
-                t[i] = chambers[i].pv_j / (chambers[i].mass_kg * gas.gas_constant_j_kg_k);
-                sqrt_t[i] = t[i].sqrt();
-            }
-            out.a.heat_w = h * areas[0] * (ambient.1 - t[0]);
-            out.b.heat_w = h * areas[1] * (ambient.1 - t[1]);
+            let side = std::f64::consts::PI * self.params.bore_m;
+            let open = Both::new([stroke_m, self.params.stroke_m - stroke_m]);
+            let temperatures = contents.pv_j / (contents.mass_kg * gas.gas_constant_j_kg_k);
+            let wall = both.wall_m2 + open * side;
+            out.chambers.heat_w = wall * h * (Both::splat(ambient.1) - temperatures);
+            t = temperatures.to_array();
+            sqrt_t = temperatures.sqrt().to_array();
         }
-        let mut exchange = |chamber: usize, m: f64, t_up: f64| {
-            let side = if chamber == 0 { &mut out.a } else { &mut out.b };
-            side.mass_kg_s += m;
-            side.inflow_w += self.exponent_r * t_up * m;
+        if state.open_mask == 0 && !self.has_leak {
+            return out;
+        }
+        let p = pressures_pa.to_array();
+        let mut flows = if state.open_mask == 0 {
+            Flows::default()
+        } else {
+            self.through_valves(state.open_mask, p, t, sqrt_t, supply_pa)
         };
-        let (mut supply, mut vent) = (0.0, 0.0);
+        if self.has_leak {
+            self.leak(&mut flows, p, t);
+        }
+        out.chambers.mass_kg_s = Both::new(flows.mass_kg_s);
+        out.chambers.inflow_w = Both::new(flows.inflow_w);
+        out.supply_kg_s = flows.supply_kg_s;
+        out.vent_kg_s = flows.vent_kg_s;
+        out
+    }
+
+    /// The flows through the open valves at these pressures and temperatures, with the roots of these.
+    #[inline(never)]
+    fn through_valves(
+        &self,
+        open_mask: u8,
+        p: [f64; 2],
+        t: [f64; 2],
+        sqrt_t: [f64; 2],
+        supply_pa: f64,
+    ) -> Flows {
+        let gas = &self.gas;
+        let ambient = (gas.ambient_pressure_pa, gas.ambient_temperature_k);
+        let mut flows = Flows::default();
         for c in 0..2 {
-            if state.open_mask >> (2 * c) & 1 == 1 {
+            if open_mask >> (2 * c) & 1 == 1 {
                 let m = self.restrictors[2 * c].mass_flow_kg_s(
                     supply_pa,
                     self.sqrt_ambient_t,
                     p[c],
                     sqrt_t[c],
                 );
-                exchange(c, m, if m >= 0.0 { ambient.1 } else { t[c] });
-                supply += m;
+                flows.exchange(
+                    c,
+                    m,
+                    self.exponent_r * if m >= 0.0 { ambient.1 } else { t[c] },
+                );
+                flows.supply_kg_s += m;
             }
-            if state.open_mask >> (2 * c + 1) & 1 == 1 {
+            if open_mask >> (2 * c + 1) & 1 == 1 {
                 let m = self.restrictors[2 * c + 1].mass_flow_kg_s(
                     p[c],
                     sqrt_t[c],
                     ambient.0,
                     self.sqrt_ambient_t,
                 );
-                exchange(c, -m, if m >= 0.0 { t[c] } else { ambient.1 });
-                vent += m;
+                flows.exchange(
+                    c,
+                    -m,
+                    self.exponent_r * if m >= 0.0 { t[c] } else { ambient.1 },
+                );
+                flows.vent_kg_s += m;
             }
         }
-        if self.has_leak {
-            let piston = leak_kg_s(self.params.piston_leak_m3_s_pa, gas, p[0], p[1]);
-            let t_up = if piston >= 0.0 { t[0] } else { t[1] };
-            exchange(0, -piston, t_up);
-            exchange(1, piston, t_up);
-            let rod = leak_kg_s(self.params.rod_leak_m3_s_pa, gas, p[1], ambient.0);
-            exchange(1, -rod, if rod >= 0.0 { t[1] } else { ambient.1 });
-            vent += rod;
-        }
-        out.supply_kg_s = supply;
-        out.vent_kg_s = vent;
-        out
+        flows
+    }
+
+    /// Adds the leaks past piston and rod.
+    #[inline]
+    fn leak(&self, flows: &mut Flows, p: [f64; 2], t: [f64; 2]) {
+        let gas = &self.gas;
+        let (ambient_pa, ambient_k) = (gas.ambient_pressure_pa, gas.ambient_temperature_k);
+        let piston = leak_kg_s(self.params.piston_leak_m3_s_pa, gas, p[0], p[1]);
+        let warmth = self.exponent_r * if piston >= 0.0 { t[0] } else { t[1] };
+        flows.exchange(0, -piston, warmth);
+        flows.exchange(1, piston, warmth);
+        let rod = leak_kg_s(self.params.rod_leak_m3_s_pa, gas, p[1], ambient_pa);
+        flows.exchange(
+            1,
+            -rod,
+            self.exponent_r * if rod >= 0.0 { t[1] } else { ambient_k },
+        );
+        flows.vent_kg_s += rod;
     }
 
     /// Refuses a state that is not finite or has left the model's range; `most_pa` is the largest

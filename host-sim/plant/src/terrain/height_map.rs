@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::surface::Near;
+use crate::both::Both;
 use crate::hash::StateHasher;
 
 /// Steepest slope between two neighbours, degrees.
@@ -98,34 +99,56 @@ pub(super) struct Place {
     pub(super) bend: [f64; 3],
 }
 
-/// Weights of four neighbours for the value between the middle two, and of its derivatives.
+/// Weights of four neighbours for the value between the middle two, and of its derivatives; along X and
+/// along Y side by side.
 #[inline]
-fn weights<const BEND: bool>(u: f64) -> [[f64; 4]; 3] {
+fn weights<const BEND: bool>(u: Both) -> [[Both; 4]; 3] {
+    let number = Both::splat;
     let (u2, u3) = (u * u, u * u * u);
     [
         [
-            0.5 * (2.0 * u2 - u - u3),
-            0.5 * (2.0 - 5.0 * u2 + 3.0 * u3),
-            0.5 * (u + 4.0 * u2 - 3.0 * u3),
-            0.5 * (u3 - u2),
+            (u2 * 2.0 - u - u3) * 0.5,
+            (number(2.0) - u2 * 5.0 + u3 * 3.0) * 0.5,
+            (u + u2 * 4.0 - u3 * 3.0) * 0.5,
+            (u3 - u2) * 0.5,
         ],
         [
-            0.5 * (4.0 * u - 1.0 - 3.0 * u2),
-            0.5 * (9.0 * u2 - 10.0 * u),
-            0.5 * (1.0 + 8.0 * u - 9.0 * u2),
-            0.5 * (3.0 * u2 - 2.0 * u),
+            (u * 4.0 - 1.0 - u2 * 3.0) * 0.5,
+            (u2 * 9.0 - u * 10.0) * 0.5,
+            (number(1.0) + u * 8.0 - u2 * 9.0) * 0.5,
+            (u2 * 3.0 - u * 2.0) * 0.5,
         ],
         if BEND {
-            [2.0 - 3.0 * u, 9.0 * u - 5.0, 4.0 - 9.0 * u, 3.0 * u - 1.0]
+            [
+                number(2.0) - u * 3.0,
+                u * 9.0 - 5.0,
+                number(4.0) - u * 9.0,
+                u * 3.0 - 1.0,
+            ]
         } else {
-            [0.0; 4]
+            [number(0.0); 4]
         },
     ]
 }
 
+/// Four numbers in pairs.
+type Four = [Both; 2];
+
+/// The first numbers of four pairs, and the second ones.
 #[inline]
-fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
+fn apart([a, b, c, d]: [Both; 4]) -> [Four; 2] {
+    let ([a, b], [c, d]) = ([a, b].map(Both::to_array), [c, d].map(Both::to_array));
+    [0, 1].map(|k| [Both::new([a[k], b[k]]), Both::new([c[k], d[k]])])
+}
+
+/// The products a · b and c · d.
+#[inline]
+fn dots([a, b]: [&Four; 2], [c, d]: [&Four; 2]) -> Both {
+    let half = |k: usize| {
+        let ([p, q], [r, s]) = ((a[k] * b[k]).to_array(), (c[k] * d[k]).to_array());
+        Both::new([p, r]) + Both::new([q, s])
+    };
+    half(0) + half(1)
 }
 
 impl HeightMap {
@@ -203,23 +226,30 @@ impl HeightMap {
         [[x, x + along(self.columns)], [y, y + along(self.rows)]]
     }
 
-    /// Cell in which a coordinate lies, the place in it 0..1, and whether it is on the map.
+    /// Cell in which a place lies, the place in it 0..1, and whether it is on the map; along X and Y.
     #[inline]
-    fn locate(&self, at_m: f64, origin_m: f64, count: usize) -> (usize, f64, bool) {
-        let along = (at_m - origin_m) / self.cell_m;
-        let last = (count - 1) as f64;
-        let inside = along >= 0.0 && along <= last;
-        let along = along.clamp(0.0, last);
-        let cell = (along as usize).min(count - 2);
-        (cell, along - cell as f64, inside)
+    fn locate(&self, place_m: [f64; 2]) -> ([usize; 2], Both, [bool; 2]) {
+        let along = (Both::new(place_m) - Both::new(self.origin_m)) / self.cell_m;
+        let along = along.to_array();
+        let counts = [self.columns, self.rows];
+        let (mut cells, mut within, mut inside) = ([0; 2], [0.0; 2], [false; 2]);
+        for i in 0..2 {
+            let last = (counts[i] - 1) as f64;
+            inside[i] = along[i] >= 0.0 && along[i] <= last;
+            let along = along[i].clamp(0.0, last);
+            // Whole and not negative: no map has more than 4096 of them.
+            let cell = (along as u32).min(counts[i] as u32 - 2);
+            cells[i] = cell as usize;
+            within[i] = along - f64::from(cell);
+        }
+        (cells, Both::new(within), inside)
     }
 
     /// The surface at a place, with its second derivatives if `BEND`.
     #[inline]
     pub(super) fn place<const BEND: bool>(&self, x_m: f64, y_m: f64) -> Place {
-        let (i, u, inside_x) = self.locate(x_m, self.origin_m[0], self.columns);
-        let (j, v, inside_y) = self.locate(y_m, self.origin_m[1], self.rows);
-        let (along, up) = (weights::<BEND>(u), weights::<BEND>(v));
+        let ([i, j], within, [inside_x, inside_y]) = self.locate([x_m, y_m]);
+        let [value, slope, bend] = weights::<BEND>(within).map(apart);
         let inner = i > 0 && i + 2 < self.columns && j > 0 && j + 2 < self.rows;
         let rows = if inner {
             let row = |k: usize| {
@@ -231,36 +261,32 @@ impl HeightMap {
         } else {
             self.rows_at_edge(i, j)
         };
+        let [a, b, c, d] = rows.map(|[p, q, r, s]| [Both::new([p, q]), Both::new([r, s])]);
         // Along X, on each of the four rows.
-        let line = |order: usize| {
-            let [a, b, c, d] = &rows;
-            let weights = &along[order];
+        let line = |weights: &Four| {
             [
-                dot(weights, a),
-                dot(weights, b),
-                dot(weights, c),
-                dot(weights, d),
+                dots([weights, &a], [weights, &b]),
+                dots([weights, &c], [weights, &d]),
             ]
         };
-        let lines = [line(0), line(1)];
+        let (heights, slopes) = (line(&value[0]), line(&slope[0]));
         // Beyond the map nothing changes outwards.
         let per = |inside: bool| if inside { 1.0 / self.cell_m } else { 0.0 };
         let (per_x, per_y) = (per(inside_x), per(inside_y));
-        let bend = if BEND {
-            [
-                dot(&up[0], &line(2)) * per_x * per_x,
-                dot(&up[1], &lines[1]) * per_x * per_y,
-                dot(&up[2], &lines[0]) * per_y * per_y,
-            ]
+        let [z, up] = dots([&value[1], &heights], [&slope[1], &heights]).to_array();
+        let (along, bend) = if BEND {
+            let bends = line(&bend[0]);
+            let [along, xx] = dots([&value[1], &slopes], [&value[1], &bends]).to_array();
+            let [xy, yy] = dots([&slope[1], &slopes], [&bend[1], &heights]).to_array();
+            let per_square = [xx * per_x * per_x, xy * per_x * per_y, yy * per_y * per_y];
+            (along, per_square)
         } else {
-            [0.0; 3]
+            let [along, _] = dots([&value[1], &slopes], [&value[1], &slopes]).to_array();
+            (along, [0.0; 3])
         };
         Place {
-            z: dot(&up[0], &lines[0]),
-            slope: [
-                dot(&up[0], &lines[1]) * per_x,
-                dot(&up[1], &lines[0]) * per_y,
-            ],
+            z,
+            slope: [along * per_x, up * per_y],
             bend,
         }
     }
@@ -298,12 +324,14 @@ impl HeightMap {
     /// Height that no place within `reach_m` of this one exceeds \[m\].
     #[inline]
     pub(super) fn highest_near_m(&self, x_m: f64, y_m: f64, reach_m: f64) -> f64 {
-        let cell = |at_m: f64, axis: usize, count: usize| {
-            self.locate(at_m, self.origin_m[axis], count).0 / TILE
+        let tile = |reach_m: f64| {
+            let (cells, _, _) = self.locate([x_m + reach_m, y_m + reach_m]);
+            cells.map(|cell| cell / TILE)
         };
+        let (first, last) = (tile(-reach_m), tile(reach_m));
         let mut top = f64::NEG_INFINITY;
-        for j in cell(y_m - reach_m, 1, self.rows)..=cell(y_m + reach_m, 1, self.rows) {
-            for i in cell(x_m - reach_m, 0, self.columns)..=cell(x_m + reach_m, 0, self.columns) {
+        for j in first[1]..=last[1] {
+            for i in first[0]..=last[0] {
                 top = top.max(self.tops_m[j * self.tiles + i]);
             }
         }

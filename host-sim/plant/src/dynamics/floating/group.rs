@@ -5,24 +5,25 @@
 
 use nalgebra::Vector3;
 
+use crate::both::{Both, Number, same};
 use crate::dynamics::params::BodyParams;
 
 /// Symmetric 3 × 3.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sym3 {
-    pub(super) xx: f64,
-    pub(super) yy: f64,
-    pub(super) zz: f64,
-    pub(super) xy: f64,
-    pub(super) xz: f64,
-    pub(super) yz: f64,
+pub(super) struct Sym3<T = f64> {
+    pub(super) xx: T,
+    pub(super) yy: T,
+    pub(super) zz: T,
+    pub(super) xy: T,
+    pub(super) xz: T,
+    pub(super) yz: T,
 }
 
-impl Sym3 {
+impl<T: Number> Sym3<T> {
     /// Of a mass at r: m (|r|² 1 − r rᵀ), plus principal inertias.
     #[inline]
-    pub(super) fn of_body(m: f64, r: &Vector3<f64>, principal: &Vector3<f64>) -> Self {
-        let s = m * r;
+    pub(super) fn of_body(m: T, r: &Vector3<T>, principal: &Vector3<T>) -> Self {
+        let s = r * m;
         let (xx, yy, zz) = (s.x * r.x, s.y * r.y, s.z * r.z);
         Self {
             xx: principal.x + yy + zz,
@@ -47,7 +48,7 @@ impl Sym3 {
     }
 
     #[inline]
-    pub(super) fn times(&self, v: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn times(&self, v: &Vector3<T>) -> Vector3<T> {
         Vector3::new(
             self.xx * v.x + self.xy * v.y + self.xz * v.z,
             self.xy * v.x + self.yy * v.y + self.yz * v.z,
@@ -55,16 +56,31 @@ impl Sym3 {
         )
     }
 
+    /// The tensor with each entry converted.
+    #[inline]
+    pub(super) fn map<U>(&self, f: impl Fn(T) -> U) -> Sym3<U> {
+        Sym3 {
+            xx: f(self.xx),
+            yy: f(self.yy),
+            zz: f(self.zz),
+            xy: f(self.xy),
+            xz: f(self.xz),
+            yz: f(self.yz),
+        }
+    }
+}
+
+impl Sym3<Both> {
     /// Moves the point of reference: the composite lies at `pivot` from the new one, with first
     /// moment h about the old one, both in this tensor's axes. The constant part
     /// m (|pivot|² 1 − pivot pivotᵀ) is left out: it is added once and for all.
     #[inline]
-    pub(super) fn shifted(&self, pivot: &Vector3<f64>, h: &Vector3<f64>) -> Self {
+    pub(super) fn shifted(&self, pivot: &Vector3<Both>, h: &Vector3<Both>) -> Self {
         let (x, y, z) = (pivot.x * h.x, pivot.y * h.y, pivot.z * h.z);
         Self {
-            xx: self.xx + 2.0 * (y + z),
-            yy: self.yy + 2.0 * (x + z),
-            zz: self.zz + 2.0 * (x + y),
+            xx: self.xx + (y + z) * 2.0,
+            yy: self.yy + (x + z) * 2.0,
+            zz: self.zz + (x + y) * 2.0,
             xy: self.xy - pivot.x * h.y - h.x * pivot.y,
             xz: self.xz - pivot.x * h.z - h.x * pivot.z,
             yz: self.yz - pivot.y * h.z - h.y * pivot.z,
@@ -74,10 +90,10 @@ impl Sym3 {
 
 /// A leg body in its group's axes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct GroupBody {
-    pub(super) m: f64,
-    pub(super) com: Vector3<f64>,
-    pub(super) inertia: Vector3<f64>,
+pub(super) struct GroupBody<T = f64> {
+    pub(super) m: T,
+    pub(super) com: Vector3<T>,
+    pub(super) inertia: Vector3<T>,
 }
 
 /// Link axes in group axes: (source index, sign) of a, b and z.
@@ -103,24 +119,35 @@ impl GroupBody {
         }
     }
 
+    /// The same body in both legs.
+    pub(super) fn twice(&self) -> GroupBody<Both> {
+        GroupBody {
+            m: Both::splat(self.m),
+            com: same(&self.com),
+            inertia: same(&self.inertia),
+        }
+    }
+}
+
+impl<T: Number> GroupBody<T> {
     /// At a displacement of its link frame.
     #[inline]
-    pub(super) fn at(&self, slide: &Vector3<f64>) -> (Vector3<f64>, Sym3) {
+    pub(super) fn at(&self, slide: &Vector3<T>) -> (Vector3<T>, Sym3<T>) {
         let r = self.com + slide;
-        (self.m * r, Sym3::of_body(self.m, &r, &self.inertia))
+        (r * self.m, Sym3::of_body(self.m, &r, &self.inertia))
     }
 }
 
 /// Group axes in the chassis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Yaw {
-    pub(super) sin: f64,
-    pub(super) cos: f64,
+    pub(super) sin: Both,
+    pub(super) cos: Both,
 }
 
 impl Yaw {
     #[inline]
-    pub(super) fn to_chassis(self, v: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn to_chassis(self, v: &Vector3<Both>) -> Vector3<Both> {
         Vector3::new(
             self.sin * v.x + self.cos * v.y,
             self.sin * v.y - self.cos * v.x,
@@ -129,7 +156,7 @@ impl Yaw {
     }
 
     #[inline]
-    pub(super) fn to_group(self, v: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn to_group(self, v: &Vector3<Both>) -> Vector3<Both> {
         Vector3::new(
             self.sin * v.x - self.cos * v.y,
             self.cos * v.x + self.sin * v.y,
@@ -138,12 +165,12 @@ impl Yaw {
     }
 
     #[inline]
-    pub(super) fn tensor_to_chassis(self, t: &Sym3) -> Sym3 {
+    pub(super) fn tensor_to_chassis(self, t: &Sym3<Both>) -> Sym3<Both> {
         let (s, c) = (self.sin, self.cos);
         let (ss, cc, sc) = (s * s, c * c, s * c);
         Sym3 {
-            xx: ss * t.xx + 2.0 * sc * t.xy + cc * t.yy,
-            yy: cc * t.xx - 2.0 * sc * t.xy + ss * t.yy,
+            xx: ss * t.xx + sc * 2.0 * t.xy + cc * t.yy,
+            yy: cc * t.xx - sc * 2.0 * t.xy + ss * t.yy,
             zz: t.zz,
             xy: sc * (t.yy - t.xx) + (ss - cc) * t.xy,
             xz: s * t.xz + c * t.yz,
@@ -156,17 +183,17 @@ impl Yaw {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion {
     /// Angular velocity of the group.
-    pub(super) omega: Vector3<f64>,
+    pub(super) omega: Vector3<Both>,
     /// Its angular acceleration.
-    pub(super) alpha: Vector3<f64>,
+    pub(super) alpha: Vector3<Both>,
     /// Acceleration of O, less gravity.
-    pub(super) origin: Vector3<f64>,
+    pub(super) origin: Vector3<Both>,
 }
 
 impl Motion {
     /// `omega` of the chassis and `origin` in group axes; yaw rate and its bias.
     #[inline]
-    pub(super) fn new(omega: Vector3<f64>, origin: Vector3<f64>, rate: f64, bias: f64) -> Self {
+    pub(super) fn new(omega: Vector3<Both>, origin: Vector3<Both>, rate: Both, bias: Both) -> Self {
         Self {
             // ω × (rate z)
             alpha: Vector3::new(rate * omega.y, -rate * omega.x, bias),
@@ -177,13 +204,13 @@ impl Motion {
 
     /// α × r + Ω × (Ω × r).
     #[inline]
-    pub(super) fn carry(&self, r: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn carry(&self, r: &Vector3<Both>) -> Vector3<Both> {
         self.alpha.cross(r) + self.omega.cross(&self.omega.cross(r))
     }
 
     /// Moment about O that the composite as a rigid body needs.
     #[inline]
-    pub(super) fn moment(&self, h: &Vector3<f64>, j: &Sym3) -> Vector3<f64> {
+    pub(super) fn moment(&self, h: &Vector3<Both>, j: &Sym3<Both>) -> Vector3<Both> {
         h.cross(&self.origin) + j.times(&self.alpha) + self.omega.cross(&j.times(&self.omega))
     }
 }

@@ -10,6 +10,7 @@ use super::leg::{LegTerms, joined};
 use super::mirror;
 use super::solve::{MIRROR, Packed, add_mirrored, assemble, at, eliminate, solve_block};
 use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::both::{Both, Number, same};
 use crate::dynamics::error::{DynamicsError, finite};
 
 /// Linear momentum, and angular momentum about the mass centre, in world axes.
@@ -29,7 +30,7 @@ pub struct FloatingKin {
     pub(super) postures: [LegPosture<f64>; 2],
     pub(super) soles: [Vector3<f64>; 2],
     pub(super) half_track: f64,
-    pub(super) legs: [LegTerms; 2],
+    pub(super) legs: LegTerms,
     pub(super) leg_masses: [f64; 2],
     pub(super) mass: f64,
     pub(super) first: Vector3<f64>,
@@ -48,16 +49,10 @@ impl FloatingKin {
     /// [`DynamicsError::NonFinite`], [`DynamicsError::Singular`].
     pub fn solve(&self, force: &Velocity) -> Result<Velocity, DynamicsError> {
         let f = force + self.dissipation();
-        let mut block = [0.0; 21];
-        let mut side = [0.0; 6];
-        let net =
-            |leg: usize| std::array::from_fn(|k| f[LEG + 3 * leg + k] - self.legs[leg].bias[k]);
-        let [l, r] = &self.legs;
-        let left = eliminate(l, self.leg_masses, net(0), &mut block, &mut side)?;
-        let mut block_r = [0.0; 21];
-        let mut side_r = [0.0; 6];
-        let right = eliminate(r, self.leg_masses, net(1), &mut block_r, &mut side_r)?;
-        add_mirrored(&mut block, &block_r);
+        let t = &self.legs;
+        let net = std::array::from_fn(|k| Both::new([f[LEG + k], f[LEG + 3 + k]]) - t.bias[k]);
+        let (legs, block, side) = eliminate(t, self.leg_masses, net)?;
+        let mut block = add_mirrored(&block);
         self.add_base(&mut block);
         // Wheels: both couple only with the pitch rate.
         if self.axle <= 0.0 {
@@ -66,14 +61,16 @@ impl FloatingKin {
         let share = self.spin / self.axle;
         let wheels = [f[WHEEL], f[WHEEL + 1]];
         block[at(1, 1)] -= 2.0 * share * self.spin;
-        let mut x: [f64; 6] =
-            std::array::from_fn(|i| f[i] - self.base[i] + side[i] + MIRROR[i] * side_r[i]);
+        let mut x: [f64; 6] = std::array::from_fn(|i| {
+            let [left, right] = side[i].to_array();
+            f[i] - self.base[i] + left + MIRROR[i] * right
+        });
         x[1] -= share * (wheels[0] + wheels[1]);
         solve_block(&mut block, &mut x)?;
-        let mirrored: [f64; 6] = std::array::from_fn(|i| MIRROR[i] * x[i]);
+        let mirrored = std::array::from_fn(|i| Both::new([x[i], MIRROR[i] * x[i]]));
         let acceleration = assemble(
             &x,
-            &[left.follow(&x), right.follow(&mirrored)],
+            &one_by_one(&legs.follow(&mirrored)),
             wheels.map(|w| w / self.axle - share * x[1]),
         );
         let values: [f64; DOF] = acceleration.into();
@@ -118,8 +115,8 @@ impl FloatingKin {
                 put(i, j, block[at(i, j)]);
             }
         }
-        for (leg, t) in self.legs.iter().enumerate() {
-            let s = LEG + 3 * leg;
+        for leg in 0..2 {
+            let (s, t) = (LEG + 3 * leg, LegMasses::of(&self.legs, leg));
             for (k, column) in t.columns.iter().enumerate() {
                 for (i, value) in column.iter().enumerate() {
                     let sign = if leg == 0 { 1.0 } else { MIRROR[i] };
@@ -149,8 +146,8 @@ impl FloatingKin {
         angular.y += self.spin * (a[WHEEL] + a[WHEEL + 1]);
         let mut base = joined(&angular, &(self.mass * v + omega.cross(&self.first)));
         let mut legs = [[0.0; 3]; 2];
-        for (leg, t) in self.legs.iter().enumerate() {
-            let s = LEG + 3 * leg;
+        for leg in 0..2 {
+            let (s, t) = (LEG + 3 * leg, LegMasses::of(&self.legs, leg));
             let [m56, m6] = self.leg_masses;
             let own = [a[s], a[s + 1], a[s + 2]];
             legs[leg] = [
@@ -173,11 +170,7 @@ impl FloatingKin {
     /// C ν − τ_g: the force that holds ν̇ at zero, friction and contact apart.
     #[must_use]
     pub fn bias(&self) -> Velocity {
-        assemble(
-            &self.base,
-            &[self.legs[0].bias, self.legs[1].bias],
-            [0.0; 2],
-        )
+        assemble(&self.base, &one_by_one(&self.legs.bias), [0.0; 2])
     }
 
     /// τ_d, viscous.
@@ -232,25 +225,36 @@ impl FloatingKin {
     #[must_use]
     #[inline]
     pub fn twist(&self, body: usize, velocity: &Velocity) -> [Vector3<f64>; 2] {
-        let omega = Vector3::new(velocity[0], velocity[1], velocity[2]);
+        self.twist_at(body, |i| velocity[i])
+    }
+
+    /// The same at two velocities.
+    #[inline]
+    pub(crate) fn twists(&self, body: usize, velocities: [&Velocity; 2]) -> [Vector3<Both>; 2] {
+        self.twist_at(body, |i| Both::new(velocities.map(|v| v[i])))
+    }
+
+    #[inline]
+    fn twist_at<T: Number>(&self, body: usize, velocity: impl Fn(usize) -> T) -> [Vector3<T>; 2] {
+        let omega = Vector3::new(velocity(0), velocity(1), velocity(2));
         let mut turning = omega;
-        let mut moving = Vector3::new(velocity[3], velocity[4], velocity[5]);
-        moving += omega.cross(&self.local_points()[body]);
+        let mut moving = Vector3::new(velocity(3), velocity(4), velocity(5));
+        moving += omega.cross(&same(&self.local_points()[body]));
         match body {
             0 | 1 => {
-                let (s, posture) = (mirror::sign(body), &self.postures[body]);
-                let (s4, c4) = (posture.sin4, posture.cos4);
+                let (s, posture) = (T::of(mirror::sign(body)), &self.postures[body]);
+                let (s4, c4) = (T::of(posture.sin4), T::of(posture.cos4));
                 let k = LEG + 3 * body;
-                let yaw = posture.phi_prime * velocity[k];
-                let arm = posture.lengths.b5_m * yaw;
+                let yaw = T::of(posture.phi_prime) * velocity(k);
+                let arm = T::of(posture.lengths.b5_m) * yaw;
                 turning.z += s * yaw;
                 moving += Vector3::new(
-                    arm * c4 + s4 * velocity[k + 1],
-                    s * (arm * s4 - c4 * velocity[k + 1]),
-                    -velocity[k + 2],
+                    arm * c4 + s4 * velocity(k + 1),
+                    s * (arm * s4 - c4 * velocity(k + 1)),
+                    -velocity(k + 2),
                 );
             }
-            2 | 3 => turning.y += velocity[WHEEL + body - 2],
+            2 | 3 => turning.y += velocity(WHEEL + body - 2),
             _ => {}
         }
         [
@@ -329,13 +333,39 @@ impl FloatingKin {
     }
 }
 
+/// The masses of one leg.
+struct LegMasses {
+    columns: [[f64; 6]; 3],
+    d22: f64,
+    d25: f64,
+}
+
+impl LegMasses {
+    fn of(legs: &LegTerms, leg: usize) -> Self {
+        let own = |both: Both| both.to_array()[leg];
+        Self {
+            columns: legs.columns.map(|column| column.map(own)),
+            d22: own(legs.d22),
+            d25: own(legs.d25),
+        }
+    }
+}
+
+/// The left leg's, then the right leg's.
+#[inline]
+fn one_by_one(both: &[Both; 3]) -> [[f64; 3]; 2] {
+    let [a, b, c] = both.map(Both::to_array);
+    [[a[0], b[0], c[0]], [a[1], b[1], c[1]]]
+}
+
 /// R v. The general product of matrices is no faster than its loops.
 #[inline]
-fn turned(r: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+fn turned<T: Number>(r: &Matrix3<f64>, v: &Vector3<T>) -> Vector3<T> {
+    let row = |a, b, c| T::of(a) * v.x + T::of(b) * v.y + T::of(c) * v.z;
     Vector3::new(
-        r.m11 * v.x + r.m12 * v.y + r.m13 * v.z,
-        r.m21 * v.x + r.m22 * v.y + r.m23 * v.z,
-        r.m31 * v.x + r.m32 * v.y + r.m33 * v.z,
+        row(r.m11, r.m12, r.m13),
+        row(r.m21, r.m22, r.m23),
+        row(r.m31, r.m32, r.m33),
     )
 }
 

@@ -5,6 +5,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::both::Both;
+
 /// +1 for the left leg, −1 for the right one.
 pub(super) fn sign(leg: usize) -> f64 {
     if leg == 0 { 1.0 } else { -1.0 }
@@ -16,6 +18,22 @@ pub(super) fn vector(sign: f64, v: &Vector3<f64>) -> Vector3<f64> {
 
 pub(super) fn axial(sign: f64, v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(sign * v.x, v.y, sign * v.z)
+}
+
+/// [`vector`] for both legs.
+#[inline]
+pub(super) fn both(v: &Vector3<f64>) -> Vector3<Both> {
+    Vector3::new(Both::splat(v.x), Both::new([v.y, -v.y]), Both::splat(v.z))
+}
+
+/// [`axial`] for both legs.
+#[inline]
+pub(super) fn both_axial(v: &Vector3<f64>) -> Vector3<Both> {
+    Vector3::new(
+        Both::new([v.x, -v.x]),
+        Both::splat(v.y),
+        Both::new([v.z, -v.z]),
+    )
 }
 
 /// The reflection itself.

@@ -11,7 +11,8 @@ use super::mirror;
 use super::params::FloatingParams;
 use super::reference::check_inputs;
 use super::solve::MIRROR;
-use super::state::{DOF, FloatingState, Velocity};
+use super::state::{DOF, FloatingState, LEG, Velocity};
+use crate::both::Both;
 use crate::dynamics::error::{DynamicsError, finite};
 
 /// Model of the floating robot: built once, read only, no allocation per call.
@@ -119,16 +120,15 @@ impl FloatingRobot {
             self.posture(0, &state.lengths_m)?,
             self.posture(1, &state.lengths_m)?,
         ];
-        let terms = |leg: usize| {
-            let s = mirror::sign(leg);
-            self.leg.terms(
-                &postures[leg],
-                &state.leg_rates(leg).into(),
-                &mirror::axial(s, &omega),
-                &mirror::vector(s, &origin),
-            )
-        };
-        let [l, r] = [terms(0), terms(1)];
+        let rates = std::array::from_fn(|k| {
+            Both::new([state.velocity[LEG + k], state.velocity[LEG + 3 + k]])
+        });
+        let legs = self.leg.terms(
+            &postures,
+            &rates,
+            &mirror::both_axial(&omega),
+            &mirror::both(&origin),
+        );
 
         let (mass, h, j) = &self.carriage;
         let [left, right] = state.wheel_rates();
@@ -137,23 +137,25 @@ impl FloatingRobot {
         turning.y += self.spin * (left + right);
         let moment = h.cross(&origin) + omega.cross(&turning);
         let own = joined(&moment, &force);
-        let first = self.first
-            + Vector3::new(
-                l.first.x + r.first.x,
-                l.first.y - r.first.y,
-                l.first.z + r.first.z,
-            );
-        let (a, b) = (&l.inertia, &r.inertia);
+        // Terms odd in Y change their sign on the right.
+        let even = |b: Both| b.to_array()[0] + b.to_array()[1];
+        let odd = |b: Both| b.to_array()[0] - b.to_array()[1];
+        let h = &legs.first;
+        let first = self.first + Vector3::new(even(h.x), odd(h.y), even(h.z));
+        let j = &legs.inertia;
         let inertia = self.inertia.plus(&Sym3 {
-            xx: a.xx + b.xx,
-            yy: a.yy + b.yy,
-            zz: a.zz + b.zz,
-            xy: a.xy - b.xy,
-            xz: a.xz + b.xz,
-            yz: a.yz - b.yz,
+            xx: even(j.xx),
+            yy: even(j.yy),
+            zz: even(j.zz),
+            xy: odd(j.xy),
+            xz: even(j.xz),
+            yz: odd(j.yz),
         });
-        let base: [f64; 6] = std::array::from_fn(|i| own[i] + l.base[i] + MIRROR[i] * r.base[i]);
-        refuse_overflow(&base, &inertia, &l, &r)?;
+        let base: [f64; 6] = std::array::from_fn(|i| {
+            let [left, right] = legs.base[i].to_array();
+            own[i] + left + MIRROR[i] * right
+        });
+        refuse_overflow(&base, &inertia, &legs)?;
         Ok(FloatingKin {
             rotation,
             position: state.position_m,
@@ -170,7 +172,7 @@ impl FloatingRobot {
             spin: self.spin,
             axle: self.axle,
             base,
-            legs: [l, r],
+            legs,
             velocity: state.velocity,
             viscous: self.viscous,
         })
@@ -258,20 +260,14 @@ impl FloatingRobot {
 
 /// Finite input so large that the arithmetic overflowed.
 #[inline]
-fn refuse_overflow(
-    base: &[f64; 6],
-    inertia: &Sym3,
-    left: &LegTerms,
-    right: &LegTerms,
-) -> Result<(), DynamicsError> {
-    let sum = |values: &[f64]| values.iter().sum::<f64>();
+fn refuse_overflow(base: &[f64; 6], inertia: &Sym3, legs: &LegTerms) -> Result<(), DynamicsError> {
     finite("bias", base)?;
-    for t in [left, right] {
-        finite("bias", &t.bias)?;
-        finite(
-            "inertia",
-            &[t.d22, t.d25, t.columns.iter().map(|c| sum(c)).sum()],
-        )?;
+    let columns = legs.columns.iter().flatten();
+    let columns = columns.fold(Both::splat(0.0), |sum, entry| sum + *entry);
+    for leg in 0..2 {
+        let own = |both: Both| both.to_array()[leg];
+        finite("bias", &legs.bias.map(own))?;
+        finite("inertia", &[legs.d22, legs.d25, columns].map(own))?;
     }
     let Sym3 {
         xx,

@@ -6,10 +6,11 @@
 
 use super::leg::LegTerms;
 use super::state::{DOF, LEG, Velocity, WHEEL};
+use crate::both::Both;
 use crate::dynamics::error::DynamicsError;
 
 /// Lower triangle of a symmetric 6 × 6, row by row.
-pub(super) type Packed = [f64; 21];
+pub(super) type Packed<T = f64> = [T; 21];
 
 /// Index in [`Packed`]; row ≥ column.
 #[inline]
@@ -23,41 +24,43 @@ pub(super) const MIRROR: [f64; 6] = [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0];
 /// Chassis directions in which b6 has momentum: roll, pitch, up.
 const LIFTED: [usize; 3] = [0, 1, 5];
 
-/// A leg taken out of the equations.
+/// The legs taken out of the equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Eliminated {
     /// D⁻¹ of the columns.
-    gain: [[f64; 6]; 3],
-    /// D⁻¹ of the leg's right side.
-    free: [f64; 3],
+    gain: [[Both; 6]; 3],
+    /// D⁻¹ of a leg's right side.
+    free: [Both; 3],
 }
 
-/// Takes a leg out: subtracts its share from the chassis block and from the right side, both in
-/// the leg's (mirrored) axes. `right` is force less bias of b2, b5, b6.
+/// Takes the legs out: their shares of the chassis block and of the right side, both in a leg's
+/// (mirrored) axes and to be subtracted. `right` is force less bias of b2, b5, b6.
 #[inline]
 pub(super) fn eliminate(
     t: &LegTerms,
     [m56, m6]: [f64; 2],
-    right: [f64; 3],
-    block: &mut Packed,
-    side: &mut [f64; 6],
-) -> Result<Eliminated, DynamicsError> {
+    right: [Both; 3],
+) -> Result<(Eliminated, Packed<Both>, [Both; 6]), DynamicsError> {
     let [c2, c5, c6] = &t.columns;
     let ratio = t.d25 / m56;
     let d22 = t.d22 - ratio * t.d25;
-    if d22.is_nan() || d22 <= 0.0 {
-        return Err(DynamicsError::Singular { pivot: d22 });
+    for pivot in d22.to_array() {
+        if pivot.is_nan() || pivot <= 0.0 {
+            return Err(DynamicsError::Singular { pivot });
+        }
     }
-    let (inv2, inv5, inv6) = (1.0 / d22, 1.0 / m56, 1.0 / m6);
-    let mut gain = [[0.0; 6]; 3];
-    let rest: [f64; 6] = std::array::from_fn(|i| c2[i] - ratio * c5[i]);
-    for i in 0..6 {
-        gain[0][i] = rest[i] * inv2;
-        gain[1][i] = c5[i] * inv5;
-        gain[2][i] = c6[i] * inv6;
-    }
+    let one = Both::splat(1.0);
+    let (inv2, inv5, inv6) = (one / d22, Both::splat(1.0 / m56), Both::splat(1.0 / m6));
+    let rest: [Both; 6] = std::array::from_fn(|i| c2[i] - ratio * c5[i]);
+    let mut gain = [
+        rest.map(|c| c * inv2),
+        c5.map(|c| c * inv5),
+        c6.map(|c| c * inv6),
+    ];
     let free2 = (right[0] - ratio * right[1]) * inv2;
     let (part5, free6) = (right[1] * inv5, right[2] * inv6);
+    let mut block = [Both::splat(0.0); 21];
+    let mut side = [Both::splat(0.0); 6];
     // b2 and b5 push nothing upwards; b6 only upwards, and turns nothing about the vertical.
     for i in 0..5 {
         for j in 0..=i {
@@ -76,18 +79,18 @@ pub(super) fn eliminate(
     for (own, by_yaw) in horizontal.iter_mut().zip(yaw) {
         *own -= ratio * *by_yaw;
     }
-    Ok(Eliminated {
-        gain,
-        free: [free2, part5 - ratio * free2, free6],
-    })
+    let free = [free2, part5 - ratio * free2, free6];
+    Ok((Eliminated { gain, free }, block, side))
 }
 
 impl Eliminated {
-    /// Accelerations of the leg for a chassis acceleration in the leg's axes.
+    /// Accelerations of the legs for a chassis acceleration in each leg's axes.
     #[inline]
-    pub(super) fn follow(&self, base: &[f64; 6]) -> [f64; 3] {
+    pub(super) fn follow(&self, base: &[Both; 6]) -> [Both; 3] {
         std::array::from_fn(|k| {
-            let taken: f64 = self.gain[k].iter().zip(base).map(|(g, a)| g * a).sum();
+            let [g0, g1, g2, g3, g4, g5] = self.gain[k];
+            let [a0, a1, a2, a3, a4, a5] = *base;
+            let taken = g0 * a0 + g1 * a1 + g2 * a2 + g3 * a3 + g4 * a4 + g5 * a5;
             self.free[k] - taken
         })
     }
@@ -96,21 +99,14 @@ impl Eliminated {
 /// Solves the symmetric positive definite 6 × 6 in place by L D Lᵀ.
 #[inline]
 pub(super) fn solve_block(block: &mut Packed, x: &mut [f64; 6]) -> Result<(), DynamicsError> {
-    let mut inverse = [0.0; 6];
-    for j in 0..6 {
-        let pivot = block[at(j, j)];
-        if pivot.is_nan() || pivot <= 0.0 {
-            return Err(DynamicsError::Singular { pivot });
-        }
-        inverse[j] = 1.0 / pivot;
-        for i in j + 1..6 {
-            let factor = block[at(i, j)] * inverse[j];
-            for k in j + 1..=i {
-                block[at(i, k)] -= factor * block[at(k, j)];
-            }
-            x[i] -= factor * x[j];
-        }
-    }
+    let inverse = [
+        clear_column::<0>(block, x)?,
+        clear_column::<1>(block, x)?,
+        clear_column::<2>(block, x)?,
+        clear_column::<3>(block, x)?,
+        clear_column::<4>(block, x)?,
+        clear_column::<5>(block, x)?,
+    ];
     // block now holds L D below the diagonal.
     for j in (0..6).rev() {
         let mut value = x[j];
@@ -122,14 +118,39 @@ pub(super) fn solve_block(block: &mut Packed, x: &mut [f64; 6]) -> Result<(), Dy
     Ok(())
 }
 
-/// Chassis block of a leg into the robot's: signs under the mirror.
+/// Eliminates one column below its pivot, and returns the pivot's inverse. A function for each
+/// column: its loops are of known length then.
+#[inline(always)]
+fn clear_column<const J: usize>(
+    block: &mut Packed,
+    x: &mut [f64; 6],
+) -> Result<f64, DynamicsError> {
+    let pivot = block[at(J, J)];
+    if pivot.is_nan() || pivot <= 0.0 {
+        return Err(DynamicsError::Singular { pivot });
+    }
+    let inverse = 1.0 / pivot;
+    for i in J + 1..6 {
+        let factor = block[at(i, J)] * inverse;
+        for k in J + 1..i + 1 {
+            block[at(i, k)] -= factor * block[at(k, J)];
+        }
+        x[i] -= factor * x[J];
+    }
+    Ok(inverse)
+}
+
+/// Left plus right leg, in the axes of the chassis: a sign under the mirror for each entry.
 #[inline]
-pub(super) fn add_mirrored(total: &mut Packed, leg: &Packed) {
+pub(super) fn add_mirrored(block: &Packed<Both>) -> Packed {
+    let mut total = [0.0; 21];
     for i in 0..6 {
         for j in 0..=i {
-            total[at(i, j)] += MIRROR[i] * MIRROR[j] * leg[at(i, j)];
+            let [left, right] = block[at(i, j)].to_array();
+            total[at(i, j)] = left + MIRROR[i] * MIRROR[j] * right;
         }
     }
+    total
 }
 
 /// Puts chassis, legs and wheels in the order of a velocity.
