@@ -146,11 +146,11 @@ impl FloatingKin {
         angular.y += self.spin * (a[WHEEL] + a[WHEEL + 1]);
         let mut base = joined(&angular, &(self.mass * v + omega.cross(&self.first)));
         let mut legs = [[0.0; 3]; 2];
-        for leg in 0..2 {
+        for (leg, forces) in legs.iter_mut().enumerate() {
             let (s, t) = (LEG + 3 * leg, LegMasses::of(&self.legs, leg));
             let [m56, m6] = self.leg_masses;
             let own = [a[s], a[s + 1], a[s + 2]];
-            legs[leg] = [
+            *forces = [
                 t.d22 * own[0] + t.d25 * own[1],
                 t.d25 * own[0] + m56 * own[1],
                 m6 * own[2],
@@ -159,7 +159,7 @@ impl FloatingKin {
                 for i in 0..6 {
                     let entry = if leg == 0 { 1.0 } else { MIRROR[i] } * column[i];
                     base[i] += entry * own[k];
-                    legs[leg][k] += entry * a[i];
+                    forces[k] += entry * a[i];
                 }
             }
         }
