@@ -93,7 +93,7 @@ fn a_step_waits_for_the_piston_and_is_sent_whole() {
     let mut inching = Inching {
         state: State::Wait { still: 1 },
     };
-    let mut next = |inching: &mut Inching, observer: &Observer| {
+    let next = |inching: &mut Inching, observer: &Observer| {
         inching.update(&model, observer, target, 1 << 20)
     };
     // Neither while it moves, nor while a pulse is to change the pressure.
