@@ -46,7 +46,10 @@ fn made(model: &AxisModel, observer: &Observer, openings: [i32; 4]) -> f64 {
 #[test]
 fn valves_are_coarse_if_a_pulse_is_more_than_friction_holds_and_the_mass_is_small() {
     let fine = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
-    let coarse = model();
+    let coarse = AxisModel {
+        breakaway: 2000,
+        ..model()
+    };
     assert!(!is_coarse(&fine, false), "{}", fine.pulse_force);
     assert!(is_coarse(&coarse, false), "{}", coarse.pulse_force);
     assert!(!is_coarse(&coarse, true));
