@@ -55,7 +55,7 @@ fn valves_are_coarse_if_a_pulse_is_more_than_friction_holds_and_the_mass_is_smal
     assert!(!is_coarse(&coarse, true));
     for (percent, found) in [(129, false), (131, true)] {
         let limit = AxisModel {
-            breakaway: coarse.pulse_force / percent * 100,
+            breakaway: coarse.pulse_force * 100 / percent,
             ..coarse
         };
         assert_eq!(is_coarse(&limit, false), found, "{percent}");
