@@ -43,6 +43,7 @@ const fn told(part: Part) -> &'static str {
 feed-forward, pause, half the acceleration"
         }
         Part::EasedGain => "of that fallback, half the acceleration only",
+        Part::Inching => "steps with shut valves between them, on coarse valves",
     }
 }
 

@@ -28,11 +28,13 @@ pub enum Part {
     Patience,
     /// Where patience is over the whole acceleration is asked for.
     EasedGain,
+    /// On coarse valves the position servo acts up to the target.
+    Inching,
 }
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::LoadObserver,
         Self::MassEstimator,
         Self::AirIdentification,
@@ -43,6 +45,7 @@ impl Part {
         Self::StoppingDistance,
         Self::Patience,
         Self::EasedGain,
+        Self::Inching,
     ];
 }
 

@@ -111,6 +111,18 @@ tuning! {
     PRESSURE_RATE_LEAST: i32 = 205, "1/256 Pa per 16 µs (50 Pa/ms)", "a valve at its pressure's end gives no pulse without end", "src/law/pulse_planner.rs::a_chamber_at_its_end_asks_for_a_pulse_that_ends";
     PULSE_LENGTHENED_LEAST: i32 = 20, "µs", "less is not worth a tick", "src/law/pulse_planner.rs::a_pulse_under_way_is_lengthened_by_what_is_worth_it";
 
+    OPENING_LONGEST: i32 = 60_000, "µs", "a step is no move: longer than any that a chamber has room for", "src/law/inching/tests.rs::an_opening_is_bounded_on_both_sides";
+
+    // Law: inching.
+    INCH_COARSE: i32 = 85_197, "break-away frictions that are less than the finest pulse, × 2^16 (1.3)", "measured: below it the position servo misses less, above it the steps (decision 64)", "src/law/inching/tests.rs::valves_are_coarse_if_a_pulse_is_more_than_friction_holds_and_the_mass_is_small";
+    INCH_BANDS: i32 = 20, "bands", "searched: with 12 and 24 as many misses, with 12 more of them by a fault", "src/law/inching/tests.rs::steps_begin_near_the_target_and_slow";
+    INCH_ENDS_BANDS: i32 = 80, "bands", "four times as far: the way of a step that went too far", "src/law/inching/tests.rs::steps_begin_near_the_target_and_slow";
+    INCH_SPEED: i32 = 120 << 16, "raw mm/s (120 mm/s)", "searched: at 60 it begins too late, at 200 too early", "src/law/inching/tests.rs::steps_begin_near_the_target_and_slow";
+    INCH_STILL_PERIODS: u16 = 2, "periods (8 ms)", "the turning point of a swing is shorter; with 4 more steps do not fit", "src/law/inching/tests.rs::a_step_waits_for_the_piston_and_is_sent_whole";
+    INCH_AIR_RESTS: i32 = 2_000 << 8, "1/256 Pa (2 kPa)", "less than a pulse, more than a creeping piston changes in the dead time", "src/law/inching/tests.rs::a_step_waits_for_the_piston_and_is_sent_whole";
+    INCH_SPRING: i32 = 39_322, "share of the spring's force, × 2^16 (0.6)", "searched: half of it would do without damping", "src/law/inching/tests.rs::a_step_makes_the_force_of_the_text";
+    INCH_FITS: i32 = 52_429, "share of a finest pulse, × 2^16 (0.8)", "half way between a pulse a quarter too large and a pair that adds its own error", "src/law/inching/tests.rs::a_force_below_the_finest_pulses_is_made_by_a_pair";
+
     // Law: standstill.
     REFERENCE_RESTS: i32 = 1 << 16, "raw mm/s (1 mm/s)", "a slower reference is a step", "src/law/tests.rs::a_moving_reference_is_not_rested_at";
     CATCH_SPEED: i32 = 4 << 16, "raw mm/s (4 mm/s)", "that of a stuck piston", "src/law/standstill/tests.rs::a_slow_piston_in_the_band_is_caught_and_rests_after_seven_periods";

@@ -7,7 +7,7 @@
 //! | | what is left when another part drives | why |
 //! |---|---|---|
 //! | goes on | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
-//! | begins anew, if the other part has the last tick of a period, and at the end of each period of its own | standstill, with the present stroke as its target; break-away ramp; preload | they belong to a rest and to forces that the law has not made |
+//! | begins anew, if the other part has the last tick of a period, and at the end of each period of its own | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
 //! | is dropped at once | the plan, as far as it was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
 //!
 //! A part that drives for less than a period, and not in its last tick, leaves rest, ramp and preload as they were. An
@@ -22,6 +22,7 @@
 //! of the pressures hold no longer.
 
 use super::Predictive;
+use super::inching::Inching;
 use super::inverse_dynamics::BreakawayRamp;
 use super::preload::Preload;
 use super::standstill::Standstill;
@@ -41,6 +42,7 @@ impl Predictive {
             self.observe_period(model, measured);
             self.ramp = BreakawayRamp::default();
             self.preload = Preload::default();
+            self.inching = Inching::default();
             self.standstill = Standstill::at(self.observer.motion.stroke);
         }
         self.next_tick(measured);

@@ -19,6 +19,7 @@
 //! | `allocation` | from a force to two chamber pressures about their mean; the pressure swap |
 //! | `pulse_planner` | from a pressure to the on-times of the next period |
 //! | `standstill` | when the valves stay shut: a state machine |
+//! | `inching` | coarse valves: steps towards the target, with the valves shut between them |
 //! | `seat` | a force instead of a position at an end stop |
 //! | `preload` | the edge of slipping ahead of an announced move |
 //! | `handover` | which part of the firmware commands the valves |
@@ -35,7 +36,8 @@
 //! 5. `seat`, if 4 has nothing to say: is the target an end stop, and the piston there? Then its force, or rest.
 //! 6. `standstill`, if 4 has nothing to say: its state follows from 5, or else from how the piston comes to the target.
 //! 7. `allocation`: the pressure swap begins with a preload, or where the piston stands at an end stop.
-//! 8. F\*: that of 4 or 5. No pulse, where 4 says so, or the state of 6 is PAUSE, CATCH or REST. Otherwise that of the
+//! 8. F\*: that of 4 or 5. No pulse, where 4 says so, or the state of 6 is PAUSE, CATCH or REST. Where the valves are
+//!    coarse and the piston near, the pulses of a step, or none (`inching`), and 9 is left out. Otherwise that of the
 //!    position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics` with `switching_curve` in it.
 //! 9. F\*, limited to what the supply can give, becomes two pressures (`allocation`) and these pulses
 //!    (`pulse_planner`).
@@ -73,6 +75,7 @@
 mod allocation;
 mod dead_time_predictor;
 mod handover;
+mod inching;
 mod inverse_dynamics;
 mod preload;
 mod pulse_planner;
@@ -87,9 +90,10 @@ use crate::observer::Observer;
 use crate::observer::motion::Motion;
 use crate::observer::pressure::{Period, Pressures};
 use crate::pwm::OnTimes;
-use crate::tuning::STILL_SPEED;
+use crate::tuning::{REFERENCE_RESTS, STILL_SPEED};
 use allocation::PressureSwap;
 use dead_time_predictor::PredictedState;
+use inching::{Inch, Inching};
 use inverse_dynamics::{BreakawayRamp, ForceDemand};
 use preload::{Awaited, Preload};
 use seat::Seat;
@@ -122,6 +126,7 @@ pub struct Predictive {
     standstill: Standstill,
     preload: Preload,
     swap: PressureSwap,
+    inching: Inching,
 
     /// A stroke has been measured.
     primed: bool,
@@ -164,6 +169,7 @@ impl Predictive {
             standstill: Standstill::default(),
             preload: Preload::default(),
             swap: PressureSwap::No,
+            inching: Inching::default(),
             primed: false,
             drives: false,
             tick_of_period: 0,
@@ -255,6 +261,7 @@ impl Predictive {
         let reference_speed = input.reference_velocity.raw();
         if self.standstill.aim(model, reference) {
             self.ramp = BreakawayRamp::default();
+            self.inching = Inching::default();
         }
         let stands = self.is_settled() || self.observer.motion.speed.wrapping_abs() < STILL_SPEED;
         let preload = self.preload(model, input, stands);
@@ -284,6 +291,17 @@ impl Predictive {
             };
             self.swap = PressureSwap::towards(to, self.observer.motion.stroke);
         }
+        let decides = preload.is_some() || seat.is_some();
+        match self.inch(model, input, decides) {
+            Some(Inch::Wait) => return self.shut(model),
+            Some(Inch::Pulses(plan)) => {
+                self.plan = plan;
+                self.limited = false;
+                self.duty = Duty::ZERO;
+                return;
+            }
+            None => {}
+        }
         let force = match (preload, seat) {
             (Some(Awaited::Ready), _) => return self.shut(model),
             (Some(Awaited::Force(force)), _) | (None, Some(Seat::Press(force))) => force,
@@ -291,6 +309,21 @@ impl Predictive {
             (None, _) => self.force_demand(model, reference, reference_speed),
         };
         self.make_force(model, force, preload.is_none() && self.standstill.is_near());
+    }
+
+    /// What a step on coarse valves wants of the next period; preload or seat may decide instead.
+    fn inch(&mut self, model: &AxisModel, input: &JointInput, decides: bool) -> Option<Inch> {
+        let reference_rests = input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS;
+        if decides || !reference_rests || !inching::is_coarse(model, self.gains.half_is_enough) {
+            self.inching = Inching::default();
+            return None;
+        }
+        if self.standstill.valves_closed() {
+            self.inching.interrupt();
+            return None;
+        }
+        self.inching
+            .update(model, &self.observer, input.reference.raw(), self.begin)
     }
 
     /// F* of the position servo, mN.

@@ -22,8 +22,8 @@
 //! **Grain.** A chamber has half of a force to make (`allocation`), and is left as it is if half of its shortest
 //! opening would be too much. So the least force that makes a pulse is about that of one shortest opening,
 //! F_1 of `switching_curve`. A smaller one is not stored: the next period asks again, and in a piston that stands the
-//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. There is no vernier: pulses of A and B whose forces oppose each other come about where both
-//! pressures are to rise, or both to fall, but are not chosen for the small difference of their forces.
+//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. Pulses of A and B whose forces oppose each other come about where both pressures are to
+//! rise, or both to fall; for the small difference of their forces `inching` alone chooses them.
 //!
 //! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected
 //! one alone; delays of the valves as specified within their margin; supply and atmosphere as specified. If the supply
@@ -34,12 +34,12 @@
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 
 use crate::axis::AxisModel;
-use crate::math::mul_shr;
+use crate::math::{mul_shr, mul_shr_sat};
 use crate::observer::Observer;
 use crate::observer::pressure::{Chamber, Pressures};
 use crate::observer::valve_delay::{ValveTimes, ValveTrack};
 use crate::pwm::OnTimes;
-use crate::tuning::{PRESSURE_RATE_LEAST, PULSE_LENGTHENED_LEAST};
+use crate::tuning::{OPENING_LONGEST, PRESSURE_RATE_LEAST, PULSE_LENGTHENED_LEAST};
 
 /// What a valve can do in the next period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,6 +177,77 @@ pub(super) fn plan(
         };
     }
     [fill_a, vent_a, fill_b, vent_b]
+}
+
+/// An open valve on a piston at rest, at the pressure that its chamber is expected to have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Valve {
+    /// Power over area, as in [`AxisModel::fill_power`].
+    power: i32,
+    /// [`AxisModel::exponent_per_length`] of the chamber.
+    n_per_length: i32,
+    /// mN per 1/256 Pa, × 2^32.
+    force: i32,
+    /// 1/256 Pa per mN, × 2^12.
+    pressure: i32,
+    /// Opening of the shortest pulse, µs.
+    shortest: i32,
+}
+
+impl Valve {
+    /// By how much the shortest opening changes the force, mN, not negative.
+    pub(super) fn finest(&self) -> i32 {
+        let rate = mul_shr_sat(self.power, self.n_per_length, 22).max(PRESSURE_RATE_LEAST);
+        mul_shr(mul_shr_sat(rate, self.shortest, 4), self.force, 32)
+    }
+
+    /// Pressure that makes a force of so many mN, 1/256 Pa.
+    pub(super) fn pressure(&self, force: i32) -> i32 {
+        mul_shr_sat(force, self.pressure, 12)
+    }
+
+    /// Opening that changes the pressure by so much (1/256 Pa), µs, at least the shortest.
+    pub(super) fn opening(&self, change: i32) -> i32 {
+        opening(self.power, change, self.n_per_length)
+            .max(self.shortest)
+            .min(OPENING_LONGEST)
+    }
+}
+
+/// The four valves.
+pub(super) fn valves(model: &AxisModel, observer: &Observer) -> [Valve; 4] {
+    let stroke = observer.motion.stroke;
+    let (a, b) = (observer.a.expected, observer.b.expected);
+    let (speed_a, speed_b) = (model.choked_speed_a, model.choked_speed_b);
+    let of_a = |power: i32| Valve {
+        power,
+        n_per_length: model.exponent_per_length(model.length_a(stroke)),
+        force: model.force_a,
+        pressure: model.pressure_a,
+        shortest: model.times.shortest_opening(),
+    };
+    let of_b = |power: i32| Valve {
+        power,
+        n_per_length: model.exponent_per_length(model.length_b(stroke)),
+        force: model.force_b,
+        pressure: model.pressure_b,
+        shortest: model.times.shortest_opening(),
+    };
+    [
+        of_a(model.fill_power(speed_a, a)),
+        of_a(model.vent_power(speed_a, a)),
+        of_b(model.fill_power(speed_b, b)),
+        of_b(model.vent_power(speed_b, b)),
+    ]
+}
+
+/// Whether every valve may begin a pulse in the period that begins `next`.
+pub(super) fn all_ready(model: &AxisModel, observer: &Observer, next: u32) -> bool {
+    [&observer.a, &observer.b].iter().all(|chamber| {
+        ready(chamber, next, &model.times)
+            .iter()
+            .all(|valve| *valve == Ready::Shut)
+    })
 }
 
 /// Everything shut as soon as the pulses under way allow.
