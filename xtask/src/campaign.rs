@@ -22,7 +22,7 @@ struct Shipped {
     rows: u32,
 }
 
-const SHIPPED: [Shipped; 4] = [
+const SHIPPED: [Shipped; 5] = [
     Shipped {
         plan: "three-step-spread",
         cuts: &[("samples = 100", "samples = 5")],
