@@ -23,10 +23,10 @@ const FIRST_VARIABLE: &str = "WHEELEG_CYLINDERS_FIRST";
 /// If set, chambers start vented, as when the first rates were measured.
 const VENTED_VARIABLE: &str = "WHEELEG_CYLINDERS_VENTED";
 /// Upper bounds of the rates that were measured, one-sided 95 %: of fine valves, of coarse ones, missed and by a fault.
-const FINE_MISSED: f64 = 0.08;
+const FINE_MISSED: f64 = 0.035;
 const FINE_FAULTS: f64 = 0.003;
-const COARSE_MISSED: f64 = 0.25;
-const COARSE_FAULTS: f64 = 0.12;
+const COARSE_MISSED: f64 = 0.095;
+const COARSE_FAULTS: f64 = 0.03;
 /// Choked outflow of air at 293.15 K per conductance, Pa (ISO 6358: ρ0 R T).
 const CHOKED_PA: f64 = 99_716.0;
 
