@@ -38,7 +38,9 @@ pub const SCENARIOS: &[(&str, &str, &str)] = embedded!("scenarios":
 );
 
 /// Plans of campaigns: name, file name for messages, text.
-pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns": "three-step-spread", "how-steep", "leg-design", "cylinder-spread", "first-step");
+pub const PLANS: &[(&str, &str, &str)] = embedded!("campaigns":
+    "three-step-spread", "how-steep", "leg-design", "cylinder-spread", "first-step",
+);
 
 /// Data files of scenarios: name, content.
 pub const DATA: &[(&str, &[u8])] = &[(

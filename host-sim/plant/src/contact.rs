@@ -113,6 +113,7 @@ impl ContactLaw {
     /// Static and kinetic friction on a material: of two the smaller.
     #[inline]
     pub(crate) fn friction_on(&self, material: &Material) -> [f64; 2] {
+        // A comparison alone: `f64::min` also minds NaN, in every contact of every step.
         let less = |own: f64, other: f64| if other < own { other } else { own };
         [
             less(self.mu_static, material.mu_static),

@@ -153,8 +153,7 @@ fn air_rests(observer: &Observer) -> bool {
 fn on_times(model: &AxisModel, openings: [i32; 4]) -> [i32; 4] {
     openings.map(|open| {
         if open > 0 {
-            open.saturating_add(model.times.on)
-                .saturating_sub(model.times.off)
+            pulse_planner::on_for(open, &model.times)
         } else {
             0
         }

@@ -85,15 +85,16 @@ impl Ready {
                 if need <= shortest >> 1 {
                     return 0;
                 }
-                let opening = need.max(shortest);
-                microseconds(
-                    opening.saturating_add(times.on).saturating_sub(times.off),
-                    times,
-                )
+                microseconds(on_for(need.max(shortest), times), times)
             }
             Self::Shut | Self::Shuts => 0,
         }
     }
+}
+
+/// On-time, µs, that opens a shut valve for so many µs.
+pub(super) fn on_for(opening: i32, times: &ValveTimes) -> i32 {
+    opening.saturating_add(times.on).saturating_sub(times.off)
 }
 
 /// An on-time, 0…period (at most 8000).
@@ -106,14 +107,18 @@ fn ready(chamber: &Chamber, next: u32, times: &ValveTimes) -> [Ready; 2] {
     [&chamber.fill, &chamber.vent].map(|track| Ready::of(track, next, times))
 }
 
+/// How fast an open valve's `power` changes the pressure in a chamber of `n_per_length`, 1/256 Pa per 16 µs.
+fn rate(power: i32, n_per_length: i32) -> i32 {
+    // 2^8 Pa mm/s × n/L.
+    mul_shr(power, n_per_length, 22).max(PRESSURE_RATE_LEAST)
+}
+
 /// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa, not
 /// negative) in a chamber of `n_per_length`.
 fn opening(power: i32, change: i32, n_per_length: i32) -> i32 {
-    // 2^8 Pa mm/s × n/L: 1/256 Pa per 16 µs.
-    let rate = mul_shr(power, n_per_length, 22).max(PRESSURE_RATE_LEAST);
     // Of at most 5 bar: below 2^31, and more than a period can make.
     let size = change.min(500_000 << 8).wrapping_shl(4);
-    size.checked_div(rate).unwrap_or(0)
+    size.checked_div(rate(power, n_per_length)).unwrap_or(0)
 }
 
 /// On-times of the next period that bring a chamber of `length` (raw mm) from what is expected to `target`,
@@ -197,7 +202,7 @@ pub(super) struct Valve {
 impl Valve {
     /// By how much the shortest opening changes the force, mN, not negative.
     pub(super) fn finest(&self) -> i32 {
-        let rate = mul_shr_sat(self.power, self.n_per_length, 22).max(PRESSURE_RATE_LEAST);
+        let rate = rate(self.power, self.n_per_length);
         mul_shr(mul_shr_sat(rate, self.shortest, 4), self.force, 32)
     }
 
@@ -219,26 +224,29 @@ pub(super) fn valves(model: &AxisModel, observer: &Observer) -> [Valve; 4] {
     let stroke = observer.motion.stroke;
     let (a, b) = (observer.a.expected, observer.b.expected);
     let (speed_a, speed_b) = (model.choked_speed_a, model.choked_speed_b);
-    let of_a = |power: i32| Valve {
-        power,
-        n_per_length: model.exponent_per_length(model.length_a(stroke)),
-        force: model.force_a,
-        pressure: model.pressure_a,
-        shortest: model.times.shortest_opening(),
+    let of = |[fill, vent]: [i32; 2], length: i32, force: i32, pressure: i32| {
+        let n_per_length = model.exponent_per_length(length);
+        [fill, vent].map(|power| Valve {
+            power,
+            n_per_length,
+            force,
+            pressure,
+            shortest: model.times.shortest_opening(),
+        })
     };
-    let of_b = |power: i32| Valve {
-        power,
-        n_per_length: model.exponent_per_length(model.length_b(stroke)),
-        force: model.force_b,
-        pressure: model.pressure_b,
-        shortest: model.times.shortest_opening(),
-    };
-    [
-        of_a(model.fill_power(speed_a, a)),
-        of_a(model.vent_power(speed_a, a)),
-        of_b(model.fill_power(speed_b, b)),
-        of_b(model.vent_power(speed_b, b)),
-    ]
+    let [fill_a, vent_a] = of(
+        [model.fill_power(speed_a, a), model.vent_power(speed_a, a)],
+        model.length_a(stroke),
+        model.force_a,
+        model.pressure_a,
+    );
+    let [fill_b, vent_b] = of(
+        [model.fill_power(speed_b, b), model.vent_power(speed_b, b)],
+        model.length_b(stroke),
+        model.force_b,
+        model.pressure_b,
+    );
+    [fill_a, vent_a, fill_b, vent_b]
 }
 
 /// Whether every valve may begin a pulse in the period that begins `next`.

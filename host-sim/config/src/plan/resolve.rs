@@ -240,10 +240,10 @@ impl<'a> Resolver<'a> {
         let any = |part| factors.iter().any(|(factor, _)| sets(factor, part));
         let name = chosen(Setting::Axis).map_or_else(|| base.axis.clone(), ToString::to_string);
         let mut template = self.known(Kept::Axis, &name)?;
-        let file = self.axes.get(name.as_str()).filter(|_| !any(Part::Axis));
+        let unchanged = self.axes.get(name.as_str()).filter(|_| !any(Part::Axis));
         // The plant is off its data sheet, whatever that says.
         let stated;
-        let sheet = match file {
+        let sheet = match unchanged {
             Some(sheet) => Cow::Borrowed(sheet),
             None => {
                 let document = changed(template, factors, Part::Axis)?;

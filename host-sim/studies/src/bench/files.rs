@@ -130,10 +130,9 @@ pub fn write(
 }
 
 fn title(motion: Move, name: &str) -> &str {
-    match name {
-        _ if motion == Move::FirstStep => "The first move after power-up",
-        "first" => "The first move after power-up",
-        "measured-1" => "The first measured move",
+    match (motion, name) {
+        (Move::FirstStep, _) | (_, "first") => "The first move after power-up",
+        (_, "measured-1") => "The first measured move",
         _ => "The second measured move",
     }
 }
