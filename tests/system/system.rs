@@ -4,6 +4,7 @@
 
 mod long_checks;
 mod program;
+mod random_cylinder;
 mod sil;
 mod step_back;
 
