@@ -236,9 +236,7 @@ fn what_each_part_of_the_law_is_worth() {
         number(COMBINATIONS_VARIABLE, COMBINATIONS),
         number(ROOT_VARIABLE, judging_root()),
     );
-    let of_axes = AXES
-        .iter()
-        .flat_map(|axis| combinations(axis, root, count));
+    let of_axes = AXES.iter().flat_map(|axis| combinations(axis, root, count));
     let of_cylinders = [false, true]
         .into_iter()
         .flat_map(|coarse| cylinders(coarse, root, count));

@@ -61,7 +61,7 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
         times.extend(settled.map(|s| s.unwrap_or(f64::INFINITY)));
         let tally = &mut tallies[usize::from(coarse)];
         tally.cylinders += 1;
-        tally.faults += u64::from(outcome.alarm);
+        tally.faults += u64::from(outcome.alarm());
         if !outcome.keeps() {
             tally.missed += 1;
             println!("cylinder {which}, coarse valves: {coarse}: {outcome:?}");

@@ -69,18 +69,23 @@ pub(crate) fn is_coarse(sheet: &AxisParams) -> bool {
 /// What came of the moves.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// The first fault told.
+    /// The first fault reported.
     pub fault: Option<String>,
-    /// A fault, or no motion where one was asked for.
-    pub alarm: bool,
+    /// Whether the law drove the piston all the time.
+    pub drove: bool,
     /// Of the two moves that are judged.
     pub judged: Vec<Metrics>,
 }
 
 impl Outcome {
+    /// Whether a sound cylinder was taken for a faulty one.
+    pub(crate) fn alarm(&self) -> bool {
+        self.fault.is_some() || !self.drove
+    }
+
     /// The bars of the combinations on the bench axis, and no false alarm.
     pub(crate) fn keeps(&self) -> bool {
-        !self.alarm
+        !self.alarm()
             && self.judged.iter().all(|m| {
                 m.steady_error_mm.abs() <= 0.5 && m.overshoot_mm <= 6.0 && !m.limit_cycle()
             })
@@ -108,7 +113,7 @@ pub(crate) fn played(sheet: &AxisParams, which: u64) -> Outcome {
     let fault = traces.iter().flat_map(|t| t.faults.iter()).next();
     Outcome {
         fault: fault.map(|fault| format!("{fault:?}")),
-        alarm: fault.is_some() || traces.iter().any(|t| !t.drove),
+        drove: traces.iter().all(|t| t.drove),
         judged: traces[1..].iter().map(Metrics::of).collect(),
     }
 }
