@@ -1,4 +1,4 @@
-//! What the commands of campaigns print as JSON, and `plan.json`, with their published forms.
+//! JSON that the commands of campaigns print, and `plan.json`, with their published schemas.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::report::{Findings, Pairs};
 use crate::store::{FORMAT, PlanFile};
 use crate::{Cause, Merged, State, Status};
 
-/// Causes that are listed; of more there is the number.
+/// Number of causes listed; any others are only counted.
 pub const CAUSES: usize = 20;
 
 /// What `wheeleg campaign status --json` prints: a line of JSON.
@@ -74,7 +74,7 @@ impl Form for StatusForm {
 }
 
 impl StatusForm {
-    /// Of a folder.
+    /// The status of a folder.
     #[must_use]
     pub fn of(state: &State) -> Self {
         let causes = state.causes.first(CAUSES).into_iter();
@@ -133,7 +133,7 @@ impl Form for MergeForm {
 }
 
 impl MergeForm {
-    /// Of a table that was written.
+    /// The form for a table that was written.
     #[must_use]
     pub fn of(merged: &Merged, table: &Path) -> Self {
         Self {
@@ -158,7 +158,7 @@ impl Form for ReportForm<'_> {
     const SCHEMA: &'static str = "wheeleg.campaign-report/1";
 }
 
-/// The published forms by their names.
+/// The published schemas by name.
 #[must_use]
 pub fn schemas() -> Vec<(&'static str, Value)> {
     let mut plan = of_file::<PlanFile>("wheeleg.campaign-plan/1");

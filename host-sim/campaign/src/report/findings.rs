@@ -1,4 +1,4 @@
-//! What a table says: rates, quantiles, correlations, the worst cases.
+//! What a table shows: rates, quantiles, correlations, the worst cases.
 
 use std::collections::BTreeMap;
 
@@ -16,11 +16,11 @@ use crate::row::Status;
 use crate::table::Table;
 use crate::{CampaignError, Cases, Setup};
 
-/// Kinds of errors that are listed.
+/// Number of kinds of errors listed.
 const ERRORS: usize = 20;
-/// Quantiles that are told of every target.
+/// Quantiles reported for every target.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
-/// Most values of which a bootstrap interval is drawn; beyond it ranks are as good.
+/// Most values for which a bootstrap interval is drawn; for more, ranks are as good.
 const BOOTSTRAP: usize = 500;
 
 /// How often something held.
@@ -168,7 +168,7 @@ pub struct Findings {
     pub paired: Vec<Paired>,
 }
 
-/// Reads a table.
+/// Evaluates a table.
 pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
     let plan = merged.plan.plan()?;
     let table = &merged.table;
@@ -221,12 +221,12 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
     })
 }
 
-/// The column of a factor.
+/// Name of a factor's column.
 fn of_factor(name: &str) -> String {
     format!("f.{name}")
 }
 
-/// Least and largest of at least two values.
+/// Smallest and largest value; `None` for fewer than two values.
 fn between<'a>(values: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let none = (0, [f64::INFINITY, f64::NEG_INFINITY]);
     let (count, between) = values.fold(none, |(count, [low, high]), value| {
@@ -235,10 +235,10 @@ fn between<'a>(values: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     (count > 1).then_some(between)
 }
 
-/// Grounds that are listed.
+/// Number of grounds listed.
 const GROUNDS: usize = 20;
 
-/// The ground of the first case of each cell, each once.
+/// The ground of the first case of each cell, without repetitions.
 fn grounds(plan: &Plan, merged: &Merged, cells: &[Cell]) -> Result<Vec<OfScenario>, CampaignError> {
     let cases = Cases::new(plan)?;
     let indices = merged.table.wholes("index");
@@ -321,8 +321,8 @@ fn of_target(
     }
 }
 
-/// Shares of the variance of a cell's values; empty where they are the same, or too few sets of samples have
-/// all their values.
+/// Shares of the variance of a cell's values; empty if all values are equal, or too few sets of samples are
+/// complete.
 fn shares(table: &Table, cell: &Cell, values: &[Option<f64>], factors: usize) -> Vec<Shares> {
     let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
     let size = factors + 2;

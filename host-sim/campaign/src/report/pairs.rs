@@ -1,4 +1,4 @@
-//! Cases that differ in one thing alone: in the program, or in the value of a paired factor.
+//! Compares cases that differ in only one thing: the program, or the value of a paired factor.
 
 use std::collections::HashMap;
 
@@ -76,7 +76,7 @@ pub struct Pairs {
     pub program: String,
 }
 
-/// Compares a table with another one, case by case.
+/// Compares a table with another, case by case.
 pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignError> {
     let places = |of: &Merged| -> HashMap<String, usize> {
         let cases = of.table.texts("case").iter().enumerate();
@@ -120,7 +120,7 @@ pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignEr
     })
 }
 
-/// Each value of a paired factor against its first, where all else is the same.
+/// Compares each value of a paired factor with its first value, with everything else equal.
 pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired> {
     let table = &merged.table;
     let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
@@ -165,7 +165,7 @@ pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired
     found
 }
 
-/// Pairs of rows, before and after.
+/// Compares pairs of rows, before and after.
 fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]) -> Paired {
     let flags = |name: &str| {
         let (b, a) = (before.table.flags(name), after.table.flags(name));
@@ -206,7 +206,7 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
     }
 }
 
-/// Most pairs that an interval is drawn from: of more a mean is normal.
+/// Most pairs for which an interval is drawn; the mean of more pairs is close to normal.
 const BOOTSTRAP: usize = 2_000;
 
 fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
@@ -221,7 +221,7 @@ fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
     Some([centre - half, centre + half])
 }
 
-/// What is neither yes nor no counts as no: a case without a result has not passed.
+/// A missing verdict counts as no: a case without a result has not passed.
 fn split(pairs: impl Iterator<Item = (Option<bool>, Option<bool>)>) -> Split {
     let (mut lost, mut gained, mut same) = (0, 0, 0);
     for (before, after) in pairs {
