@@ -45,7 +45,7 @@ struct RunArgs {
     /// Seed of all noise, and of the instants.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
-    /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
+    /// Folder for the results. Results of an earlier run in it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/faults")]
     out: PathBuf,
     /// Print every row with --all; otherwise rows that passed are only counted.
