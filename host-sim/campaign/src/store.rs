@@ -49,7 +49,7 @@ pub struct PlanFile {
     pub cases: u64,
     /// Cases of a block.
     pub block: u64,
-    /// Texts that the plan stands on.
+    /// Texts that the plan depends on.
     pub sources: Sources,
 }
 

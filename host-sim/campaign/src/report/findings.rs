@@ -23,12 +23,12 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 /// Most values for which a bootstrap interval is drawn; for more, ranks are as good.
 const BOOTSTRAP: usize = 500;
 
-/// How often something held.
+/// How often something was true.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Rate {
-    /// How often.
+    /// How often it was true.
     pub met: u64,
-    /// Of how many.
+    /// Out of how many.
     pub of: u64,
     /// Exact interval, 95 % two-sided.
     pub exact: [f64; 2],
@@ -54,9 +54,9 @@ pub struct Quantile {
     pub share: f64,
     /// Its value.
     pub value: f64,
-    /// Interval by ranks, 95 %; an end that so few values do not bound is none.
+    /// Interval by ranks, 95 %; an end that too few values cannot bound is null.
     pub ranks: [Option<f64>; 2],
-    /// Interval by drawing from the values; none of too many or too few.
+    /// Interval by resampling the values; null for too many or too few values.
     pub bootstrap: Option<[f64; 2]>,
 }
 
@@ -65,34 +65,35 @@ pub struct Quantile {
 pub struct InCell {
     /// The cell, in words.
     pub cell: String,
-    /// How often it was met, of the cases that ran to their end.
+    /// How often it was met, among the cases that ran to their end.
     pub rate: Rate,
     /// Quantiles of its value.
     pub quantiles: Vec<Quantile>,
-    /// Rank correlation with each factor that is drawn.
+    /// Rank correlation with each drawn factor.
     pub spearman: Vec<Option<f64>>,
-    /// Least and largest value of each of these factors in the cases that missed the target; none of fewer than two
-    /// such cases. An effect within a narrow range of a factor is no correlation.
+    /// Smallest and largest value of each of these factors among the cases that missed the target; null for
+    /// fewer than two such cases. An effect within a narrow range of a factor does not show as a correlation.
     pub missed_between: Vec<Option<[f64; 2]>>,
-    /// Shares of the variance that the factors of [`Findings::shared`] cause; empty where there are none.
+    /// Shares of the variance caused by the factors in [`Findings::shared`]; empty if there are none.
     pub shares: Vec<Shares>,
 }
 
-/// Shares of a target's variance that one factor causes.
+/// Shares of a target's variance caused by one factor.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
-    /// Alone.
+    /// By the factor alone.
     pub first: Share,
-    /// With all that it does together with others.
+    /// Including its interactions with other factors.
     pub total: Share,
 }
 
 /// A share of a variance. Noise may make it less than 0 or more than 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// Its estimate; none where the interval is wider than all of the variance: these samples do not tell it.
+    /// Estimate; null if the interval is wider than the whole variance, so that these samples do not
+    /// determine it.
     pub value: Option<f64>,
-    /// Its interval, 95 %, by drawing from the samples; none of too many, and none beside no estimate.
+    /// 95 % interval, by resampling the samples; null for too many samples, or without an estimate.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -130,41 +131,41 @@ pub struct OfTarget {
     pub cells: Vec<InCell>,
 }
 
-/// What a scenario stands on, as its file has it.
+/// The ground of a scenario, as its file describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OfScenario {
     /// Its name.
     pub scenario: String,
-    /// Its parts with their materials; none of a level floor of rock.
+    /// Parts of the ground with their materials; empty for a level floor of rock.
     pub parts: Vec<String>,
 }
 
-/// What a table says.
+/// What a table shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
     /// Rows.
     pub rows: u64,
     /// Rows by [`Status::ALL`].
     pub by_status: Vec<(String, u64)>,
-    /// In each cell, how often all required targets were met, of all cases.
+    /// For each cell, how often all required targets were met, among all cases.
     pub passed: Vec<(String, Rate)>,
     /// Names of the factors.
     pub factors: Vec<String>,
-    /// Names of the factors that are drawn and have numbers.
+    /// Names of the factors that are drawn and numeric.
     pub drawn: Vec<String>,
-    /// Least and largest value of each of these in the table.
+    /// Smallest and largest value of each of these in the table.
     pub drawn_between: Vec<Option<[f64; 2]>>,
-    /// Names of the factors that cause shares of the variance: those that Saltelli's design draws.
+    /// Names of the factors with shares of the variance: those that Saltelli's design draws.
     pub shared: Vec<String>,
     /// Each target.
     pub targets: Vec<OfTarget>,
     /// Errors by kind, the most frequent first.
     pub errors: Vec<(String, u64)>,
-    /// What the scenarios stand on; empty of cylinders on the bench.
+    /// The ground of each scenario; empty for cylinders on the bench.
     pub grounds: Vec<OfScenario>,
-    /// The worst cases, the worst first; those that passed come last, the nearest to a limit first.
+    /// The worst cases, worst first; those that passed come last, nearest to a limit first.
     pub worst: Vec<Worst>,
-    /// Values of paired factors against the first value of each.
+    /// Values of paired factors, each compared with the factor's first value.
     pub paired: Vec<Paired>,
 }
 

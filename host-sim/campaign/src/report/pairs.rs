@@ -12,7 +12,7 @@ use super::cells::{self, Cell};
 use crate::CampaignError;
 use crate::columns::Column;
 
-/// A yes or no of pairs, before and after.
+/// A yes-or-no result of pairs, before and after.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Split {
     /// Yes before, no after.
@@ -21,7 +21,8 @@ pub struct Split {
     pub gained: u64,
     /// The same in both.
     pub same: u64,
-    /// Probability of as unequal a split if neither way is more likely: exact test of McNemar.
+    /// Probability of a split at least this unequal if both directions are equally likely: exact test of
+    /// McNemar.
     pub p: f64,
 }
 
@@ -42,7 +43,7 @@ pub struct Change {
     pub column: Column,
     /// Mean of after − before.
     pub mean: Option<f64>,
-    /// Its interval, 95 %, by drawing pairs; of very many by the normal distribution.
+    /// Its 95 % interval, by resampling the pairs; for very many pairs, by the normal distribution.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -53,22 +54,22 @@ pub struct Paired {
     pub what: String,
     /// Pairs.
     pub pairs: u64,
-    /// All required targets met.
+    /// Whether all required targets were met.
     pub passed: Split,
     /// Each target with limits.
     pub targets: Vec<TargetSplit>,
-    /// Each target without: nothing can be lost or gained.
+    /// Each target without limits: nothing can be lost or gained.
     pub values: Vec<Change>,
 }
 
 /// Pairs of two tables.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Pairs {
-    /// The comparison; before is the other table.
+    /// The comparison; the other table is "before".
     pub paired: Paired,
-    /// Cases of this table alone.
+    /// Cases only in this table.
     pub only_here: u64,
-    /// Cases of the other table alone.
+    /// Cases only in the other table.
     pub only_there: u64,
     /// Pairs with the same log.
     pub same_log: u64,

@@ -16,7 +16,7 @@ const WORST: usize = 20;
 /// share of at least this value.
 const NOTHING: f64 = 1e-9;
 
-/// A case with what was missed in it, or what was nearest to be.
+/// A case with what it missed, or what it was nearest to missing.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Worst {
     /// Identity.
@@ -27,11 +27,11 @@ pub struct Worst {
     pub passed: bool,
     /// Values of the factors.
     pub factors: Vec<String>,
-    /// Required targets outside of their limits, and by how much of the limit's value; those that were not measured
-    /// first, then the furthest outside.
+    /// Required targets outside their limits, and by what share of the limit: first those that were not
+    /// measured, then the furthest outside.
     pub missed: Vec<String>,
-    /// Of a case that passed, the required target nearest to a limit, and by how much of the limit's
-    /// value it was met.
+    /// For a case that passed, the required target nearest to a limit, and by what share of the limit it was
+    /// met.
     pub nearest: Option<String>,
 }
 
