@@ -1,12 +1,12 @@
-//! Digest of the sources that the rows of a campaign depend on: parts of two programs are told
-//! apart by it.
+//! Computes a digest of the sources that the rows of a campaign depend on. It tells the parts of two
+//! different programs apart.
 
 use std::env;
 use std::path::PathBuf;
 
 use wheeleg_identity::sources;
 
-/// Whatever this crate is built from.
+/// Everything this crate is built from.
 const NAMES: [&str; 21] = [
     "Cargo.toml",
     "Cargo.lock",

@@ -1,7 +1,7 @@
-//! What a campaign costs beside its simulations: the first row of a plan of 1,000,000 cases, the
-//! making of a case, parts, merge, report. Prints times and memory.
+//! Measures the overhead of a campaign, without its simulations: the first row of a plan of 1,000,000 cases,
+//! building a case, parts, merge, report. Prints times and memory.
 //!
-//! `cargo run --release -p wheeleg-campaign --example large [ROWS]`; without a number, 4,096 rows.
+//! `cargo run --release -p wheeleg-campaign --example large [ROWS]`; the default is 4,096 rows.
 
 use std::time::Instant;
 
@@ -12,10 +12,10 @@ use wheeleg_config::plan::{Plan, Sources};
 use wheeleg_studies::analysis::Analyser;
 use wheeleg_studies::study::Stop;
 
-/// Cases that get a row, unless the command line asks for another number.
+/// Number of cases that get a row, unless the command line states another.
 const ROWS: u64 = 4096;
 
-/// A result without a simulation.
+/// Returns a result without a simulation.
 fn computed(case: &Case) -> Option<Outcome> {
     let (scenario, robot) = case.setup.as_ref().ok()?.robot()?;
     let mut targets = Analyser::new(scenario, robot).finish().targets;
@@ -44,7 +44,7 @@ fn plan(samples: u64) -> Plan {
     Plan::of(sources).expect("a plan")
 }
 
-/// Largest memory so far, MB, where the system tells it.
+/// Peak memory so far, MB, where the system reports it.
 fn peak_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

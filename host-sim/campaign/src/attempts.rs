@@ -1,9 +1,10 @@
-//! Which cases a process has begun, so that one that ends the process is known by the next.
+//! Records which cases a process has begun, so that the next process knows which case may have crashed this
+//! one.
 //!
-//! A line for each beginning, each end, and each process of its own that a case ended
-//! (`isolate.rs`). A beginning without an end is a suspicion: the process may have been killed
-//! from outside, and had more than one case at work. So such a case is run once more in a process
-//! of its own; if it ends that, too, its row says so.
+//! One line is written when a case begins, one when it ends, and one for each separate process that it
+//! crashed (`isolate.rs`). A beginning without an end is only a suspicion: the process may have been killed
+//! from outside, and may have been running several cases. Such a case is therefore run again in a process of
+//! its own; if it crashes that process too, its row says so.
 
 use std::collections::BTreeMap;
 use std::fs::{self, OpenOptions};
@@ -16,7 +17,7 @@ use wheeleg_config::open_file;
 
 use crate::{CampaignError, host};
 
-/// One line.
+/// One line of the file.
 #[derive(Debug, Serialize, Deserialize)]
 struct Line {
     case: u64,
@@ -25,45 +26,45 @@ struct Line {
     process: u32,
 }
 
-/// What became of a case.
+/// What happened to a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Event {
-    /// A process has begun it.
+    /// A process has begun the case.
     Begun,
-    /// It has a row, or was left when the process was asked to stop.
+    /// The case has a row, or was abandoned because the process was asked to stop.
     Ended,
-    /// It ended a process of its own.
+    /// The case crashed the separate process that ran it.
     EndedItsProcess,
 }
 
-/// What is known of a case.
+/// What is known about a case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Known {
     /// Beginnings without an end.
     pub(crate) open: u32,
-    /// Processes of its own that it ended.
+    /// Separate processes that the case crashed.
     pub(crate) proven: u32,
 }
 
 impl Known {
-    /// Processes that have ended in it, as far as is known.
+    /// Number of processes known to have ended while they ran the case.
     pub(crate) fn ends(self) -> u32 {
         self.open + self.proven
     }
 }
 
-/// The file of a block.
+/// The attempts file of a block.
 #[derive(Debug)]
 pub(crate) struct Attempts {
     path: PathBuf,
     known: BTreeMap<u64, Known>,
-    /// Lines of threads must not mix.
+    /// Keeps lines of different threads from mixing.
     file: Mutex<()>,
 }
 
 impl Attempts {
-    /// Reads what is there; a line that was cut off is none.
+    /// Reads the existing file; ignores a truncated line.
     pub(crate) fn read(path: PathBuf) -> Self {
         let text = open_file(&path)
             .and_then(std::io::read_to_string)
@@ -90,17 +91,17 @@ impl Attempts {
         }
     }
 
-    /// What was known of a case when the file was read.
+    /// What was known about a case when the file was read.
     pub(crate) fn known(&self, case: u64) -> Known {
         self.known.get(&case).copied().unwrap_or_default()
     }
 
-    /// What was known of every case that was begun.
+    /// What was known about every case that was begun.
     pub(crate) fn all(&self) -> impl Iterator<Item = (u64, Known)> + '_ {
         self.known.iter().map(|(case, known)| (*case, *known))
     }
 
-    /// Adds a line.
+    /// Appends a line.
     pub(crate) fn note(&self, case: u64, event: Event) -> Result<(), CampaignError> {
         let line = Line {
             case,
@@ -121,7 +122,7 @@ impl Attempts {
         write().map_err(|e| CampaignError::output("write", &self.path, e))
     }
 
-    /// The block is done.
+    /// Removes the file when the block is done.
     pub(crate) fn remove(&self) {
         let _ = fs::remove_file(&self.path);
     }

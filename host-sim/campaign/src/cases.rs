@@ -1,4 +1,4 @@
-//! Any case of a plan from its index.
+//! Builds any case of a plan from its index.
 
 use wheeleg_config::bench::Bench;
 use wheeleg_config::plan::{Base, OnRobot, Plan, Resolved, Resolver, Sets, Value};
@@ -13,28 +13,28 @@ use crate::identity::{CaseId, identity};
 use crate::place::Place;
 use crate::reasons::{problems, why};
 
-/// Simulated seconds of a robot in one of work, about.
+/// Approximate number of seconds of a robot simulated per second of processor time.
 const SPEED: f64 = 20.0;
-/// Simulated time of a start-up, s, about (1.4 of `wheeleg-2003`, 2.7 of `wheeleg`, measured 2026-11-26): it comes
-/// before the time of a scenario.
+/// Approximate simulated time of a start-up, s (1.4 for `wheeleg-2003`, 2.7 for `wheeleg`, measured
+/// 2026-11-26). It precedes the time of the scenario.
 const START_UP_S: f64 = 2.5;
-/// Processor time of a case on the bench, s, about.
+/// Approximate processor time of a case on the bench, s.
 const BENCH_S: f64 = 0.03;
 
-/// Processor time of one case, s, about: that of a scenario of so many seconds, and of its start-up. Not measured:
-/// two computers must come to the same blocks.
+/// Approximate processor time of one case, s, for a scenario of this duration and its start-up. It is not
+/// measured, because two computers must arrive at the same blocks.
 #[must_use]
 pub fn work_s(duration_s: f64) -> f64 {
     (START_UP_S + duration_s) / SPEED
 }
 
-/// Cells that are looked at before the first case.
+/// Number of cells checked before the first case.
 const CELLS: u64 = 1000;
 
-/// A case.
+/// One case of a plan.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// Where it stands.
+    /// Its place in the plan.
     pub place: Place,
     /// Values of the factors.
     pub values: Vec<Value>,
@@ -42,7 +42,7 @@ pub struct Case {
     pub id: CaseId,
     /// Seed of all noise.
     pub seed: u64,
-    /// What is simulated, or why nothing can be.
+    /// What is simulated, or why the case cannot be.
     pub setup: Result<Setup, String>,
 }
 
@@ -56,7 +56,7 @@ pub enum Setup {
 }
 
 impl Setup {
-    /// Scenario and robot; none of a cylinder on the bench.
+    /// Scenario and robot; `None` for a cylinder on the bench.
     #[must_use]
     pub fn robot(&self) -> Option<(&Scenario, &RobotConfig)> {
         match self {
@@ -75,11 +75,11 @@ pub struct Cases<'a> {
 }
 
 impl<'a> Cases<'a> {
-    /// Reads scenarios and robots once.
+    /// Reads all scenarios and robots once.
     ///
     /// # Errors
-    /// [`CampaignError::Config`] if one of them is wrong, [`CampaignError::Refused`] if the
-    /// sampler cannot draw so many factors, or the table would have too many columns.
+    /// [`CampaignError::Config`] if one of them is wrong; [`CampaignError::Refused`] if the sampler cannot
+    /// draw this many factors, or the table would have too many columns.
     pub fn new(plan: &'a Plan) -> Result<Self, CampaignError> {
         let resolver = Resolver::new(plan)?;
         let columns = Columns::of(plan, &resolver)?;
@@ -103,7 +103,7 @@ impl<'a> Cases<'a> {
         &self.columns
     }
 
-    /// Time of the first case's scenario, s, without its start-up.
+    /// Duration of the first case's scenario, s, without its start-up.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         let setup = self.case(0).setup.ok();
@@ -111,7 +111,7 @@ impl<'a> Cases<'a> {
         robot.map_or(1.0, |(scenario, _)| scenario.duration_s)
     }
 
-    /// Processor time of a case, s, about.
+    /// Approximate processor time of a case, s.
     #[must_use]
     pub fn work_s(&self) -> f64 {
         match self.plan.base {
@@ -120,8 +120,8 @@ impl<'a> Cases<'a> {
         }
     }
 
-    /// Whether a case can be at all: tells why not before any is begun. A case that cannot be
-    /// among others that can has a row that says so.
+    /// Checks that at least one case can be simulated, and reports why not before any case is begun. If only
+    /// some cases are impossible, their rows say so.
     ///
     /// # Errors
     /// [`CampaignError::Refused`] if no case of the first sample can be simulated.
@@ -139,7 +139,7 @@ impl<'a> Cases<'a> {
         ))
     }
 
-    /// Where the case of an index stands.
+    /// Place of the case with this index.
     #[must_use]
     pub fn place(&self, index: u64) -> Place {
         let (replicates, cells) = (self.plan.replicates, self.plan.cells());
@@ -157,7 +157,7 @@ impl<'a> Cases<'a> {
         self.draws.values(place.cell, place.sample)
     }
 
-    /// The case of an index.
+    /// The case with this index.
     #[must_use]
     pub fn case(&self, index: u64) -> Case {
         let place = self.place(index);
@@ -178,7 +178,7 @@ impl<'a> Cases<'a> {
     }
 }
 
-/// What the simulator, too, asks of the faults; those that the plan adds stand in no other file.
+/// Applies the simulator's own checks to the faults: those that the plan adds are in no other file.
 fn checked(plan: &Plan, resolved: Resolved) -> Result<Setup, String> {
     let OnRobot {
         scenario, robot, ..

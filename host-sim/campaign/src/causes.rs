@@ -1,4 +1,4 @@
-//! Why cases failed, counted by what made them fail.
+//! Counts the reasons why cases failed.
 
 use std::collections::BTreeMap;
 
@@ -6,44 +6,44 @@ use crate::columns::{Column, Columns};
 use crate::row::{Figure, Row, Status};
 use crate::table::Table;
 
-/// Kinds that are told apart; messages of errors may all differ.
+/// Number of distinct kinds that are counted separately; error messages may all differ.
 const KINDS: usize = 1000;
 
-/// What made a case fail. Those without a result come first.
+/// Why a case failed. Cases without a result come first.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// It has no result.
+    /// The case has no result.
     NoResult {
-        /// How it ended.
+        /// How the case ended.
         status: Status,
-        /// What it said.
+        /// The message it reported.
         message: String,
     },
-    /// A required target lies outside of its limits.
+    /// A required target lies outside its limits.
     Missed {
-        /// Its name.
+        /// Name of the target.
         target: String,
     },
     /// A required target could not be measured, which counts as missed.
     NotMeasured {
-        /// Its name.
+        /// Name of the target.
         target: String,
     },
 }
 
-/// How many cases failed of what. A case that missed two targets counts with both.
+/// Number of failed cases by cause. A case that missed two targets is counted under both.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Causes {
     required: Vec<Column>,
     counts: BTreeMap<Cause, u64>,
-    /// Of kinds beyond the most that are told apart.
+    /// Failures of kinds beyond the number counted separately.
     others: u64,
 }
 
 /// A target with its values and verdicts.
 type Judged<'a> = (&'a str, &'a [Option<f64>], &'a [Option<bool>]);
 
-/// The columns of a table that say why a case failed.
+/// The columns of a table that show why a case failed.
 pub(crate) struct Seen<'a> {
     passed: &'a [Option<bool>],
     statuses: &'a [Option<String>],
@@ -63,7 +63,7 @@ impl Causes {
         self.count(row.status, row.error.as_deref(), figures);
     }
 
-    /// Prepares a table to be counted.
+    /// Prepares a table for counting.
     pub(crate) fn see<'a>(&mut self, table: &'a Table) -> Seen<'a> {
         self.know(&table.columns);
         let required = table.columns.iter().filter(|column| column.required);
@@ -94,8 +94,8 @@ impl Causes {
         self.count(status.unwrap_or(Status::Error), error, figures);
     }
 
-    /// The causes with their counts, at most so many: those without a result first, each kind by
-    /// its count.
+    /// The first `most` causes with their counts. Causes without a result come first; within each group they
+    /// are sorted by count.
     #[must_use]
     pub fn first(&self, most: usize) -> Vec<(&Cause, u64)> {
         let mut all: Vec<(&Cause, u64)> = self.counts.iter().map(|(c, n)| (c, *n)).collect();
@@ -105,13 +105,13 @@ impl Causes {
         all
     }
 
-    /// How many kinds there are.
+    /// Number of kinds.
     #[must_use]
     pub fn kinds(&self) -> usize {
         self.counts.len() + usize::from(self.others > 0)
     }
 
-    /// A cause in words, with what a target asks.
+    /// The cause in words, including what the target requires.
     #[must_use]
     pub fn message(&self, cause: &Cause) -> String {
         match cause {

@@ -1,5 +1,5 @@
-//! Columns of the table of a campaign: known before the first case, so that every part has the
-//! same.
+//! Columns of a campaign's table. They are known before the first case, so that every part has the same
+//! columns.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use wheeleg_studies::bench;
 use crate::CampaignError;
 use crate::pages::{MOST_COLUMNS, NAMES_MOST};
 
-/// Key of the columns in what a file says of itself.
+/// Key of the columns in the metadata of a file.
 pub(crate) const FACT: &str = "wheeleg.columns";
 
 /// What a column holds.
@@ -62,15 +62,16 @@ impl Column {
         }
     }
 
-    /// Whether it is a target with a limit: of the others a verdict says only that there is a value.
+    /// Whether the column is a target with a limit. For other targets, the verdict only says whether there is
+    /// a value.
     pub(crate) fn has_limits(&self) -> bool {
         self.min.is_some() || self.max.is_some()
     }
 
-    /// The limits of a target in words, after a comma; empty where it has none.
+    /// The limits of a target in words, after a comma; empty if it has none.
     pub(crate) fn limits(&self) -> String {
         let unit = match self.unit.as_str() {
-            // A number without a unit.
+            // A dimensionless number.
             "" | "1" => String::new(),
             unit => format!(" {unit}"),
         };
@@ -83,18 +84,18 @@ impl Column {
     }
 }
 
-/// All columns, and which of them are what.
+/// All columns, and the roles of some of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     /// In the order of the table.
     pub all: Vec<Column>,
-    /// Names of the factors, without the `f.` of their columns.
+    /// Names of the factors, without the `f.` prefix of their columns.
     pub factors: Vec<String>,
-    /// Names of the targets; each has a column of its value and one of its verdict.
+    /// Names of the targets. Each has one column for its value and one for its verdict.
     pub targets: Vec<String>,
 }
 
-/// Columns before the factors, and between them and the targets.
+/// Columns before the factors, and columns between the factors and the targets.
 const BEFORE: [(&str, Kind, &str, &str); 6] = [
     (
         "case",
@@ -149,17 +150,17 @@ fn plain(list: &[(&str, Kind, &str, &str)]) -> Vec<Column> {
 }
 
 impl Columns {
-    /// Columns of every table: those before the factors, and those between them and the targets.
+    /// Columns of every table: those before the factors, and those between the factors and the targets.
     #[must_use]
     pub fn of_every_table() -> [Vec<Column>; 2] {
         [plain(&BEFORE), plain(&BETWEEN)]
     }
 
-    /// Those of a plan. Targets are those of all its scenarios, or moves.
+    /// Columns of a plan. The targets are those of all its scenarios or moves.
     ///
     /// # Errors
-    /// [`CampaignError::Config`] if a scenario or robot is wrong, [`CampaignError::Refused`] if there are
-    /// too many columns, or names that are too long.
+    /// [`CampaignError::Config`] if a scenario or robot is wrong; [`CampaignError::Refused`] if there are too
+    /// many columns, or names are too long.
     pub fn of(plan: &Plan, resolver: &Resolver<'_>) -> Result<Self, CampaignError> {
         let mut all = plain(&BEFORE);
         all.extend(plan.factors.iter().map(factor_column));
@@ -168,7 +169,7 @@ impl Columns {
         for values in probes(plan) {
             for target in targets_of(&resolver.resolve(&values)?) {
                 if targets.contains(&target.id) {
-                    // Of several scenarios or moves one may ask for what another only tells.
+                    // One scenario or move may require what another only reports.
                     let known = all.iter_mut().find(|column| column.name == target.id);
                     if let Some(known) = known.filter(|known| target.required && !known.required) {
                         known.required = true;
@@ -201,7 +202,7 @@ impl Columns {
         Ok(columns)
     }
 
-    /// A table that nobody could read is not begun.
+    /// Refuses to begin a table that could not be read back.
     fn ensure_readable(&self, plan: &Plan) -> Result<(), CampaignError> {
         let file = &plan.sources.plan.file;
         let count = self.all.len();
@@ -229,7 +230,7 @@ impl Columns {
         Ok(())
     }
 
-    /// Those of a file, by their order.
+    /// Columns of a file, in their order.
     #[must_use]
     pub fn read(all: Vec<Column>) -> Self {
         let names = || all.iter().map(|c| c.name.as_str());
@@ -268,7 +269,7 @@ fn factor_column(factor: &Factor) -> Column {
     Column::new(&name, kind, &factor.unit, &meaning)
 }
 
-/// Bytes of the longest name that a factor gives a row; 0 where its values are none.
+/// Length in bytes of the longest name that a factor puts into a row; 0 if its values are not names.
 fn longest_name(factor: &Factor) -> usize {
     let name = |value: &Value| match value {
         Value::Text(name) => name.len(),
@@ -282,7 +283,7 @@ fn longest_name(factor: &Factor) -> usize {
     longest.unwrap_or(0)
 }
 
-/// Targets without values.
+/// The targets, without values.
 fn targets_of(case: &Resolved) -> Vec<Target> {
     match case {
         Resolved::Robot(case) => Analyser::new(&case.scenario, &case.robot).finish().targets,
@@ -290,12 +291,12 @@ fn targets_of(case: &Resolved) -> Vec<Target> {
     }
 }
 
-/// Whether the targets depend on a setting.
+/// Whether the targets depend on this setting.
 fn is_judged_by(setting: Setting) -> bool {
     matches!(setting, Setting::Scenario | Setting::Robot | Setting::Move)
 }
 
-/// Values at which each scenario, robot and move is seen once, the other factors in their middle.
+/// Values that cover each scenario, robot and move once, with the other factors at their middle.
 fn probes(plan: &Plan) -> Vec<Vec<Value>> {
     let mut probes = vec![Vec::new()];
     for factor in &plan.factors {

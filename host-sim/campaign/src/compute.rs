@@ -1,4 +1,4 @@
-//! The row of a case, whatever becomes of it.
+//! Computes the row of a case, whatever happens to the case.
 
 use crate::cases::{Case, Cases};
 use crate::columns::Column;
@@ -6,10 +6,10 @@ use crate::panics::caught;
 use crate::row::{self, Figure, Row, Status};
 use crate::simulate::Outcome;
 
-/// What simulates a case; `None` if it was asked to stop before its end.
+/// A function that simulates a case; it returns `None` if it was asked to stop before the end.
 pub type Simulate<'a> = &'a (dyn Fn(&Case) -> Option<Outcome> + Sync);
 
-/// Computes the row of a case; `None` if it was stopped.
+/// Computes the row of a case; returns `None` if it was stopped.
 pub(crate) fn row(
     cases: &Cases<'_>,
     index: u64,
@@ -24,7 +24,7 @@ pub(crate) fn row(
     match made {
         Ok((case, outcome)) => Some(row_of(cases, &case, block, outcome?)),
         Err(message) => {
-            // The case itself can be made: what panicked is its simulation.
+            // The case itself can be built, so it was its simulation that panicked.
             let case = caught(|| cases.case(index)).ok()?;
             let outcome = Outcome::without(Status::Panic, message);
             Some(row_of(cases, &case, block, outcome))
@@ -32,13 +32,13 @@ pub(crate) fn row(
     }
 }
 
-/// The row of a case and its outcome.
+/// The row for a case and its outcome.
 pub(crate) fn row_of(cases: &Cases<'_>, case: &Case, block: u64, outcome: Outcome) -> Row {
     let columns = cases.columns();
     let figures = columns.targets.iter().map(|id| {
         let target = outcome.targets.iter().find(|target| target.id == *id);
         let column = columns.all.iter().find(|column| column.name == *id);
-        // Where another scenario or move has limits and this one has none, there is nothing to meet.
+        // If another scenario or move has limits and this one has none, there is nothing to meet.
         let others = column.is_some_and(Column::has_limits);
         let judged = target.filter(|target| !others || target.min.or(target.max).is_some());
         Figure {

@@ -1,4 +1,4 @@
-//! What can go wrong with a campaign, and what to do about it.
+//! Errors of a campaign, with what the user can do about them.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,10 @@ use wheeleg_report::ReportError;
 use wheeleg_studies::StudyError;
 use wheeleg_telemetry::LogError;
 
-/// Any failure of a campaign outside of its cases, which have a row of their own.
+/// Any failure of a campaign outside its cases; a failed case has a row instead.
 #[derive(Debug, Error, Diagnostic)]
 pub enum CampaignError {
-    /// Plan, scenario or robot are wrong.
+    /// A plan, scenario or robot is wrong.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Config(#[from] Box<ConfigError>),
@@ -34,11 +34,11 @@ pub enum CampaignError {
         help("finished parts are intact; make room or the folder writable, and run again")
     )]
     Output {
-        /// What was tried.
+        /// The operation that failed.
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         reason: std::io::Error,
     },
 
@@ -48,13 +48,13 @@ pub enum CampaignError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         reason: String,
         /// What the user can do.
         help: String,
     },
 
-    /// What was asked for cannot be done.
+    /// The request cannot be carried out.
     #[error("{what}")]
     #[diagnostic(code(wheeleg::campaign), help("{help}"))]
     Refused {
@@ -70,7 +70,7 @@ pub enum CampaignError {
     Incomplete {
         /// What is missing.
         what: String,
-        /// The command that fills the holes.
+        /// The command that fills the gaps.
         help: String,
     },
 }
@@ -131,7 +131,7 @@ impl From<ConfigError> for CampaignError {
 impl From<StudyError> for CampaignError {
     fn from(e: StudyError) -> Self {
         match e {
-            // Its exit code is that of a file that cannot be written.
+            // This one has the exit code of a file that cannot be written.
             StudyError::Report(e) => Self::from(e),
             other => Self::Study(Box::new(other)),
         }

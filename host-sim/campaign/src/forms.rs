@@ -1,4 +1,4 @@
-//! What the commands of campaigns print as JSON, and `plan.json`, with their published forms.
+//! JSON that the commands of campaigns print, and `plan.json`, with their published schemas.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::report::{Findings, Pairs};
 use crate::store::{FORMAT, PlanFile};
 use crate::{Cause, Merged, State, Status};
 
-/// Causes that are listed; of more there is the number.
+/// Number of causes listed; any others are only counted.
 pub const CAUSES: usize = 20;
 
 /// What `wheeleg campaign status --json` prints: a line of JSON.
@@ -22,7 +22,7 @@ pub struct StatusForm {
     pub cases: u64,
     /// Cases with a row.
     pub rows: u64,
-    /// Of these, in files of blocks that are not finished.
+    /// Of these, rows in files of unfinished blocks.
     pub partial: u64,
     /// Cases without a row that a process has begun.
     pub begun: u64,
@@ -30,7 +30,7 @@ pub struct StatusForm {
     pub unsaved: u64,
     /// Rows that missed a required target or have no result.
     pub failed: u64,
-    /// Why they did, the most frequent causes.
+    /// The most frequent causes of these failures.
     pub causes: Vec<CauseForm>,
     /// Number of causes that are not listed.
     pub other_causes: usize,
@@ -40,8 +40,8 @@ pub struct StatusForm {
     pub missing_blocks: Vec<u64>,
     /// Parts that cannot be read or belong to another plan.
     pub bad_parts: Vec<BadPart>,
-    /// Files that nobody reads: of processes that were killed, and temporary ones of other computers, which may
-    /// be writing them.
+    /// Files that nobody reads: those of processes that were killed, and temporary files of other computers,
+    /// which may still be writing them.
     pub leftovers: Vec<String>,
 }
 
@@ -60,7 +60,7 @@ pub struct CauseForm {
     pub cases: u64,
 }
 
-/// A part that does not count.
+/// A part that is not valid.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct BadPart {
     /// Its file.
@@ -74,7 +74,7 @@ impl Form for StatusForm {
 }
 
 impl StatusForm {
-    /// Of a folder.
+    /// The status of a folder.
     #[must_use]
     pub fn of(state: &State) -> Self {
         let causes = state.causes.first(CAUSES).into_iter();
@@ -120,9 +120,9 @@ impl StatusForm {
 pub struct MergeForm {
     /// Rows of the table.
     pub rows: u64,
-    /// Cases without one: 0 unless `--partial` allowed them to be missing.
+    /// Cases without a row: 0 unless `--partial` allowed them to be missing.
     pub missing: u64,
-    /// BLAKE3 over case, status, log hash and the bits of all figures, in the order of the plan.
+    /// BLAKE3 hash over case, status, log hash and the bits of all figures, in the order of the plan.
     pub hash: String,
     /// File of the table.
     pub table: String,
@@ -133,7 +133,7 @@ impl Form for MergeForm {
 }
 
 impl MergeForm {
-    /// Of a table that was written.
+    /// The form for a table that was written.
     #[must_use]
     pub fn of(merged: &Merged, table: &Path) -> Self {
         Self {
@@ -148,7 +148,7 @@ impl MergeForm {
 /// What `wheeleg campaign report --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ReportForm<'a> {
-    /// What the table says.
+    /// What the table shows.
     pub findings: &'a Findings,
     /// The comparison with the table given by `--against`.
     pub against: Option<&'a Pairs>,
@@ -158,7 +158,7 @@ impl Form for ReportForm<'_> {
     const SCHEMA: &'static str = "wheeleg.campaign-report/1";
 }
 
-/// The published forms by their names.
+/// The published schemas by name.
 #[must_use]
 pub fn schemas() -> Vec<(&'static str, Value)> {
     let mut plan = of_file::<PlanFile>("wheeleg.campaign-plan/1");

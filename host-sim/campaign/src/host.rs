@@ -1,6 +1,6 @@
-//! The computer and the process that a case runs on: beside the rows, never in them.
+//! The computer and the process that run a case. They are recorded beside the rows, never in them.
 
-/// Name of this computer, as far as it says.
+/// Name of this computer, if the system reports one.
 pub(crate) fn name() -> String {
     let from_kernel = std::fs::read_to_string("/proc/sys/kernel/hostname");
     let name = from_kernel.ok().map(|name| name.trim().to_owned());
@@ -9,7 +9,7 @@ pub(crate) fn name() -> String {
         .unwrap_or_else(|| "unknown".to_owned())
 }
 
-/// What of the processor decides which code the C library's mathematics takes.
+/// Features of the processor that decide which code paths the C library's mathematics takes.
 pub(crate) fn processor() -> String {
     #[cfg(target_arch = "x86_64")]
     {
@@ -25,7 +25,7 @@ pub(crate) fn processor() -> String {
     std::env::consts::ARCH.to_owned()
 }
 
-/// A part of a file's name that no other process has: computer, [`scope`], number of the process, time, count.
+/// A part of a file name that no other process uses: computer, [`scope`], process number, time, count.
 pub(crate) fn unique() -> String {
     use std::sync::atomic::{AtomicU64, Ordering};
     static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -38,11 +38,12 @@ pub(crate) fn unique() -> String {
     format!("{host}-{scope}-{}-{ns:x}-{count}", std::process::id())
 }
 
-/// The scope of a computer that does not say it.
+/// Scope of a computer that does not report one.
 const UNKNOWN: &str = "unknown";
 
-/// Where a number means one process: this start of this kernel, and its namespace of processes. Computers may
-/// have one name, and so may containers of a computer, in which a number is another process.
+/// Identifies where a process number is unique: one boot of one kernel, and one process namespace. Several
+/// computers may have the same name, and so may containers on one computer, in which the same number means
+/// another process.
 fn scope() -> Option<String> {
     let boot = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok()?;
     let namespace = std::fs::read_link("/proc/self/ns/pid").ok()?;
@@ -50,8 +51,8 @@ fn scope() -> Option<String> {
     Some(blake3::hash(whole.as_bytes()).to_hex()[..8].to_owned())
 }
 
-/// Whether the process that made a name by [`unique`] still lives. `None` where that cannot be known: of a
-/// process of another computer, or of this one before it was started again.
+/// Whether the process that made a name with [`unique`] is still alive. `None` if this cannot be known: the
+/// process ran on another computer, or on this one before its last restart.
 pub(crate) fn lives(unique: &str) -> Option<bool> {
     let mut fields = unique.rsplit('-').skip(2);
     let (process, of) = (fields.next()?, fields.next()?);
@@ -66,7 +67,7 @@ fn is_there(process: i32) -> Option<bool> {
     use rustix::io::Errno;
     use rustix::process::{Pid, test_kill_process};
     let process = Pid::from_raw(process).filter(|_| process > 0)?;
-    // A process of somebody else may not be signalled, and lives.
+    // A process of another user may not be signalled, but it is alive.
     Some(test_kill_process(process) != Err(Errno::SRCH))
 }
 

@@ -1,10 +1,10 @@
-//! Who a case is: its content, and nothing else.
+//! Identity of a case: its content, and nothing else.
 //!
-//! Neither index nor shard nor order enters. Two programs that run the same content have the same
-//! case, so their results can be compared case by case.
+//! Index, shard and order do not enter. Two programs that run the same content have the same case, so their
+//! results can be compared case by case.
 //!
-//! The samples of a plan that draws from lists alone would often be the same case, run again with the
-//! same noise. There the number of the sample belongs to the content.
+//! If a plan draws from lists alone, many of its samples would be the same case, run again with the same
+//! noise. For such plans the sample number is part of the content.
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,12 +14,12 @@ use wheeleg_config::plan::{Base, Part, Plan, Resolved, Sets, Setting, Value};
 
 use crate::place::Place;
 
-/// Version of what is hashed.
+/// Version of the hashed content.
 const FORMAT: u32 = 1;
-/// Purpose of the seed's key.
+/// Purpose string of the seed's key.
 const SEED_KEY: &str = "wheeleg campaign seed v1";
 
-/// Identity of a case: 128 bits of a hash of its content.
+/// Identity of a case: 128 bits of the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CaseId(u128);
 
@@ -74,7 +74,7 @@ pub(crate) fn identity(
     (case, u64::from_le_bytes(*bits) >> 1)
 }
 
-/// Canonical JSON: keys are sorted, floats have the fewest digits that give them back.
+/// Canonical JSON: keys are sorted, and floats have the fewest digits that restore their value.
 fn canonical(json: &Json) -> Vec<u8> {
     let mut text = Vec::new();
     write_canonical(json, &mut text);
@@ -84,7 +84,7 @@ fn canonical(json: &Json) -> Vec<u8> {
 fn write_canonical(json: &Json, text: &mut Vec<u8>) {
     match json {
         Json::Object(fields) => {
-            // Whatever order the map keeps.
+            // Sort, whatever order the map keeps.
             let mut fields: Vec<_> = fields.iter().collect();
             fields.sort_by_key(|(key, _)| *key);
             text.push(b'{');
@@ -116,7 +116,7 @@ fn content(plan: &Plan, values: &[Value], replicate: u64, resolved: Option<&Reso
     let factors = plan.factors.iter().zip(values);
     let factors: serde_json::Map<String, Json> = factors
         .map(|(factor, value)| {
-            // Two units of one number are two contents; a plan has one of them.
+            // One number in two units makes two different contents; a plan uses only one of them.
             let value = json!({ "value": value, "unit": factor.unit });
             (factor.name.clone(), value)
         })
@@ -141,7 +141,7 @@ fn content(plan: &Plan, values: &[Value], replicate: u64, resolved: Option<&Reso
     content
 }
 
-/// Takes a paired factor and what it sets out of a content.
+/// Removes a paired factor, and what it sets, from the content.
 fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
     if let Some(factors) = content["factors"].as_object_mut() {
         factors.remove(name);
@@ -178,14 +178,14 @@ fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
     }
 }
 
-/// Removes the parameter that a path leads to, or into.
+/// Removes every listed parameter that a path names or leads into.
 fn remove_parameter(parameters: &mut Json, path: &str) {
     if let Some(parameters) = parameters.as_object_mut() {
         parameters.retain(|listed, _| !is_or_holds(listed, path));
     }
 }
 
-/// Whether a path names a parameter or a component of it.
+/// Whether a path names a parameter or one of its components.
 fn is_or_holds(listed: &str, path: &str) -> bool {
     let rest = path.strip_prefix(listed);
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))

@@ -1,4 +1,4 @@
-//! A case in a process of its own: one that is suspected to end the process that runs it.
+//! Runs a case that is suspected of crashing its process in a separate process.
 
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
@@ -15,17 +15,17 @@ use crate::{CampaignError, part};
 /// Exit code of a process that was asked to stop.
 pub(crate) const STOPPED: i32 = 75;
 
-/// What became of the process.
+/// What happened to the process.
 pub(crate) enum Isolated {
-    /// It has a row.
+    /// It computed a row.
     Row(Box<Row>),
-    /// The case ended it, and how.
+    /// The case crashed it; how it ended.
     Ended(String),
     /// It was asked to stop.
     Stopped,
 }
 
-/// Runs a case in a process of its own of `program`.
+/// Runs a case in a separate process of `program`.
 pub(crate) fn isolate(
     program: &Path,
     store: &Store,
@@ -68,7 +68,7 @@ pub(crate) fn isolate(
     Ok(Isolated::Ended(how(child.status)))
 }
 
-/// How a process ended, the same on every computer.
+/// How a process ended, in the same words on every computer.
 fn how(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
@@ -80,10 +80,10 @@ fn how(status: ExitStatus) -> String {
     }
 }
 
-/// The other side: computes one row of a campaign into a file. False if it was asked to stop.
+/// The child's side: computes one row of a campaign into a file. Returns false if it was asked to stop.
 ///
 /// # Errors
-/// As of [`crate::run`].
+/// As for [`crate::run`].
 pub fn isolated(
     store: &Store,
     index: u64,

@@ -1,9 +1,9 @@
-//! What killed processes leave in the folder of a campaign, and nobody reads.
+//! Files that killed processes leave in a campaign's folder and that nobody reads.
 //!
-//! A process that is killed while it writes a file leaves it under its temporary name. One that is killed after
-//! it has written a part leaves the partial rows and the attempts that the part stands for. [`run`](crate::run)
-//! removes both at its end. A temporary file goes only if its process is known to live no more: another
-//! computer may be writing it, since a folder is often shared.
+//! A process that is killed while writing a file leaves it under its temporary name. A process that is killed
+//! after writing a part leaves the partial rows and the attempts that the part replaces. [`run`](crate::run)
+//! removes both when it ends. It removes a temporary file only if the file's process is known to be dead: the
+//! folder is often shared, and another computer may be writing the file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,15 +11,15 @@ use std::path::{Path, PathBuf};
 use crate::host;
 use crate::store::Store;
 
-/// Folders in which a process writes, below that of the campaign.
+/// Folders that a process writes to, below that of the campaign.
 const FOLDERS: [&str; 4] = ["", "parts", "attempts", "logs"];
 
 /// A file that nobody reads.
 #[derive(Debug)]
 enum Leftover {
-    /// What a process was writing, and whether that is known to live or not.
+    /// A file that a process was writing, and whether that process is alive, if known.
     Temporary(Option<bool>),
-    /// Of a block, which is of no use once that has its part.
+    /// A file of a block, useless once the block has its part.
     OfBlock(u64),
 }
 
@@ -46,8 +46,8 @@ impl Store {
         });
     }
 
-    /// The files that [`Store::tidy`] would remove, and temporary ones of which it is not known whether their
-    /// process lives.
+    /// The files that [`Store::tidy`] would remove, and temporary files whose process may or may not be
+    /// alive.
     pub(crate) fn leftovers(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
         self.each_leftover(|path, _| found.push(path.to_owned()));
@@ -55,7 +55,8 @@ impl Store {
         found
     }
 
-    /// Tells `what` of each, and whether it is known that nobody needs it. What a living process writes is none.
+    /// Calls `what` for each leftover, with whether it is known that nobody needs it. A file that a living
+    /// process is writing is not a leftover.
     fn each_leftover(&self, mut what: impl FnMut(&Path, bool)) {
         for folder in FOLDERS {
             let entries = fs::read_dir(self.folder().join(folder));
@@ -71,7 +72,7 @@ impl Store {
         }
     }
 
-    /// Whether the part of a block is there and counts.
+    /// Whether the part of a block exists and is valid.
     fn has(&self, block: u64) -> bool {
         block < self.blocks() && matches!(self.table(block), Ok(Some(_)))
     }
@@ -94,7 +95,7 @@ mod tests {
         Some(outcome)
     }
 
-    /// Names of the files of a folder, but of the records of who made the parts.
+    /// Names of the files in a folder, except the records of who made the parts.
     fn names(folder: &Path) -> Vec<String> {
         let entries = FOLDERS.iter().flat_map(|name| {
             let entries = fs::read_dir(folder.join(name)).into_iter().flatten();
@@ -108,8 +109,9 @@ mod tests {
         names
     }
 
-    /// Everything that a process can leave when it is killed, planted beside the first, a finished, and the last,
-    /// an unfinished block: after the next run nothing is left but what living processes and other computers write.
+    /// Plants everything that a killed process can leave, for the first block, which is finished, and for the
+    /// last, which is not. After the next run, only the files of living processes and of other computers
+    /// remain.
     #[test]
     fn a_finished_campaign_has_no_rubbish_and_files_of_others_stay() {
         let home = tempfile::tempdir().expect("a folder");
@@ -173,7 +175,7 @@ mod tests {
         for name in &of_others {
             fs::write(folder.join(name), torn).expect("written");
         }
-        // The last block is not done: its partial rows are no rubbish yet.
+        // The last block is not done, so its partial rows are still needed.
         fs::copy(
             &there,
             folder
@@ -183,7 +185,7 @@ mod tests {
         .expect("copied");
         fs::remove_file(folder.join("parts/000002.parquet")).expect("there");
         let told = status(&store, Shard::ALL).expect("readable").leftovers;
-        // Without the two of the unfinished block, and what this process writes.
+        // Without the two files of the unfinished block, and the one that this process is writing.
         assert_eq!(
             told.len(),
             planted.len() - 2 + of_others.len() - 1,

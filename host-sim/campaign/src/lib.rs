@@ -1,8 +1,9 @@
-//! Campaigns: one scenario, or one cylinder on the bench, many times, on as many computers as there are.
+//! Campaigns: one scenario, or one cylinder on the bench, simulated many times, on as many computers as are
+//! available.
 //!
-//! A plan ([`wheeleg_config::plan`]) says what differs. [`Cases`] makes any case from its index,
-//! [`run`] works off a shard of them into a folder of part files ([`Store`]), [`merge`] makes one
-//! table of them, [`report`] a page, [`replay`] a full run of one case.
+//! A plan ([`wheeleg_config::plan`]) states what varies. [`Cases`] builds any case from its index, [`run`]
+//! computes a shard of them into a folder of part files ([`Store`]), [`merge`] combines the parts into one
+//! table, [`report`] writes a page, and [`replay`] repeats one case in full.
 //!
 //! There is no scheduler here. A shard is a process that anybody may start, kill and start again.
 //!
@@ -11,10 +12,10 @@
 //! * **case**: one run: a scenario and a robot, or a cylinder and a move, with a value of each factor, and a seed
 //! * **sample**: values of the factors that are drawn; the same in every cell of the grid
 //! * **cell**: one combination of values of the factors that have a list
-//! * **replicate**: the same values with other noise
+//! * **replicate**: the same values with different noise
 //! * **block**: cases with successive indices, the contents of one part file
 //! * **shard**: every n-th block, the share of one process
-//! * **part**: the file of a block; written whole or not at all
+//! * **part**: the file of a block; written as a whole or not at all
 //! * **attempt**: a case that a process has begun
 //! * **figure**: the measured value of a target
 

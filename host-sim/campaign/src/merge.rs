@@ -1,4 +1,4 @@
-//! One table of all parts.
+//! Merges all parts into one table.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,27 +16,27 @@ use crate::store::Store;
 use crate::table::{Data, Table, TableWriter};
 use crate::{CampaignError, Cases, host};
 
-/// What was merged.
+/// The result of a merge.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Merged {
     /// Rows.
     pub rows: u64,
-    /// Cases of the plan without one: 0 unless they were allowed to be missing.
+    /// Cases of the plan without a row: 0 unless they were allowed to be missing.
     pub missing: u64,
-    /// BLAKE3 over case, status, log hash and the bits of all figures, in the order of the plan,
-    /// hexadecimal. Programs that compute the same have the same, however the work was shared.
+    /// BLAKE3 hash over case, status, log hash and the bits of all figures, in the order of the plan, in
+    /// hexadecimal. Programs that compute the same have the same hash, however the work was shared.
     pub hash: String,
 }
 
-/// Blocks that a message names; of more there is the number.
+/// Number of blocks that a message names; any others are only counted.
 const NAMED: usize = 12;
 
-/// Writes one table of the parts in several folders of one plan; each case once. None if it was
-/// stopped: then nothing is written.
+/// Merges the parts in several folders of one plan into one table, with each case once. Returns `None`, and
+/// writes nothing, if it was stopped.
 ///
 /// # Errors
-/// [`CampaignError::Incomplete`] if blocks are missing, with the command that fills the holes;
-/// [`CampaignError::Refused`] for folders of different plans or programs, or a row twice;
+/// [`CampaignError::Incomplete`] if blocks are missing, with the command that fills the gaps;
+/// [`CampaignError::Refused`] for folders of different plans or programs, or a duplicate row;
 /// [`CampaignError::Output`] if the table cannot be written.
 pub fn merge(
     folders: &[PathBuf],
@@ -46,11 +46,11 @@ pub fn merge(
     table_of(folders, out, false, stop)
 }
 
-/// The same of the cases that have a row, those of blocks that are not finished among them: of a
-/// pilot, or while others are at work.
+/// As [`merge`], for whichever cases have a row, including those of unfinished blocks: for a pilot, or while
+/// other processes are still running.
 ///
 /// # Errors
-/// As [`merge`]; [`CampaignError::Incomplete`] only if no case has a row.
+/// As for [`merge`], but [`CampaignError::Incomplete`] only if no case has a row.
 pub fn merge_partial(
     folders: &[PathBuf],
     out: &Path,
@@ -106,7 +106,7 @@ fn table_of(
     let columns = Cases::new(&plan)?.columns().clone();
     let plan_text = serde_json::to_string(first.plan()).expect("texts are JSON");
     let temporary = out.with_extension(format!("{}.tmp", host::unique()));
-    // From here on there is something to take away.
+    // From here on there is something to clean up.
     stop.begin();
     let facts = [plan_text.as_str(), &first.plan().program];
     let written = write([&temporary, out], &stores, &columns, facts, (partial, stop));
@@ -118,12 +118,12 @@ fn table_of(
         }
         Ok(merged)
     });
-    // Gone already where it has become the table.
+    // It no longer exists if it has become the table.
     let _ = std::fs::remove_file(&temporary);
     result
 }
 
-/// Whether two files have the same bytes; false where one cannot be read.
+/// Whether two files have the same bytes; false if one cannot be read.
 fn is_same(one: &Path, other: &Path) -> bool {
     let open = |path: &Path| {
         let about = std::fs::metadata(path)
@@ -137,7 +137,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     if a_len != b_len {
         return false;
     }
-    // Both are filled alike, so that their buffers have the same length.
+    // Both readers are filled alike, so their buffers have the same length.
     while let (Ok(left), Ok(right)) = (a.fill_buf(), b.fill_buf()) {
         let alike = left.len().min(right.len());
         if left[..alike] != right[..alike] {
@@ -152,7 +152,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     false
 }
 
-/// Blocks without a part, and parts that do not count.
+/// Blocks without a part, and invalid parts.
 #[derive(Default)]
 struct Holes {
     blocks: Vec<u64>,
@@ -160,7 +160,7 @@ struct Holes {
 }
 
 impl Holes {
-    /// The table of a block, from the first folder that has its part; None where none has.
+    /// The table of a block, from the first folder that has its part; `None` if no folder has it.
     fn find(&mut self, block: u64, stores: &[Store]) -> Option<(PathBuf, Table)> {
         for store in stores {
             match store.table(block) {
@@ -176,7 +176,7 @@ impl Holes {
         None
     }
 
-    /// What to do about them.
+    /// The error that tells the user what to do about the gaps.
     fn error(&self, of: &Store) -> CampaignError {
         let named = self
             .blocks
@@ -203,12 +203,12 @@ impl Holes {
     }
 }
 
-/// The rows that there are of a block that is not finished, in the order of the plan.
+/// The existing rows of an unfinished block, in the order of the plan.
 fn unfinished(block: u64, stores: &[Store], columns: &Columns) -> Option<(PathBuf, Table)> {
     let mut rows = BTreeMap::new();
     for store in stores {
         for path in store.partials(block) {
-            // What cannot be read is set aside when the block is computed.
+            // An unreadable file is set aside when the block is computed.
             let Ok((found, _)) = part::read(&path, &store.plan().hash) else {
                 continue;
             };
@@ -221,7 +221,7 @@ fn unfinished(block: u64, stores: &[Store], columns: &Columns) -> Option<(PathBu
     (!rows.is_empty()).then(|| (stores[0].part(block), row::table(columns, &rows)))
 }
 
-/// Writes the table of all blocks to `to`, each part read once; messages name `out`, which it becomes.
+/// Writes the table of all blocks to `to`, reading each part once. Messages name `out`, the final path.
 fn write(
     [to, out]: [&Path; 2],
     stores: &[Store],
@@ -253,7 +253,7 @@ fn write(
             continue;
         };
         if !partial && !holes.blocks.is_empty() {
-            // Nothing comes of the table: what else is missing is looked for alone.
+            // There will be no table, so only look for further gaps.
             continue;
         }
         if table.columns != columns.all {
@@ -281,7 +281,7 @@ fn write(
     }))
 }
 
-/// Adds case, status, log hash and the figures' bits of each row.
+/// Hashes case, status, log hash and the bits of the figures of each row.
 fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
     let texts = ["case", "status", "log_hash"].map(|name| table.texts(name));
     let figures: Vec<&Data> = columns
@@ -305,7 +305,7 @@ fn hash(hasher: &mut blake3::Hasher, table: &Table, columns: &Columns) {
                 Data::Number(v) => v.get(row).copied().flatten(),
                 _ => None,
             };
-            // No figure has these bits: they are those of a number that is none.
+            // No figure has these bits: they encode a NaN.
             let bits = value.map_or(u64::MAX, f64::to_bits);
             all.extend(bits.to_le_bytes());
         }
@@ -322,7 +322,7 @@ mod tests {
     use crate::table::TableReader;
     use crate::{Figure, Status, report};
 
-    /// A row of a case that was not simulated.
+    /// A row for a case that was not simulated.
     fn row(index: u64, columns: &Columns) -> Row {
         let identity = blake3::hash(&index.to_le_bytes()).to_hex();
         Row {
@@ -342,8 +342,8 @@ mod tests {
         }
     }
 
-    /// Blocks that do not divide a row group, with one that is not finished among them, and the longest
-    /// texts: what is written is read.
+    /// Blocks that do not divide a row group, one of them unfinished, and the longest texts: what is written
+    /// can be read.
     #[test]
     fn a_table_of_any_blocks_is_read_again() {
         const CASES: u64 = 66_500;

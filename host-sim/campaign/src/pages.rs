@@ -1,5 +1,6 @@
-//! What a Parquet file claims is compared with its bytes before anything is unpacked: the library makes
-//! room for what is claimed. Work and memory are then within a fixed multiple of the file's size.
+//! Compares what a Parquet file claims with its bytes before anything is decompressed, because the library
+//! allocates memory for whatever is claimed. Work and memory then stay within a fixed multiple of the file's
+//! size.
 //!
 //! A page begins with its header, a struct of Thrift's compact protocol.
 
@@ -8,24 +9,25 @@ use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::ChunkReader;
 use wheeleg_config::plan::MOST_IN_BLOCK;
 
-/// Most rows of a row group that is written.
+/// Most rows of a row group that this program writes.
 pub(crate) const GROUP_ROWS: usize = 65_536;
-/// Most rows of a row group that is read: earlier programs ended a group after the block that filled it.
+/// Most rows of a row group that this program reads: earlier programs ended a group only after the block that
+/// filled it.
 const MOST_ROWS: u64 = GROUP_ROWS as u64 - 1 + MOST_IN_BLOCK;
-/// Cells for each byte of a file.
+/// Most cells per byte of a file.
 const CELLS_PER_BYTE: u64 = 32;
-/// Bytes of a row that do not pack: its case, with its length.
+/// Bytes of a row that do not compress: its case identity, with its length.
 const ROW_BYTES: u64 = 32;
-/// Most columns of a table: one of empty cells has as many for each byte as can be read.
+/// Most columns of a table: even if all other cells are empty, it stays within [`CELLS_PER_BYTE`].
 pub(crate) const MOST_COLUMNS: usize = (CELLS_PER_BYTE * ROW_BYTES) as usize;
-/// Most bytes of the names that a plan puts into one row.
+/// Most bytes of names that a plan puts into one row.
 pub(crate) const NAMES_MOST: usize = 1500;
-/// Snappy packs 64 bytes in 3 at best.
+/// Snappy compresses 64 bytes into 3 at best.
 const MOST_PACKED: usize = 22;
-/// Plain, two names of a dictionary, and runs: no value is made of others.
+/// Plain, the two names of dictionary encoding, and run lengths: no value depends on another.
 const ENCODINGS: [usize; 4] = [0, 2, 3, 8];
 
-/// What is wrong with a table, without the words of the library that reads it.
+/// Describes what is wrong with a table, without the library's own wording.
 pub(crate) fn in_words(error: &ParquetError) -> String {
     match error {
         ParquetError::General(what) => what.clone(),
@@ -40,10 +42,10 @@ fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("it is damaged: {what}"))
 }
 
-/// Whether all that a file claims is of a size that its bytes can have.
+/// Checks that everything a file claims has a size that its bytes can hold.
 ///
 /// # Errors
-/// What is claimed and cannot be.
+/// The claim that cannot be true.
 pub(crate) fn check<R: ChunkReader>(
     from: &R,
     metadata: &ParquetMetaData,
@@ -53,7 +55,7 @@ pub(crate) fn check<R: ChunkReader>(
     for group in metadata.row_groups() {
         let rows = u64::try_from(group.num_rows()).unwrap_or(u64::MAX);
         let columns = group.columns().len() as u64;
-        // Each row has the name of its case, or the time that it took, which do not pack.
+        // Each row has the identity of its case, or the time that it took; neither compresses.
         all_rows = all_rows.saturating_add(rows);
         all_cells = all_cells.saturating_add(rows.saturating_mul(columns));
         if rows > MOST_ROWS || all_rows > length || all_cells / CELLS_PER_BYTE > length {
@@ -87,7 +89,7 @@ pub(crate) fn check<R: ChunkReader>(
     Ok(())
 }
 
-/// Whether the pages of a column of so many rows are of a size that their bytes can have.
+/// Checks that the pages of a column of this many rows have sizes that their bytes can hold.
 fn check_pages(mut pages: &[u8], rows: u64) -> Result<(), ParquetError> {
     while !pages.is_empty() {
         let header = Header::read(pages).ok_or_else(|| damaged("a page has no header"))?;
@@ -108,30 +110,31 @@ fn check_pages(mut pages: &[u8], rows: u64) -> Result<(), ParquetError> {
     Ok(())
 }
 
-/// What the header of a page says.
+/// Contents of a page header.
 #[derive(Debug, Default, PartialEq)]
 struct Header {
-    /// Bytes of itself.
+    /// Bytes of the header itself.
     length: usize,
-    /// Bytes of the page, unpacked.
+    /// Bytes of the page, decompressed.
     unpacked: usize,
-    /// Bytes of the page as they stand behind the header.
+    /// Bytes of the page as stored after the header.
     packed: usize,
-    /// Values of a page of data.
+    /// Number of values of a data page.
     values: usize,
-    /// How these are written.
+    /// Encoding of these values.
     encoding: usize,
-    /// Values of a dictionary.
+    /// Number of values of a dictionary page.
     entries: usize,
 }
 
-/// A field of 32 bits.
+/// Kind of a 32-bit field.
 const WHOLE: u8 = 5;
 const STRUCT: u8 = 12;
 
 impl Header {
-    /// `None` for bytes that are none. The library goes by the number of a field and not by its kind:
-    /// a field of another kind than it expects is refused, or the two would read different pages.
+    /// Returns `None` for bytes that are not a header. The library identifies a field by its number and
+    /// ignores its kind. A field of an unexpected kind is therefore refused; otherwise the two would read
+    /// different pages.
     fn read(bytes: &[u8]) -> Option<Self> {
         let mut header = Self::default();
         let mut reader = Compact { bytes, at: 0 };
@@ -152,7 +155,7 @@ impl Header {
         Some(header)
     }
 
-    /// That of data, 5 and 8 by version, or of a dictionary, 7.
+    /// Reads the inner header: of data (5 or 8, by version) or of a dictionary (7).
     fn read_inner(&mut self, reader: &mut Compact<'_>, outer: i64) -> Option<()> {
         let mut number = 0;
         while let Some(kind) = reader.field(&mut number)? {
@@ -161,7 +164,7 @@ impl Header {
                 (7, 1, WHOLE) => self.entries = reader.size()?,
                 (5, 2, WHOLE) | (8, 4, WHOLE) => self.encoding = reader.size()?,
                 (5, 3..=4, WHOLE) | (7, 2, WHOLE) | (8, 2..=6, WHOLE) => drop(reader.size()?),
-                // A flag stands in the head.
+                // The value of a flag is in the field's head.
                 (7, 3, 1..=2) | (8, 7, 1..=2) => {}
                 (5, 5, STRUCT) | (8, 8, STRUCT) => reader.skip_statistics()?,
                 _ => return None,
@@ -171,7 +174,7 @@ impl Header {
     }
 }
 
-/// Reads Thrift's compact protocol.
+/// A reader of Thrift's compact protocol.
 struct Compact<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -184,7 +187,7 @@ impl Compact<'_> {
         Some(byte)
     }
 
-    /// A number in groups of seven bits, the lowest first.
+    /// Reads a number in groups of seven bits, lowest first.
     fn varint(&mut self) -> Option<u64> {
         let mut value = 0;
         for shift in (0..64).step_by(7) {
@@ -202,14 +205,14 @@ impl Compact<'_> {
         Some((zigzag >> 1) as i64 ^ -((zigzag & 1) as i64))
     }
 
-    /// A number from 0 that 32 bits hold: the library leaves out all others.
+    /// Reads a number from 0 that fits in 32 bits; the library ignores all others.
     fn size(&mut self) -> Option<usize> {
         let size = i32::try_from(self.signed()?).ok()?;
         usize::try_from(size).ok()
     }
 
-    /// The kind of the next field, and its number after that of the last one; the inner `None` at the
-    /// end of the struct.
+    /// Reads the kind of the next field, and updates its number from that of the last one; the inner `None`
+    /// marks the end of the struct.
     fn field(&mut self, number: &mut i64) -> Option<Option<u8>> {
         let head = self.byte()?;
         let (step, kind) = (i64::from(head >> 4), head & 0x0f);
@@ -223,7 +226,7 @@ impl Compact<'_> {
         Some(Some(kind))
     }
 
-    /// Goes over the least and the greatest value of a page, and how many there are.
+    /// Skips the smallest and largest values of a page, and their counts.
     fn skip_statistics(&mut self) -> Option<()> {
         let mut number = 0;
         while let Some(kind) = self.field(&mut number)? {
@@ -246,12 +249,12 @@ impl Compact<'_> {
 mod tests {
     use super::*;
 
-    /// Type 0, 300 bytes, 20 packed, 7 values in a page of data.
+    /// Type 0, 300 bytes, 20 compressed, 7 values in a data page.
     const DATA: [u8; 13] = [
         0x15, 0x00, 0x15, 0xd8, 0x04, 0x15, 0x28, 0x2c, 0x15, 0x0e, 0x00, 0x00, 0xff,
     ];
 
-    /// A page of so many bytes whose header claims these sizes, as their varints.
+    /// A page of this many bytes whose header claims these sizes, given as varints.
     fn page(unpacked: &[u8], packed: &[u8], bytes: usize) -> Vec<u8> {
         let mut page = [&[0x15, 0x00, 0x15], unpacked, &[0x15], packed].concat();
         page.extend([0x2c, 0x15, 0x0e, 0x00, 0x00]);
@@ -275,7 +278,7 @@ mod tests {
         }
     }
 
-    /// The library would see other fields, or others of their bytes.
+    /// The library would see different fields, or read different bytes as their values.
     #[test]
     fn what_the_library_reads_otherwise_is_no_header() {
         let other = |at: usize, bytes: &[u8]| {
@@ -285,13 +288,13 @@ mod tests {
         };
         assert!(Header::read(&other(12, &[])).is_some());
         for (at, bytes) in [
-            // Another kind of field.
+            // Fields of another kind.
             (2, &[0x13][..]),
             (5, &[0x18]),
             (8, &[0x1c]),
             // The field 65,539, which is 3 in 16 bits.
             (5, &[0x05, 0x86, 0x80, 0x08]),
-            // An unknown field: a list of very many.
+            // An unknown field: a very long list.
             (11, &[0x49, 0xf8, 0xff, 0xff, 0xff, 0xff, 0x0f]),
         ] {
             assert_eq!(Header::read(&other(at, bytes)), None, "{at} {bytes:x?}");
@@ -305,12 +308,12 @@ mod tests {
         assert!(check_pages(&whole, 7).is_ok());
         assert!(check_pages(&[whole.clone(), whole.clone()].concat(), 7).is_ok());
         assert!(told(&whole[..whole.len() - 1]).contains("beyond the end of its column"));
-        // 2^31 - 1 bytes, of 2^32 + 5 packed ones, which are 5 in 32 bits.
+        // 2^31 - 1 bytes from 2^32 + 5 compressed ones, which are 5 in 32 bits.
         let most = [0xfe, 0xff, 0xff, 0xff, 0x0f];
         let hidden = page(&most, &[0x8a, 0x80, 0x80, 0x80, 0x20], 5);
         assert!(told(&hidden).contains("no header"));
         assert!(told(&page(&most, &[0x0a], 5)).contains("more bytes"));
-        // Each value made of the one before it.
+        // Each value depends on the one before it.
         let mut delta = whole;
         delta.splice(10..10, [0x15, 0x0e]);
         assert!(told(&delta).contains("encoding"));

@@ -1,16 +1,16 @@
-//! Panics as values.
+//! Turns panics into values.
 
 use std::cell::RefCell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
 
 thread_local! {
-    /// What the panic of this thread said, while it is caught.
+    /// Message of this thread's panic, while it is being caught.
     static CAUGHT: RefCell<Option<String>> = const { RefCell::new(None) };
     static CATCHING: RefCell<bool> = const { RefCell::new(false) };
 }
 
-/// Runs `work`; a panic is its message and place, and is not printed.
+/// Runs `work`; returns a panic as its message and location, without printing it.
 pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -25,7 +25,7 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
                 .map(|text| (*text).to_owned());
             let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
             let text = text.unwrap_or_else(|| "a panic".to_owned());
-            // The folder is the builder's: without it rows are the same everywhere.
+            // The folder depends on who built the program; without it, rows are the same everywhere.
             let place = info.location().map(|at| {
                 let file = at.file().rsplit(['/', '\\']).next().unwrap_or_default();
                 format!(" ({file}:{})", at.line())

@@ -1,4 +1,4 @@
-//! Part files: the rows of a block, and beside them who computed them and in what time.
+//! Part files: the rows of a block, and beside them a record of who computed them and how long it took.
 
 use std::fs::File;
 use std::path::Path;
@@ -11,29 +11,29 @@ use crate::row::{self, Row};
 use crate::table::{Data, Table, TableReader, TableWriter};
 use crate::{host, program};
 
-/// Keys of what a part says of itself, beside its columns.
+/// Keys of a part's metadata, beside its columns.
 pub(crate) const PLAN: &str = "wheeleg.plan";
 pub(crate) const PROGRAM: &str = "wheeleg.program";
-/// Key of the hash of the values: bytes that were damaged are found, wherever they are.
+/// Key of the hash of the values, which reveals damaged bytes wherever they are.
 const ROWS: &str = "wheeleg.rows";
 
-/// What it took to compute a row.
+/// The effort of computing a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Effort {
     /// Place in the plan.
     pub(crate) index: u64,
-    /// Time that it took, s.
+    /// Elapsed time, s.
     pub(crate) wall_s: f64,
-    /// How often a process had begun it before without an end.
+    /// How many processes had begun it before without finishing.
     pub(crate) ends: u32,
 }
 
-/// The bytes of a part: the same from any program of the same sources.
+/// The bytes of a part, identical for every program built from the same sources.
 pub(crate) fn bytes(columns: &Columns, plan: &str, rows: &[Row]) -> Vec<u8> {
     encode(&row::table(columns, rows), plan)
 }
 
-/// The bytes of what stands beside a part.
+/// The bytes of the record beside a part.
 pub(crate) fn run_bytes(plan: &str, efforts: &[Effort]) -> Vec<u8> {
     let column =
         |name: &str, kind, unit: &str, meaning: &str| Column::new(name, kind, unit, meaning);
@@ -83,18 +83,18 @@ fn encode(table: &Table, plan: &str) -> Vec<u8> {
     write().expect("a table in memory can be written")
 }
 
-/// What a part is not.
+/// Why a file is not a valid part.
 #[derive(Debug)]
 pub(crate) enum NotAPart {
-    /// There is none.
+    /// There is no file.
     Missing,
-    /// It cannot be read: torn, or something else.
+    /// It cannot be read: it is truncated, or not a part at all.
     Torn(String),
-    /// It is one of another plan or program.
+    /// It belongs to another plan or program.
     Foreign(String),
 }
 
-/// Rows of a part, if it is one of this plan and program.
+/// Rows of a part, if it belongs to this plan and program.
 pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), NotAPart> {
     let table = read_table(path, plan)?;
     let rows = row::rows(&table);
@@ -102,7 +102,7 @@ pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), N
     Ok((rows, table.columns))
 }
 
-/// Table of a part, if it is one of this plan and program.
+/// Table of a part, if it belongs to this plan and program.
 pub(crate) fn read_table(path: &Path, plan: &str) -> Result<Table, NotAPart> {
     let file = open(path)?;
     let torn = |e: parquet::errors::ParquetError| NotAPart::Torn(in_words(&e));
@@ -127,7 +127,7 @@ fn of(reader: &TableReader, plan: &str) -> Result<(), NotAPart> {
     for (key, own) in [(PLAN, plan), (PROGRAM, own.as_str())] {
         let found = reader.fact(key).unwrap_or("nothing");
         if found != own {
-            // A merged table has its whole plan there.
+            // A merged table has the whole plan there.
             let what = format!("its {key} is {}, not {own}", word(found));
             return Err(NotAPart::Foreign(what));
         }

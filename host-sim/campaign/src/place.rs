@@ -1,15 +1,15 @@
-//! Where a case stands.
+//! Place of a case.
 
-/// Where a case stands in its plan.
+/// Place of a case in its plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
-    /// Index of the case. Replicates count first, then cells, then samples: more samples leave
-    /// the cases before them where they are.
+    /// Index of the case. Replicates vary fastest, then cells, then samples, so adding samples leaves the
+    /// existing cases where they are.
     pub index: u64,
-    /// Cell of the grid.
+    /// Index of the cell of the grid.
     pub cell: u64,
-    /// Sample.
+    /// Index of the sample.
     pub sample: u64,
-    /// Replicate.
+    /// Index of the replicate.
     pub replicate: u64,
 }

@@ -1,11 +1,11 @@
-//! Which program made a part.
+//! Identifies the program that made a part.
 
 use std::fmt::Write as _;
 
 /// Digest of the sources that rows depend on.
 const SOURCES: [u8; 24] = *include_bytes!(concat!(env!("OUT_DIR"), "/sources"));
 
-/// Version and digest of the sources of this program. Another one may give other rows.
+/// Version of this program and digest of its sources. Another program may compute different rows.
 #[must_use]
 pub fn program() -> String {
     let mut digest = String::new();

@@ -1,5 +1,5 @@
-//! One case again: its row computed anew, and the whole run with log, figures and report; on the bench, the moves
-//! with tables, figures and page.
+//! Repeats one case: recomputes its row and writes the full run with log, figures and report; on the bench,
+//! the moves with tables, figures and page.
 
 use std::path::{Path, PathBuf};
 
@@ -19,31 +19,31 @@ use crate::store::{PlanFile, Store};
 use crate::table::TableReader;
 use crate::{CampaignError, compute};
 
-/// A case that was run again.
+/// The result of repeating a case.
 #[derive(Debug)]
 pub struct Replayed {
-    /// The row as it is now.
+    /// The row as computed now.
     pub row: Row,
-    /// The row as it was, if there is one.
+    /// The previous row, if there is one.
     pub before: Option<Row>,
-    /// Program that computed it.
+    /// Program that computed the previous row.
     pub program: String,
-    /// Columns in which the row is not what it was, to the bit.
+    /// Columns in which the new row differs from the previous one, to the bit.
     pub differs: Vec<String>,
-    /// Its files; none of a case that cannot be simulated.
+    /// Its files; `None` for a case that cannot be simulated.
     pub files: Option<Finished<Files>>,
 }
 
 /// What a replay has written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Files {
-    /// What was recorded.
+    /// The kind of recording.
     pub recording: Recording,
-    /// Its hash; none of a run that was stopped or failed.
+    /// Hash of the recording; `None` for a run that was stopped or failed.
     pub hash: Option<String>,
 }
 
-/// What is recorded of a case, and has a hash.
+/// The recording of a case, which has a hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recording {
     /// The log of a robot.
@@ -53,14 +53,14 @@ pub enum Recording {
 }
 
 impl Replayed {
-    /// Whether the row is what it was, to the bit; none if there was none.
+    /// Whether the new row equals the previous one, to the bit; `None` if there was none.
     #[must_use]
     pub fn same_row(&self) -> Option<bool> {
         self.before.as_ref().map(|_| self.differs.is_empty())
     }
 
-    /// Whether the recording of the full run, a log or moves, has the hash of the row; none of a row without one, or
-    /// of a case that was given up: its log ends before that of the full run.
+    /// Whether the recording of the full run, a log or moves, has the hash in the row. `None` for a row
+    /// without a hash, or for a case that was given up, because its log ends before that of the full run.
     #[must_use]
     pub fn same_recording(&self) -> Option<bool> {
         let files = self.files.as_ref();
@@ -75,17 +75,17 @@ impl Replayed {
     }
 }
 
-/// Where the case is from: a folder of parts, or one table of them.
+/// Source of the case: a folder of parts, or the table merged from them.
 enum From {
     Folder(Box<Store>),
     Table(PathBuf),
 }
 
-/// Runs a case again. `from`: the folder of a campaign, or its merged table; `case`: identity, or
-/// place in the plan.
+/// Repeats a case. `from` is the folder of a campaign or its merged table; `case` is an identity or an index
+/// in the plan.
 ///
 /// # Errors
-/// [`CampaignError::Refused`] if there is no such case, else as a run.
+/// [`CampaignError::Refused`] if there is no such case; otherwise as for a run.
 pub fn replay(
     from: &Path,
     case: &str,
@@ -151,13 +151,13 @@ fn run_again(
     }))
 }
 
-/// The moves on the bench, with tables, figures and page; none of one that cannot be played.
+/// The moves on the bench, with tables, figures and page; `None` if they cannot be played.
 fn play_again(
     bench: &Bench,
     seed: u64,
     settings: &Settings,
 ) -> Result<Option<Finished<Files>>, CampaignError> {
-    // Why not stands in the row.
+    // The row says why not.
     let Ok(played) = bench::play(bench, seed) else {
         return Ok(None);
     };
@@ -177,7 +177,7 @@ pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
             .to_owned(),
     })?;
     let reader = TableReader::new(file).map_err(|e| CampaignError::unreadable(path, e))?;
-    // A part has the hash of its plan alone.
+    // A part has only the hash of its plan.
     let text = reader.fact(PLAN).filter(|text| text.starts_with('{'));
     let text = text.ok_or_else(|| CampaignError::Unreadable {
         path: path.to_owned(),
@@ -213,7 +213,7 @@ fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>),
     Ok((row.index, Some(row)))
 }
 
-/// Rows of one block, or of all; of a folder those that there are.
+/// Rows of one block, or of all blocks; for a folder, the rows that exist.
 fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> {
     match place {
         From::Folder(store) => {

@@ -1,4 +1,4 @@
-//! One row: what became of a case.
+//! One row of the table: the result of a case.
 
 use wheeleg_config::plan::Value;
 
@@ -15,14 +15,14 @@ pub enum Status {
     Error,
     /// The program panicked.
     Panic,
-    /// It ended the process, more than once.
+    /// The case crashed its process more than once.
     Crashed,
-    /// It passed the limit of simulated time.
+    /// The case exceeded the limit of simulated time.
     Limit,
 }
 
 impl Status {
-    /// All of them.
+    /// All variants.
     pub const ALL: [Self; 5] = [
         Self::Ok,
         Self::Error,
@@ -31,12 +31,12 @@ impl Status {
         Self::Limit,
     ];
 
-    /// That of a name in a table.
+    /// The status with this name in a table.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|status| status.name() == name)
     }
 
-    /// As the table has it.
+    /// Name in the table.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -52,9 +52,9 @@ impl Status {
 /// A target's value and verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Figure {
-    /// What was measured; none where it could not be.
+    /// The measured value; `None` if it could not be measured.
     pub value: Option<f64>,
-    /// Whether it lies within its limits.
+    /// Whether the value lies within its limits.
     pub pass: Option<bool>,
 }
 
@@ -75,7 +75,7 @@ pub struct Row {
     pub seed: u64,
     /// Values of the factors.
     pub factors: Vec<Value>,
-    /// How it ended.
+    /// How the case ended.
     pub status: Status,
     /// What went wrong.
     pub error: Option<String>,
@@ -83,21 +83,21 @@ pub struct Row {
     pub log_hash: Option<String>,
     /// Simulated time, s.
     pub simulated_s: Option<f64>,
-    /// Whether all required targets are met.
+    /// Whether all required targets were met.
     pub passed: Option<bool>,
     /// Values and verdicts, in the order of the columns.
     pub figures: Vec<Figure>,
 }
 
 impl Row {
-    /// Whether it counts as failed: a required target missed, or no result.
+    /// Whether the row counts as failed: it missed a required target or has no result.
     #[must_use]
     pub fn is_failed(&self) -> bool {
         is_failed(self.passed)
     }
 }
 
-/// Whether a row whose column `passed` says this counts as failed: also one without a result.
+/// Whether a row with this value of `passed` counts as failed. A row without a result does.
 pub(crate) fn is_failed(passed: Option<bool>) -> bool {
     passed != Some(true)
 }
@@ -143,10 +143,10 @@ pub(crate) fn differing(columns: &Columns, one: &Row, other: &Row) -> Vec<String
     names
 }
 
-/// Longest text of what went wrong, bytes.
+/// Most bytes of an error text.
 pub(crate) const ERROR_MOST: usize = 400;
 
-/// What went wrong, cut where it is too long for a table.
+/// The error text, truncated if it is too long for a table.
 pub(crate) fn shortened(mut error: String) -> String {
     if error.len() > ERROR_MOST {
         let room = ERROR_MOST - '…'.len_utf8();
@@ -157,7 +157,7 @@ pub(crate) fn shortened(mut error: String) -> String {
     error
 }
 
-/// Rows as a table.
+/// Converts rows to a table.
 pub(crate) fn table(columns: &Columns, rows: &[Row]) -> Table {
     let mut table = Table::empty(columns.all.clone());
     for row in rows {
@@ -211,7 +211,7 @@ impl Cell<'_> {
     }
 }
 
-/// Rows of a table; `None` if it is not one of [`table`]'s.
+/// Converts a table to rows; returns `None` if [`table`] did not make it.
 pub(crate) fn rows(table: &Table) -> Option<Vec<Row>> {
     let columns = Columns::read(table.columns.clone());
     let whole = |name: &str, at: usize| -> Option<u64> {
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
     use crate::columns::{Column, Kind};
 
-    /// Each column is compared, and a number to its last bit.
+    /// Compares every column, and numbers to the last bit.
     #[test]
     fn rows_that_differ_say_where() {
         let columns = Columns::read(

@@ -21,52 +21,52 @@ use crate::simulate::log;
 use crate::store::Store;
 use crate::work::Work;
 
-/// How to run.
+/// Options of a run.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// Which share.
+    /// The shard to compute.
     pub shard: Shard,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// Only so many cases, as a pilot.
+    /// Compute only this many cases, as a pilot.
     pub first: Option<u64>,
-    /// Asks to stop.
+    /// Handle to request a stop.
     pub stop: Stop,
-    /// This program, for cases that may end the process; none: they are run in this one.
+    /// This program, to run cases that may crash the process; if `None`, they run in this process.
     pub program: Option<PathBuf>,
-    /// Progress as lines of JSON on standard error.
+    /// Whether to report progress as lines of JSON on standard error.
     pub json: bool,
-    /// Time after which the rows of a block that is not finished are saved, so that a process that
-    /// is killed loses no more; [`SAVE_EVERY`] unless there is a reason.
+    /// Interval at which the rows of an unfinished block are saved, which limits what a killed process loses.
+    /// Use [`SAVE_EVERY`] unless there is a reason not to.
     pub save_every: Duration,
 }
 
-/// A save of a block of 4096 cases takes less than a thousandth of this.
+/// Saving a block of 4096 cases takes less than a thousandth of this.
 pub const SAVE_EVERY: Duration = Duration::from_secs(30);
 
-/// What a process did.
+/// The result of a process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ran {
-    /// Cases that it was to do and that had a row before.
+    /// Cases of its share that already had a row.
     pub found: u64,
     /// Cases that it computed.
     pub computed: u64,
-    /// Of those, how many missed a required target or have no result.
+    /// Computed cases that missed a required target or have no result.
     pub failed: u64,
-    /// Why they did.
+    /// Why these cases failed.
     pub causes: Causes,
-    /// Cases of its share.
+    /// Number of cases in its share.
     pub of: u64,
-    /// What stopped it.
+    /// The signal that stopped it.
     pub stopped: Option<Signal>,
     /// Parts that were set aside, and why.
     pub aside: Vec<(PathBuf, String)>,
 }
 
-/// Works off a shard. Whatever a process before has finished is not done again.
+/// Computes a shard. Work that an earlier process finished is not repeated.
 ///
 /// # Errors
-/// A file that cannot be written, with its path. Cases that go wrong are rows, not errors.
+/// A file that cannot be written, with its path. Cases that fail are rows, not errors.
 pub fn run(
     store: &Store,
     cases: &Cases<'_>,
@@ -145,7 +145,7 @@ pub fn run(
     })
 }
 
-/// Writes the log of a case that the plan wants to be kept: it is simulated once more for it.
+/// Writes the log of a case if the plan keeps it; the case is simulated again for this.
 fn keep_log(store: &Store, cases: &Cases<'_>, row: &Row, stop: &Stop) -> Result<(), CampaignError> {
     let wanted = match cases.plan().keep {
         KeepLogs::None => false,
@@ -165,31 +165,31 @@ fn keep_log(store: &Store, cases: &Cases<'_>, row: &Row, stop: &Stop) -> Result<
     Ok(())
 }
 
-/// How far it is.
+/// Progress of a run.
 struct Live<'a> {
     progress: &'a Progress,
     json: bool,
     of: u64,
     begun: Instant,
     found: AtomicU64,
-    /// Of those found, how many had failed.
+    /// Failed cases among those found.
     failed_before: AtomicU64,
     computed: AtomicU64,
-    /// Of those computed.
+    /// Failed cases among those computed.
     failed: AtomicU64,
     causes: Mutex<Causes>,
     last: Mutex<Option<Instant>>,
-    /// When the last line was written where no bar is shown.
+    /// When the last line was written, if no progress bar is shown.
     lined: Mutex<Instant>,
     is_terminal: bool,
 }
 
-/// Time between two tellings of progress, and between two plain lines of it, which stay.
+/// Interval between two progress reports, and between two plain lines, which stay on the screen.
 const BETWEEN: Duration = Duration::from_secs(1);
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
 impl Live<'_> {
-    /// A plain line from time to time where no bar is shown, as in a log of a scheduler.
+    /// Writes a plain line from time to time if no progress bar is shown, as in the log of a scheduler.
     fn line(&self, done: u64, told: &str) {
         let Ok(mut lined) = self.lined.try_lock() else {
             return;
@@ -227,7 +227,7 @@ impl Live<'_> {
         *last = Some(Instant::now());
         let computed = self.computed.load(Ordering::Relaxed);
         let done = computed + self.found.load(Ordering::Relaxed);
-        // Of all that are done, also by earlier processes.
+        // Counts all finished cases, including those of earlier processes.
         let failed =
             self.failed.load(Ordering::Relaxed) + self.failed_before.load(Ordering::Relaxed);
         let rate = computed as f64 / self.begun.elapsed().as_secs_f64().max(1e-3);

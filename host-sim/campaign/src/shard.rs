@@ -1,4 +1,4 @@
-//! Which share of the blocks a process does.
+//! The share of the blocks that a process computes.
 
 use std::str::FromStr;
 
@@ -7,27 +7,27 @@ use crate::CampaignError;
 /// Every n-th block, beginning with the i-th.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// Which, from 0.
+    /// Index, from 0.
     pub i: u64,
-    /// Of how many.
+    /// Number of shards.
     pub n: u64,
 }
 
 impl Shard {
-    /// All of it.
+    /// The whole campaign.
     pub const ALL: Self = Self { i: 0, n: 1 };
 
-    /// Whether a block belongs to it.
+    /// Whether a block belongs to the shard.
     #[must_use]
     pub const fn has(self, block: u64) -> bool {
         block % self.n == self.i
     }
 
-    /// That of the command line, or else that of a job array of Slurm or of an indexed job of
-    /// Kubernetes with `shards` of them; all, if there is none.
+    /// Takes the shard from the command line, or from the job array of Slurm or the indexed job of Kubernetes
+    /// with `shards` members. If there is neither, the shard is the whole campaign.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if they disagree, or a variable is not what it should be.
+    /// [`CampaignError::Refused`] if these sources disagree, or a variable has an invalid value.
     pub fn choose(
         given: Option<Self>,
         shards: Option<u64>,

@@ -1,4 +1,4 @@
-//! One case in memory: no file is written unless its log is asked for.
+//! Simulates one case in memory; no file is written unless its log is requested.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -18,25 +18,25 @@ use crate::cases::{Case, Setup};
 use crate::reasons::why;
 use crate::row::Status;
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// How it ended.
+    /// How the case ended.
     pub status: Status,
     /// What went wrong.
     pub error: Option<String>,
-    /// Hash of the log, as far as it went.
+    /// Hash of the log up to where it ended.
     pub log_hash: Option<String>,
     /// Simulated time, start-up included, s.
     pub simulated_s: Option<f64>,
-    /// Whether all required targets are met; none unless it ran to its end.
+    /// Whether all required targets were met; `None` unless the case ran to its end.
     pub passed: Option<bool>,
-    /// Targets; none unless it ran to its end.
+    /// Targets; empty unless the case ran to its end.
     pub targets: Vec<Target>,
 }
 
 impl Outcome {
-    /// One without a result.
+    /// An outcome without a result.
     pub(crate) fn without(status: Status, error: String) -> Self {
         Self {
             status,
@@ -49,8 +49,8 @@ impl Outcome {
     }
 }
 
-/// Simulates a case and judges it; `None` if `stop` was asked for before its end. A simulated
-/// time above `limit_s`, of the scenario, gives it up.
+/// Simulates a case and judges it; returns `None` if `stop` was requested before its end. The case is given
+/// up when the scenario's simulated time exceeds `limit_s`.
 #[must_use]
 pub fn simulate(case: &Case, limit_s: Option<f64>, stop: &Stop) -> Option<Outcome> {
     recorded(case, Recorder::new(Keep::nothing()), limit_s, stop)
@@ -79,7 +79,7 @@ fn on_bench(bench: &Bench, seed: u64) -> Outcome {
     }
 }
 
-/// Hash of all that was recorded.
+/// Hash of everything recorded.
 pub(crate) fn hash(played: &PlayedBench) -> String {
     let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign bench v1");
     let mut bytes = Vec::new();
@@ -111,7 +111,7 @@ pub(crate) fn hash(played: &PlayedBench) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// The same with a log at `path`, under that name once it is whole.
+/// As [`simulate`], and writes a log that appears at `path` once it is complete.
 pub(crate) fn log(
     case: &Case,
     path: &Path,
@@ -122,7 +122,7 @@ pub(crate) fn log(
     let temporary = path.with_extension(format!("{}.tmp", crate::host::unique()));
     let made = || {
         let mut file = LogFile::create(&temporary).map_err(StudyError::from)?;
-        // A case that cannot be built has a row that says so.
+        // If a case cannot be built, its row says so.
         if let Some((scenario, robot)) = case.setup.as_ref().ok().and_then(Setup::robot) {
             let scene = Scene::new(robot, scenario).map_err(StudyError::from)?;
             file = file.with(scene).map_err(StudyError::from)?;

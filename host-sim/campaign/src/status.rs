@@ -1,4 +1,4 @@
-//! How far a campaign is, from its files alone.
+//! Determines the progress of a campaign from its files alone.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -11,38 +11,39 @@ use crate::row::{Status, is_failed};
 use crate::shard::Shard;
 use crate::store::Store;
 
-/// What a folder holds.
+/// State of a campaign's folder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     /// Cases of the plan, or of the shard.
     pub cases: u64,
     /// Cases with a row.
     pub rows: u64,
-    /// Of these, in files of blocks that are not finished.
+    /// Of these, rows in files of unfinished blocks.
     pub partial: u64,
-    /// Cases without a row that a process has begun: it is at them, or was ended in them.
+    /// Cases without a row that a process has begun and not ended: it is still running them, or died in them.
     pub begun: u64,
-    /// Cases whose row is in no file: of a process that has not saved it yet, or was killed before.
+    /// Cases that have ended but whose row is in no file: their process has not saved it yet, or was killed
+    /// before it could.
     pub unsaved: u64,
     /// Rows that missed a required target or have no result.
     pub failed: u64,
-    /// Why they did.
+    /// Why these cases failed.
     pub causes: Causes,
     /// Rows by [`Status::ALL`].
     pub by_status: [u64; 5],
     /// Blocks without a part.
     pub missing: Vec<u64>,
-    /// Parts that cannot be read or are foreign, and why.
+    /// Parts that are unreadable or foreign, and why.
     pub bad: Vec<(PathBuf, String)>,
-    /// Files of the whole folder that nobody reads: of processes that were killed, and temporary ones of other
-    /// computers, which may be writing them.
+    /// Files of the whole folder that nobody reads: those of processes that were killed, and temporary files
+    /// of other computers, which may still be writing them.
     pub leftovers: Vec<PathBuf>,
 }
 
 /// Reads the parts of a shard.
 ///
 /// # Errors
-/// [`CampaignError::Unreadable`] if a part has no rows that this program knows.
+/// [`CampaignError::Unreadable`] if the rows of a part have a form unknown to this program.
 pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
     let mut state = State {
         cases: 0,
@@ -57,7 +58,7 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
         bad: Vec::new(),
         leftovers: store.leftovers(),
     };
-    // Of a million blocks most may not be there: the folder is looked through once.
+    // Most of a million blocks may not exist, so the folder is listed only once.
     let there = store.begun();
     for block in (0..store.blocks()).filter(|block| shard.has(*block)) {
         let cases = store.cases_of(block);

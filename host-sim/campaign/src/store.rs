@@ -1,17 +1,17 @@
 //! The folder of a campaign.
 //!
-//! | name | what |
+//! | name | contents |
 //! |---|---|
-//! | `plan.json` | plan with all texts that it stands on, its hash, block size, program |
-//! | `parts/000123.parquet` | rows of block 123; equal bytes from any executor |
+//! | `plan.json` | plan with all texts that it depends on, its hash, block size, program |
+//! | `parts/000123.parquet` | rows of block 123; identical bytes from any executor |
 //! | `parts/000123.run.parquet` | who computed them, and in what time |
-//! | `parts/000123.NAME.partial.parquet` | rows of a block that is at work, or whose process was stopped or killed |
+//! | `parts/000123.NAME.partial.parquet` | rows of a block in progress, or whose process was stopped or killed |
 //! | `attempts/000123.jsonl` | cases that were begun and ended |
-//! | `aside/` | parts that could not be read or are foreign |
+//! | `aside/` | parts that are unreadable or foreign |
 //! | `logs/CASE.mcap` | logs that the plan keeps |
 //!
-//! A file appears under its name when it is whole: it is written under another one and renamed. What a killed
-//! process leaves is in `leftovers.rs`.
+//! A file appears under its name only when it is complete: it is written under another name and then renamed.
+//! For what a killed process leaves, see `leftovers.rs`.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -33,7 +33,7 @@ use crate::{CampaignError, host, part, program};
 
 /// Name of the plan in the folder.
 pub(crate) const PLAN_FILE: &str = "plan.json";
-/// Version of the form of `plan.json`.
+/// Version of the format of `plan.json`.
 pub(crate) const FORMAT: u32 = 1;
 
 /// `plan.json`.
@@ -49,19 +49,19 @@ pub struct PlanFile {
     pub cases: u64,
     /// Cases of a block.
     pub block: u64,
-    /// Texts that the plan stands on.
+    /// Texts that the plan depends on.
     pub sources: Sources,
 }
 
-/// Work of one block, s, where the plan does not say how many cases it has.
+/// Work per block, s, if the plan does not set the block size.
 const BLOCK_S: f64 = 60.0;
 
 impl PlanFile {
-    /// That of a plan, for this program. `work_s`: processor time of a case, about.
+    /// The file for a plan and this program. `work_s` is the approximate processor time of a case.
     #[must_use]
     pub fn of(plan: &Plan, work_s: f64) -> Self {
         let by_work = (BLOCK_S / work_s).clamp(1.0, MOST_IN_BLOCK as f64) as u64;
-        // The power of two that is not above it, unless that makes too many parts.
+        // The largest power of two not above it, unless that makes too many parts.
         let by_work = 1 << by_work.ilog2();
         let by_number = plan.cases().div_ceil(MOST_BLOCKS).next_power_of_two();
         let block = plan.block.unwrap_or_else(|| by_number.max(by_work));
@@ -75,7 +75,7 @@ impl PlanFile {
         }
     }
 
-    /// The same plan for this program.
+    /// The same plan, attributed to this program.
     #[must_use]
     pub fn for_this_program(self) -> Self {
         Self {
@@ -84,20 +84,20 @@ impl PlanFile {
         }
     }
 
-    /// Reads one.
+    /// Reads a plan file.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] if it is none.
+    /// [`CampaignError::Unreadable`] if it is not one.
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
         let text = open_file(path).and_then(std::io::read_to_string);
         let text = text.map_err(|e| CampaignError::unreadable(path, e))?;
         Self::parse(path, &text)
     }
 
-    /// Reads the text of one; `path` is where it stands.
+    /// Parses the text of a plan file; `path` is its location.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] if it is none.
+    /// [`CampaignError::Unreadable`] if it is not a plan file.
     pub(crate) fn parse(path: &Path, text: &str) -> Result<Self, CampaignError> {
         let file: Self =
             serde_json::from_str(text).map_err(|e| CampaignError::unreadable(path, e))?;
@@ -109,7 +109,8 @@ impl PlanFile {
             let reason = "its texts are not those of its hash".to_owned();
             return Err(CampaignError::unreadable(path, reason));
         }
-        // It follows from the texts; a plan that only another program reads is shown as it stands.
+        // The number of cases follows from the texts. For a plan that only another program can read, it is
+        // taken as stated.
         let cases = file.plan().map_or(file.cases, |plan| plan.cases());
         if file.cases != cases || cases == 0 {
             let reason = format!(
@@ -121,7 +122,7 @@ impl PlanFile {
         Ok(file)
     }
 
-    /// The plan in it.
+    /// The plan in the file.
     ///
     /// # Errors
     /// [`CampaignError::Config`] if this program refuses it.
@@ -129,7 +130,7 @@ impl PlanFile {
         Ok(Plan::of(self.sources.clone())?)
     }
 
-    /// In what another one differs, for a message.
+    /// How another plan file differs, for a message.
     fn difference(&self, other: &Self) -> Option<String> {
         let texts = |of: &Self| {
             let Sources {
@@ -188,7 +189,7 @@ impl PlanFile {
     }
 }
 
-/// Names of files do not count, their texts do.
+/// Hashes the texts; the names of the files do not enter.
 fn hash(sources: &Sources, block: u64) -> String {
     let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign plan v1");
     let mut add = |text: &str| {
@@ -220,7 +221,7 @@ fn hash(sources: &Sources, block: u64) -> String {
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// A folder of parts of one plan.
+/// A folder with the parts of one plan.
 #[derive(Debug, Clone)]
 pub struct Store {
     folder: PathBuf,
@@ -228,11 +229,11 @@ pub struct Store {
 }
 
 impl Store {
-    /// Creates the folder, or goes on with one of the same plan and program. From here on there is
-    /// something to finish: a signal that ends the program before it finds nothing written.
+    /// Creates the folder, or continues with a folder of the same plan and program. If a signal ends the
+    /// program before this point, nothing has been written; from here on there is something to finish.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if it is one of another plan or program, which is named;
+    /// [`CampaignError::Refused`] if the folder belongs to another plan or program, which is named;
     /// [`CampaignError::Output`] if it cannot be written.
     pub fn create(folder: &Path, plan: PlanFile, stop: &Stop) -> Result<Self, CampaignError> {
         stop.begin();
@@ -263,10 +264,11 @@ impl Store {
         })
     }
 
-    /// Opens a folder that there is.
+    /// Opens an existing folder.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if there is no plan in it, [`CampaignError::Unreadable`] if it is none.
+    /// [`CampaignError::Refused`] if there is no plan in it; [`CampaignError::Unreadable`] if the plan is
+    /// invalid.
     pub fn open(folder: &Path) -> Result<Self, CampaignError> {
         let plan = folder.join(PLAN_FILE);
         if plan.try_exists().is_ok_and(|there| !there) {
@@ -281,13 +283,13 @@ impl Store {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Whether a path is that of one of its own files, or would be among them.
+    /// Whether a path is that of one of the folder's own files, or would be among them.
     pub(crate) fn owns(&self, path: &Path) -> bool {
         let parent = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -298,7 +300,7 @@ impl Store {
             || own.any(|name| same_file(parent, &self.folder.join(name)))
     }
 
-    /// Its plan.
+    /// The plan file.
     #[must_use]
     pub fn plan(&self) -> &PlanFile {
         &self.plan
@@ -323,7 +325,7 @@ impl Store {
         self.folder.join(format!("parts/{block:06}.parquet"))
     }
 
-    /// Writes the part of a block, which has all its rows.
+    /// Writes the part of a block that has all its rows.
     ///
     /// # Errors
     /// [`CampaignError::Output`] if it cannot be written.
@@ -341,7 +343,7 @@ impl Store {
         self.folder.join(format!("attempts/{block:06}.jsonl"))
     }
 
-    /// The rows of a block that is done; of a part that is torn or foreign, why it does not count.
+    /// The rows of a finished block, `None` if it has no part, or why its part is torn or foreign.
     pub(crate) fn table(&self, block: u64) -> Result<Option<Table>, String> {
         let expected = self.cases_of(block);
         let table = match part::read_table(&self.part(block), &self.plan.hash) {
@@ -356,7 +358,7 @@ impl Store {
         Err("it has not each case of its block once".to_owned())
     }
 
-    /// Moves a part that does not count out of the way; where it is now.
+    /// Moves an invalid part out of the way; returns its new path.
     pub(crate) fn set_aside(&self, path: &Path) -> Result<PathBuf, CampaignError> {
         let folder = self.folder.join("aside");
         let failed = |e| CampaignError::output("set aside", path, e);
@@ -367,7 +369,7 @@ impl Store {
         Ok(to)
     }
 
-    /// Blocks that have a file, whole or not.
+    /// Blocks that have a file, whether complete or not.
     pub(crate) fn begun(&self) -> BTreeSet<u64> {
         let entries = fs::read_dir(self.folder.join("parts"));
         let names = entries.into_iter().flatten().flatten();
@@ -376,7 +378,7 @@ impl Store {
         blocks.collect()
     }
 
-    /// Files with rows of a block that was not finished.
+    /// Files with rows of an unfinished block.
     pub(crate) fn partials(&self, block: u64) -> Vec<PathBuf> {
         let begin = format!("{block:06}.");
         let entries = fs::read_dir(self.folder.join("parts"));
@@ -393,14 +395,13 @@ impl Store {
         found
     }
 
-    /// A name for such a file that no other process has.
+    /// A name for such a file that no other process uses.
     pub(crate) fn new_partial(&self, block: u64) -> PathBuf {
         let name = format!("parts/{block:06}.{}.partial.parquet", host::unique());
         self.folder.join(name)
     }
 
-    /// Rows of the files of a block that was not finished, and those files; what cannot be read
-    /// is set aside.
+    /// Rows in the files of an unfinished block, and those files; unreadable files are set aside.
     pub(crate) fn kept_rows(&self, block: u64) -> Result<(Vec<Row>, Vec<PathBuf>), CampaignError> {
         let (mut rows, mut files) = (Vec::new(), Vec::new());
         for path in self.partials(block) {
@@ -421,7 +422,7 @@ impl Store {
     }
 }
 
-/// Writes a file whole: under another name, synced, renamed, and the folder synced.
+/// Writes a file as a whole: under another name, synced, renamed, and the folder synced.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let temporary = temporary(path);
     let result = fill(&temporary, path, bytes).and_then(|()| {
@@ -435,14 +436,14 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), CampaignError
     result
 }
 
-/// Creates a file whole, unless it is there by now.
+/// Creates a file as a whole, unless it exists by then.
 fn create_new(path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let temporary = temporary(path);
     let result =
         fill(&temporary, path, bytes).and_then(|()| match fs::hard_link(&temporary, path) {
             Ok(()) => sync_folder(path).map_err(|e| CampaignError::output("write", path, e)),
             Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(()),
-            // A file system without links: whoever comes second writes the same.
+            // On a file system without hard links, the second process writes the same bytes.
             Err(_) => {
                 fs::rename(&temporary, path).map_err(|e| CampaignError::output("write", path, e))
             }
@@ -456,7 +457,7 @@ fn temporary(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}.tmp", host::unique()))
 }
 
-/// Writes the file that will be at `path`, which is the one that the user knows.
+/// Writes the temporary file. Errors name `path`, its final name, which the user knows.
 fn fill(temporary: &Path, path: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
     let write = || -> std::io::Result<()> {
         let mut file = File::create(temporary)?;
@@ -473,7 +474,7 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
     if cfg!(unix)
         && let Some(folder) = path.parent()
     {
-        // Of a bare name it is the folder that the program stands in.
+        // A bare file name is relative to the current folder.
         let here = folder.as_os_str().is_empty();
         return File::open(if here { Path::new(".") } else { folder })?.sync_all();
     }

@@ -1,38 +1,37 @@
-//! A campaign for a cluster: the script of a Slurm array, the manifest of a Kubernetes job.
+//! Submits a campaign to a cluster: the script of a Slurm array, or the manifest of a Kubernetes job.
 //!
-//! There is no scheduler here: both start the shards of [`crate::run`], which know from their
-//! environment which they are.
+//! There is no scheduler here. Both start the shards of [`crate::run`], which learn from their environment
+//! which shard they are.
 
 use std::path::Path;
 use std::process::Command;
 
 use crate::{CampaignError, Store};
 
-/// Shortest work of a task, s: less is mostly start-up, and overwhelms a site.
+/// Shortest work of a task, s: a shorter task is mostly start-up, and many of them overload a site.
 const LEAST_TASK_S: f64 = 30.0;
-/// So few tasks overwhelm nobody, however short they are.
+/// This few tasks overload nobody, however short they are.
 const FEW: u64 = 8;
 
-/// What a cluster is to do.
+/// A job for a cluster.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Submission {
     /// Name of the plan.
     pub name: String,
-    /// This program, as the cluster's computers find it.
+    /// This program, as seen by the cluster's computers.
     pub program: String,
-    /// Folder of the campaign, as they find it.
+    /// Folder of the campaign, as seen by them.
     pub folder: String,
-    /// Shards.
+    /// Number of shards.
     pub shards: u64,
 }
 
 impl Submission {
-    /// That of a folder.
+    /// Prepares the submission of a folder.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if there are more shards than blocks, or more than a few of
-    /// which each has less than 30 s of work, by the simulated time of a case; with what is
-    /// allowed.
+    /// [`CampaignError::Refused`], stating what is allowed, if there are more shards than blocks, or more
+    /// than a few shards with less than 30 s of work each, judging by the simulated time of a case.
     pub fn new(
         store: &Store,
         name: &str,
@@ -94,7 +93,7 @@ impl Submission {
         own.into_iter().chain(further.iter().cloned()).collect()
     }
 
-    /// Arguments of `sbatch` for the job that merges, after all tasks of `job` have ended.
+    /// Arguments of `sbatch` for the job that merges the parts after all tasks of `job` have ended.
     #[must_use]
     pub fn merge_arguments(&self, job: &str, further: &[String]) -> Vec<String> {
         let (program, folder) = (shell(&self.program), shell(&self.folder));
@@ -111,10 +110,10 @@ impl Submission {
             .collect()
     }
 
-    /// Gives the array and the merging job to Slurm; their numbers.
+    /// Submits the array and the merge job to Slurm; returns their numbers.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if Slurm is not there, allows fewer tasks, or refuses;
+    /// [`CampaignError::Refused`] if Slurm is missing, allows fewer tasks, or refuses;
     /// [`CampaignError::Output`] if the script cannot be written.
     pub fn submit_to_slurm(&self, further: &[String]) -> Result<[String; 2], CampaignError> {
         let config = output_of("scontrol", &["show".to_owned(), "config".to_owned()])?;
@@ -141,8 +140,8 @@ impl Submission {
         Ok([job, merge])
     }
 
-    /// Manifest of an indexed job (`batch/v1`), for `kubectl apply -f -`. The folder is a volume
-    /// that all pods can write.
+    /// Manifest of an indexed job (`batch/v1`), for `kubectl apply -f -`. The folder is a volume that all
+    /// pods can write to.
     #[must_use]
     pub fn kubernetes(&self, image: &str, claim: &str) -> String {
         let plain = |c: char| {
@@ -152,7 +151,7 @@ impl Submission {
                 '-'
             }
         };
-        // A label of DNS (RFC 1123), with room for the number of a pod behind it.
+        // A DNS label (RFC 1123), with room to append the number of a pod.
         let name: String = self.name.chars().map(plain).take(40).collect();
         let name = match name.trim_matches('-') {
             "" => String::new(),
@@ -178,7 +177,7 @@ impl Submission {
     }
 }
 
-/// A word for a shell.
+/// Quotes a word for a shell.
 fn shell(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-%+:=@,".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -187,12 +186,12 @@ fn shell(word: &str) -> String {
     format!("'{}'", word.replace('\'', "'\\''"))
 }
 
-/// A text in YAML.
+/// Quotes a text for YAML.
 fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-/// What a program prints.
+/// Runs a program and returns its output.
 fn output_of(program: &str, arguments: &[String]) -> Result<String, CampaignError> {
     let output = Command::new(program)
         .args(arguments)
@@ -216,13 +215,13 @@ fn output_of(program: &str, arguments: &[String]) -> Result<String, CampaignErro
     ))
 }
 
-/// Job number in what `sbatch --parsable` prints: the cluster's name may follow.
+/// Job number in the output of `sbatch --parsable`, which may append the cluster's name.
 fn number(printed: &str) -> String {
     let line = printed.trim();
     line.split(';').next().unwrap_or(line).to_owned()
 }
 
-/// Tasks that an array may have, by `scontrol show config`: indices stay below this number.
+/// Most tasks of an array, from `scontrol show config`: indices stay below this number.
 fn max_array_size(config: &str) -> Option<u64> {
     let lines = config.lines();
     let mut values = lines.filter_map(|line| line.split_once('='));
@@ -288,7 +287,7 @@ mod tests {
         assert!(yaml.contains("--shards, \"8\""));
     }
 
-    /// Names of plans have characters that a job's has not, and may have no others.
+    /// The name of a plan may contain characters that a job name may not, and possibly no others.
     #[test]
     fn a_job_has_a_name_that_kubernetes_takes() {
         for (plan, job) in [

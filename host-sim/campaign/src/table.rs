@@ -1,4 +1,4 @@
-//! A table in memory, a column at a time, and as Parquet.
+//! A table in memory, stored by column, and its Parquet form.
 
 use std::fs::File;
 use std::path::Path;
@@ -22,8 +22,9 @@ use crate::columns::{Column, Kind};
 use crate::pages::{self, in_words};
 use crate::panics::caught;
 
-/// Bytes of text for each byte of a file: many rows may share one. A row has some 40 bytes that do not
-/// pack, and its texts are cut ([`crate::row::ERROR_MOST`]) or those of a plan ([`crate::pages::NAMES_MOST`]).
+/// Most bytes of text per byte of file: many rows may share one text. A row has about 40 bytes that do not
+/// compress, and its texts are either truncated ([`crate::row::ERROR_MOST`]) or come from a plan
+/// ([`crate::pages::NAMES_MOST`]).
 const TEXT_PER_BYTE: u64 = 64;
 
 /// Values of one column; `None` is null.
@@ -40,7 +41,7 @@ pub enum Data {
 }
 
 impl Data {
-    /// No values of a kind.
+    /// An empty column of a kind.
     #[must_use]
     pub fn empty(kind: Kind) -> Self {
         match kind {
@@ -79,10 +80,10 @@ impl Data {
     }
 }
 
-/// A table: its columns, and what else its file says.
+/// A table: its columns and their values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Names and kinds.
+    /// Names, kinds and meanings.
     pub columns: Vec<Column>,
     /// Values, one list for each column.
     pub data: Vec<Data>,
@@ -102,14 +103,14 @@ impl Table {
         self.data.first().map_or(0, Data::len)
     }
 
-    /// The column of a name.
+    /// The column with this name.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&Data> {
         let at = self.columns.iter().position(|c| c.name == name)?;
         self.data.get(at)
     }
 
-    /// Whole numbers of a column; none if there is no such column.
+    /// Whole numbers of a column; empty if there is no such column.
     #[must_use]
     pub fn wholes(&self, name: &str) -> &[Option<i64>] {
         match self.column(name) {
@@ -118,7 +119,7 @@ impl Table {
         }
     }
 
-    /// Numbers of a column; none if there is no such column.
+    /// Numbers of a column; empty if there is no such column.
     #[must_use]
     pub fn numbers(&self, name: &str) -> &[Option<f64>] {
         match self.column(name) {
@@ -127,7 +128,7 @@ impl Table {
         }
     }
 
-    /// Flags of a column; none if there is no such column.
+    /// Flags of a column; empty if there is no such column.
     #[must_use]
     pub fn flags(&self, name: &str) -> &[Option<bool>] {
         match self.column(name) {
@@ -136,7 +137,7 @@ impl Table {
         }
     }
 
-    /// Texts of a column; none if there is no such column.
+    /// Texts of a column; empty if there is no such column.
     #[must_use]
     pub fn texts(&self, name: &str) -> &[Option<String>] {
         match self.column(name) {
@@ -145,11 +146,11 @@ impl Table {
         }
     }
 
-    /// Writes it to a new file that says `facts` of itself, besides its columns. For tests; nothing is
-    /// left of a file that fails.
+    /// Writes the table to a new file, with `facts` as metadata besides its columns. For tests. If this
+    /// fails, no file remains.
     ///
     /// # Errors
-    /// What the operating system or the library says.
+    /// The error of the operating system or of the library.
     #[doc(hidden)]
     pub fn write_to(&self, path: &Path, facts: &[(&str, &str)]) -> std::io::Result<()> {
         let columns = serde_json::to_string(&self.columns)?;
@@ -167,10 +168,10 @@ impl Table {
         })
     }
 
-    /// Reads a file, and of what it says of itself the values of these keys. For tests.
+    /// Reads a file, and the values of these keys in its metadata. For tests.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] for one that is no table, damaged, or made to look like one.
+    /// [`CampaignError::Unreadable`] for a file that is not a table, is damaged, or only pretends to be one.
     #[doc(hidden)]
     pub fn read_from(
         path: &Path,
@@ -185,9 +186,9 @@ impl Table {
         read().map_err(|e: ParquetError| CampaignError::unreadable(path, in_words(&e)))
     }
 
-    /// Hash of all columns and values, hexadecimal.
+    /// Hash of all columns and values, in hexadecimal.
     pub(crate) fn digest(&self) -> String {
-        // Hashed at once: a call for each value takes longer than the hash itself.
+        // Hashed in one call: a call for each value takes longer than the hash itself.
         let mut all = serde_json::to_vec(&self.columns).expect("columns are JSON");
         let mut add = |there: bool, bytes: &[u8]| {
             all.push(u8::from(there));
@@ -221,13 +222,13 @@ impl Table {
     }
 }
 
-/// Writes one table, a row group after the other.
+/// Writes one table, one row group after another.
 pub(crate) struct TableWriter<W: std::io::Write + Send> {
     file: SerializedFileWriter<W>,
 }
 
 impl<W: std::io::Write + Send> TableWriter<W> {
-    /// A file of these columns that says `facts` of itself.
+    /// Begins a file with these columns, and with `facts` as metadata.
     pub(crate) fn new(
         to: W,
         columns: &[Column],
@@ -238,7 +239,7 @@ impl<W: std::io::Write + Send> TableWriter<W> {
             value: Some((*value).to_owned()),
         });
         let properties = WriterProperties::builder()
-            // Equal rows give equal bytes, whatever version of the library another program has.
+            // Equal rows give equal bytes, whichever version of the library another program uses.
             .set_created_by("wheeleg".to_owned())
             .set_compression(Compression::SNAPPY)
             .set_key_value_metadata(Some(facts.collect()))
@@ -247,7 +248,7 @@ impl<W: std::io::Write + Send> TableWriter<W> {
         Ok(Self { file })
     }
 
-    /// Writes rows as one group; none makes no group.
+    /// Writes rows as one group; an empty table makes no group.
     pub(crate) fn write(&mut self, table: &Table) -> Result<(), ParquetError> {
         if table.rows() == 0 {
             return Ok(());
@@ -282,13 +283,13 @@ impl<W: std::io::Write + Send> TableWriter<W> {
         Ok(())
     }
 
-    /// Writes the footer and gives back what was written to.
+    /// Writes the footer and returns the underlying writer.
     pub(crate) fn finish(self) -> Result<W, ParquetError> {
         self.file.into_inner()
     }
 }
 
-/// Values that there are, and for each row whether it has one.
+/// The values that exist, and for each row whether it has one.
 fn split<T, U>(values: &[Option<T>], of: impl Fn(&T) -> U) -> (Vec<U>, Vec<i16>) {
     let there = values.iter().flatten().map(of).collect();
     let levels = values.iter().map(|v| i16::from(v.is_some())).collect();
@@ -316,7 +317,7 @@ fn schema(columns: &[Column]) -> Result<Arc<Type>, ParquetError> {
     Ok(Arc::new(schema))
 }
 
-/// Damaged bytes must not end the program, whatever the library does with them.
+/// Keeps damaged bytes from ending the program, whatever the library does with them.
 fn sound<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
     let read = caught(read);
     read.unwrap_or_else(|_| Err(ParquetError::General("its bytes are damaged".to_owned())))
@@ -326,12 +327,12 @@ fn sound<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Parquet
 pub(crate) struct TableReader {
     file: SerializedFileReader<File>,
     columns: Vec<Column>,
-    /// Most bytes of its texts.
+    /// Most bytes of text that the file may have.
     text_most: u64,
 }
 
 impl TableReader {
-    /// Reads the footer, and from it the columns; what it claims is compared with its bytes.
+    /// Reads the footer and the columns in it, and checks its claims against the bytes of the file.
     pub(crate) fn new(from: File) -> Result<Self, ParquetError> {
         sound(|| Self::open(from))
     }
@@ -358,21 +359,21 @@ impl TableReader {
         Ok(reader)
     }
 
-    /// What the file says of itself.
+    /// A value of the file's metadata.
     pub(crate) fn fact(&self, key: &str) -> Option<&str> {
         let facts = self.file.metadata().file_metadata().key_value_metadata()?;
         let fact = facts.iter().find(|fact| fact.key == key)?;
         fact.value.as_deref()
     }
 
-    /// Rows of each row group.
+    /// Number of rows in each row group.
     #[cfg(test)]
     pub(crate) fn groups(&self) -> Vec<i64> {
         let groups = self.file.metadata().row_groups().iter();
         groups.map(|group| group.num_rows()).collect()
     }
 
-    /// All rows.
+    /// Reads all rows.
     pub(crate) fn read(&self) -> Result<Table, ParquetError> {
         let mut table = Table::empty(self.columns.clone());
         let mut text_left = self.text_most;
@@ -382,7 +383,7 @@ impl TableReader {
         Ok(table)
     }
 
-    /// One row group. `text_left`: bytes that its texts may have.
+    /// Reads one row group. `text_left` is the number of bytes its texts may still have.
     fn group(&self, group: usize, text_left: &mut u64) -> Result<Table, ParquetError> {
         let group = self.file.get_row_group(group)?;
         let rows = usize::try_from(group.metadata().num_rows())
@@ -429,7 +430,7 @@ impl TableReader {
     }
 }
 
-/// Reads a column whole: values and levels to values or null.
+/// Reads a whole column; combines values and levels into optional values.
 fn read_column<T>(
     rows: usize,
     read: impl FnOnce(&mut Vec<i16>, &mut Vec<T>) -> Result<(usize, usize, usize), ParquetError>,
@@ -453,8 +454,8 @@ mod tests {
     use crate::pages::{MOST_COLUMNS, NAMES_MOST};
     use crate::row::ERROR_MOST;
 
-    /// The widest table and the longest names that a plan may have, with nothing else in its rows: what is
-    /// written is read.
+    /// The widest table with the longest names that a plan may have, and nothing else in its rows: what is
+    /// written can be read.
     #[test]
     fn the_widest_table_is_read() {
         const ROWS: u128 = 5_000;
@@ -483,7 +484,7 @@ mod tests {
         assert!(read.expect("a table") == table);
     }
 
-    /// Names, texts and what else a file says come back as they were, whatever they hold.
+    /// Names, texts and metadata survive a round trip, whatever they contain.
     #[test]
     fn texts_of_any_content_come_back() {
         let texts = [

@@ -1,4 +1,4 @@
-//! Works off the blocks of a shard: a queue of cases, and a part as soon as its block is done.
+//! Computes the blocks of a shard: a queue of cases, and a part as soon as its block is done.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use crate::row::{Row, Status, is_failed};
 use crate::simulate::Outcome;
 use crate::store::{Store, write_whole};
 
-/// Processes of its own that a case must have ended before it is given up.
+/// Number of separate processes that a case must have crashed before it is given up.
 const ENDS: u32 = 2;
 
-/// A block at work.
+/// A block in progress.
 struct Block {
     number: u64,
-    /// Cases that it has, or of a pilot those that it is to have.
+    /// Number of its cases, or for a pilot the number wanted.
     wanted: usize,
     rows: Mutex<BTreeMap<u64, Row>>,
     efforts: Mutex<Vec<Effort>>,
@@ -31,18 +31,18 @@ struct Block {
     saved: Mutex<Saved>,
 }
 
-/// What of a block is on the disk before it is finished.
+/// The rows of an unfinished block that are on disk.
 struct Saved {
-    /// Since when it is.
+    /// When they were last saved.
     since: Instant,
-    /// The files that hold it: this process' own, and those that it has taken up. Another process
-    /// may be at the same block; its files are left to it.
+    /// The files that hold them: this process's own, and those that it has taken over. Another process may be
+    /// working on the same block; its files are left alone.
     files: Vec<PathBuf>,
-    /// Whether the part is there: then nothing is to be saved any more.
+    /// Whether the part exists, so that there is nothing more to save.
     finished: bool,
 }
 
-/// What is to be done, and what was.
+/// Pending and open work.
 struct Queue<'a> {
     blocks: Box<dyn Iterator<Item = u64> + Send + 'a>,
     block: Option<(Arc<Block>, VecDeque<u64>)>,
@@ -50,32 +50,31 @@ struct Queue<'a> {
     error: Option<CampaignError>,
 }
 
-/// A shard at work.
+/// A shard in progress.
 pub(crate) struct Work<'a> {
     pub(crate) store: &'a Store,
     pub(crate) cases: &'a Cases<'a>,
     pub(crate) simulate: Simulate<'a>,
     pub(crate) stop: &'a Stop,
-    /// Only cases below this index.
+    /// Only cases below this index are computed.
     pub(crate) first: u64,
-    /// Time after which the rows of a block that is not finished are saved.
+    /// Interval at which the rows of an unfinished block are saved.
     pub(crate) save_every: Duration,
-    /// Program for cases that may end the process.
+    /// Program that runs cases that may crash the process.
     pub(crate) program: Option<&'a Path>,
-    /// Told of cases that have a row already, and how many of them failed.
+    /// Called with the number of cases that already have a row, and how many of them failed.
     pub(crate) found: &'a (dyn Fn(u64, u64) + Sync),
-    /// Told of every row that is computed.
+    /// Called for every computed row.
     pub(crate) on_row: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
-    /// Told of a part that was set aside.
+    /// Called for every part that was set aside.
     pub(crate) aside: &'a (dyn Fn(&Path, &str) + Sync),
 }
 
 impl Work<'_> {
-    /// Works on the blocks with so many threads.
+    /// Works on the blocks with this many threads.
     ///
     /// # Errors
-    /// The first file that cannot be written. What was computed until then is kept, as far as
-    /// that can be written.
+    /// The first file that cannot be written. Rows computed until then are kept if they can be written.
     pub(crate) fn run(
         &self,
         blocks: impl Iterator<Item = u64> + Send,
@@ -136,7 +135,7 @@ impl Work<'_> {
         }
     }
 
-    /// The next case, from the next block if this one has none left.
+    /// The next case; moves on to the next block if this one has none left.
     fn next(&self, queue: &mut Queue<'_>) -> Result<Option<(Arc<Block>, u64)>, CampaignError> {
         loop {
             if let Some((block, left)) = &mut queue.block
@@ -160,7 +159,7 @@ impl Work<'_> {
         }
     }
 
-    /// A block and its cases without a row; `None` if it is done.
+    /// A block and its cases without a row; `None` if the block is done.
     fn open(&self, number: u64) -> Result<Option<(Block, VecDeque<u64>)>, CampaignError> {
         match self.store.table(number) {
             Ok(Some(table)) => {
@@ -205,7 +204,7 @@ impl Work<'_> {
         Ok(Some((block, left)))
     }
 
-    /// Computes one case of a block; true if the block is finished with it.
+    /// Computes one case of a block; returns true if this finishes the block.
     fn work_on(&self, block: &Block, index: u64) -> Result<bool, CampaignError> {
         let begun = Instant::now();
         let ends = block.attempts.known(index).ends();
@@ -268,7 +267,7 @@ impl Work<'_> {
         }
     }
 
-    /// Writes the part of a block that has all its rows; of a pilot, what there is.
+    /// Writes the part of a block that has all its rows; for a pilot, saves the rows that exist.
     fn finish(&self, block: &Block) -> Result<(), CampaignError> {
         let cases = self.store.cases_of(block.number);
         let mut saved = held(&block.saved);
@@ -297,13 +296,12 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Saves the rows of a block from time to time: a process that is killed loses no more than
-    /// that.
+    /// Saves the rows of a block from time to time, which limits what a killed process loses.
     fn save_if_due(&self, block: &Block) -> Result<(), CampaignError> {
         let mut saved = match block.saved.try_lock() {
             Ok(saved) => saved,
             Err(TryLockError::Poisoned(e)) => e.into_inner(),
-            // Another thread is at it.
+            // Another thread is saving.
             Err(TryLockError::WouldBlock) => return Ok(()),
         };
         if saved.since.elapsed() < self.save_every {
@@ -312,12 +310,12 @@ impl Work<'_> {
         self.save(block, &mut saved)
     }
 
-    /// Keeps the rows of a block that is not finished.
+    /// Keeps the rows of an unfinished block.
     fn leave(&self, block: &Block) -> Result<(), CampaignError> {
         self.save(block, &mut held(&block.saved))
     }
 
-    /// Writes the rows that there are, and takes away the files that held some of them before.
+    /// Saves the existing rows, and removes the files that held some of them before.
     fn save(&self, block: &Block, saved: &mut Saved) -> Result<(), CampaignError> {
         let rows: Vec<Row> = held(&block.rows).values().cloned().collect();
         let none = rows.is_empty() || held(&block.efforts).is_empty();
@@ -335,7 +333,7 @@ impl Work<'_> {
     }
 }
 
-/// What a thread that panicked has left is whole: nothing is half done under a lock.
+/// Ignores poisoning: no data is left half changed when a lock is released, even by a thread that panicked.
 fn held<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,7 +1,7 @@
-//! A case that ends the process, and a process that is killed: a program of its own, which is
-//! started again and again.
+//! A case that crashes its process, and a process that is killed. The test starts its own program again and
+//! again.
 //!
-//! Without a harness, because the program under test is this one.
+//! There is no harness, because the program under test is this one.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -17,17 +17,18 @@ const PLAN: &str = "name = \"planted\"\nroot = 1\nsamples = 12\nblock = 4\n[base
      scenario = \"stand\"\n[factor.droop]\nparameter = \"robot.supply.droop\"\n\
      uniform = { min = 0.2, max = 0.4, unit = \"bar\" }\n";
 
-/// One block that takes longer than anybody waits, of cases of a few ms.
+/// One block, of cases of a few ms, that takes longer than anybody waits.
 const LONG: &str = "name = \"long\"\nroot = 1\nreplicates = 2000\nblock = 4096\n[base]\n\
      scenario = \"stand\"\n";
-/// Time that a case of it takes, and after which its rows are saved.
+/// Duration of one of its cases, and interval at which its rows are saved.
 const CASE: Duration = Duration::from_millis(5);
 const SAVE_EVERY: Duration = Duration::from_millis(200);
-/// Processes that are killed, and their threads.
+/// Number of processes that are killed, and of their threads.
 const KILLS: u64 = 6;
 const THREADS: usize = 2;
 
-/// The case that ends its process, and one that did so once alone: its process was killed.
+/// The case that always crashes its process, and one that does so only once, as if its process had been
+/// killed.
 const CRASHES: u64 = 6;
 const KILLED_IN: u64 = 9;
 
@@ -61,7 +62,7 @@ fn plan_of(text: &str) -> Plan {
     Plan::of(Sources::load(&path.to_string_lossy()).expect("read")).expect("a plan")
 }
 
-/// The campaign, as the program under test runs it.
+/// Runs the campaign as the program under test.
 fn work(folder: &Path) {
     let own = Options {
         program: std::env::current_exe().ok(),
@@ -70,7 +71,7 @@ fn work(folder: &Path) {
     run_in(folder, &plan_of(PLAN), &own, &|case| simulate(case, folder));
 }
 
-/// The long block, until it is killed.
+/// Runs the long block until killed.
 fn work_long(folder: &Path) {
     let saving = Options {
         save_every: SAVE_EVERY,
@@ -141,7 +142,7 @@ fn test() {
         ended += 1;
         assert!(ended < 10, "it never gets to its end");
     }
-    // Once in each of the two; then each is run in a process of its own.
+    // Each of the two cases ends the process once; then each runs in a separate process.
     assert_eq!(ended, 2);
     let store = Store::open(folder.path()).expect("a folder");
     let state = status(&store, Shard::ALL).expect("readable");
@@ -166,9 +167,8 @@ fn test() {
     println!("planted: a case that ends the process is a row, after {ended} runs: ok");
 }
 
-/// A process that is killed loses at most what it has computed since it saved last: so long as the
-/// interval, the cases that were under way, and the time of a save. Without saves it would lose its
-/// whole block.
+/// A process that is killed loses at most the work since its last save: one interval, the cases in progress,
+/// and the duration of a save. Without saves, it would lose its whole block.
 fn a_killed_process_loses_no_more_than_it_has_not_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let program = std::env::current_exe().expect("this program");
@@ -184,7 +184,7 @@ fn a_killed_process_loses_no_more_than_it_has_not_saved() {
     let (mut before, mut most_lost) = (0, 0);
     for kill in 0..KILLS {
         let mut child = start();
-        // At another time of the interval each, and not before something is saved.
+        // Kill each process at a different time within the interval, and not before something is saved.
         let begun = Instant::now();
         let saved = || status(&open(), Shard::ALL).map_or(0, |state| state.rows);
         while !folder.path().join("plan.json").exists() || saved() == before {

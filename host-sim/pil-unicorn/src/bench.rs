@@ -1,9 +1,9 @@
-//! A bench board: one image with its second serial port on a pseudo-terminal, as the
-//! debug probe of a Nucleo board gives it to the PC. Nothing else is connected.
+//! A bench board: one image whose second serial port is a pseudo-terminal, as the debug probe of a Nucleo
+//! board presents it to the PC. Nothing else is connected.
 //!
-//! The board runs as fast as it can, and its time stands still while its program waits
-//! for bytes; so what it answers does not depend on when it is asked. It stops with an
-//! error as soon as its program lets go of a pin that drives something.
+//! The board runs as fast as it can, and its time stands still while its program waits for bytes. Its answers
+//! therefore do not depend on when they are requested. It stops with an error as soon as its program takes a
+//! pin that drives something out of its idle state.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -21,18 +21,18 @@ use crate::soc::Soc;
 use crate::soc::flash::STORE_SIZE;
 use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
 
-/// Rate of the line [bit/s]; the PC opens it with that (host-sim/remote/src/serial.rs).
+/// Bit rate of the line [bit/s], at which the PC opens it (host-sim/remote/src/serial.rs).
 const BAUD: u64 = 1_000_000;
-/// Most by which two ends may differ: half a bit in ten, shared between both.
+/// Largest difference allowed between the two ends: half a bit in ten, shared between both.
 const TOLERANCE: u64 = BAUD / 50;
-/// The board is run in stretches of this [ns].
+/// Length of one run of the board [ns].
 const STRETCH_NS: u64 = 10_000_000;
 
 /// A pseudo-terminal.
 struct Line {
     /// The board's end.
     near: File,
-    /// The PC's end by name.
+    /// Name of the PC's end.
     name: String,
     /// The PC's end, held open so that simulators may come and go.
     _far: File,
@@ -46,7 +46,7 @@ impl Line {
         let name = ptsname(&near, Vec::new())?;
         let name = name.to_string_lossy().into_owned();
         let far = File::options().read(true).write(true).open(&name)?;
-        // Bytes as they are: no echo, no line ends.
+        // Pass bytes through unchanged: no echo, no line-end conversion.
         let mut settings = tcgetattr(&far)?;
         settings.make_raw();
         tcsetattr(&far, OptionalActions::Now, &settings)?;
@@ -58,11 +58,11 @@ impl Line {
     }
 }
 
-/// Runs the image for ever, and says on standard output where its port is.
+/// Runs the image forever, and prints the name of its port to standard output.
 ///
 /// # Errors
-/// A sentence: the image cannot be read, drives what it must not drive, or touches
-/// what is not modelled.
+/// A sentence: the image cannot be read, drives a pin that it must not drive, or accesses something that is
+/// not modelled.
 pub(crate) fn serve(path: &Path) -> Result<(), String> {
     let wanted = [Kind::JointHil, Kind::WheelHil];
     identify(path, &wanted, None).map_err(|wrong| {
@@ -103,7 +103,7 @@ fn stretch(machine: &mut Machine) -> Result<Stop, String> {
     machine.run(until_ns, Until::Cycle, true)
 }
 
-/// The PC understands what the board's port sends.
+/// Checks that the PC can read what the board's port sends.
 fn rate(machine: &Machine) -> Result<(), String> {
     let soc = &machine.state().soc;
     let byte_cycles = soc.serial.byte_cycles();

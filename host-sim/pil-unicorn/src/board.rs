@@ -1,4 +1,4 @@
-//! One emulated board: requests in, replies out.
+//! One emulated board, which answers requests with replies.
 
 mod outputs;
 mod timeline;
@@ -20,15 +20,13 @@ use crate::soc::flash::STORE_SIZE;
 use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
 use crate::wiring;
 
-/// Time for the start-up code before a board is taken for one that does not
-/// run its tick [ns].
+/// Time allowed for the start-up code before the board is considered not to run its tick [ns].
 const START_UP_NS: u64 = 100_000_000;
-/// Environment variable with the folder for the profiles of the boards: for each one
-/// `IMAGE-ADDRESS.txt`, a line for each block of its worst tick, with address,
-/// instructions in one execution, and number of executions.
+/// Environment variable with the folder for the boards' profiles. Each board writes `IMAGE-ADDRESS.txt` with
+/// one line per block of its worst tick: address, instructions in one execution, and number of executions.
 const PROFILE: &str = "WHEELEG_PIL_PROFILE";
 
-/// A board of one image.
+/// A board that runs one image.
 pub(crate) struct Board {
     image: Rc<Image>,
     blocks: Blocks,
@@ -39,21 +37,21 @@ pub(crate) struct Board {
     edge_ns: u64,
     first_edge_ns: u64,
     grid_ns: u64,
-    /// Where the wheel stood at the newest edges, the newest first: time [ns] and quadrature edges.
+    /// Wheel position at the two newest edges, newest first: time [ns] and quadrature edges.
     turned: [(u64, i32); 2],
     power: Power,
-    /// Transmissions that were told and have not gone out yet.
+    /// Transmissions that were announced and have not gone out yet.
     announced: VecDeque<(u64, Vec<u8>)>,
     figures: Figures,
     retired: u64,
     edges: u32,
     trip: Option<Trip>,
     power_lost_in_save: bool,
-    /// Received bytes are not worked off.
+    /// Whether received bytes remain to be processed.
     owes: bool,
-    /// Address that the straps tell.
+    /// Address set by the straps.
     address: u8,
-    /// Where the profile of the worst tick goes.
+    /// Folder for the profile of the worst tick.
     profiles: Option<PathBuf>,
 }
 
@@ -249,7 +247,7 @@ impl Board {
         for (bit, pin) in wiring::STRAPS.iter().enumerate() {
             closed |= (bits >> bit & 1) << pin;
         }
-        // The number of closed straps is odd.
+        // The parity strap makes the number of closed straps odd.
         closed |= u32::from(bits.count_ones().is_multiple_of(2)) << wiring::PARITY;
         soc.ports[1].driven = closed;
         soc.ports[0].driven = wiring::FOOT.iter().fold(0, |m, p| m | 1 << p)
@@ -264,8 +262,7 @@ impl Board {
         self.running = false;
         let stop = self.start_up(START_UP_NS)?;
         if stop == Stop::TickStarted {
-            // The rest of the start-up code runs on the way to the first edge,
-            // whose inputs come with it.
+            // The rest of the start-up code runs on the way to the first edge, which brings its own inputs.
             self.align(0);
         }
         if let Stop::Reset(cause) = stop {

@@ -1,4 +1,4 @@
-//! Firmware images: what stands in flash, and the symbols.
+//! Firmware images: the contents of the flash memory, and the symbols.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,24 +8,24 @@ use object::{Object as _, ObjectSymbol as _};
 
 /// Start of the flash memory.
 pub(crate) const FLASH_BASE: u32 = 0x0800_0000;
-/// Flash of an STM32G431CB.
+/// Flash size of an STM32G431CB.
 pub(crate) const FLASH_SIZE: u32 = 128 << 10;
 /// Start of the contiguous view of SRAM1, SRAM2 and CCM SRAM.
 pub(crate) const RAM_BASE: u32 = 0x2000_0000;
-/// All RAM of an STM32G431.
+/// Total RAM of an STM32G431.
 pub(crate) const RAM_SIZE: u32 = 32 << 10;
 
-/// An image as it is flashed.
+/// An image as flashed.
 #[derive(Debug, Clone)]
 pub(crate) struct Image {
     /// File name without extension.
     pub(crate) name: String,
-    /// All of the flash memory, erased where the image has nothing.
+    /// The whole flash memory, erased where the image has no contents.
     pub(crate) flash: Vec<u8>,
-    /// Digest over the image's bytes in flash.
+    /// Digest of the image's bytes in flash.
     pub(crate) digest: [u8; 16],
-    /// Lowest address the stack may grow to: end of what the linker placed
-    /// below the initial stack pointer, or the start of RAM.
+    /// Lowest address to which the stack may grow: the end of what the linker placed below the initial stack
+    /// pointer, or the start of RAM.
     pub(crate) stack_bottom: u32,
     symbols: BTreeMap<String, u32>,
     by_address: BTreeMap<u32, String>,
@@ -54,7 +54,7 @@ impl Image {
             let data = segment
                 .data(endian, &*bytes)
                 .map_err(|()| fail(&"a segment lies outside of the file"))?;
-            // The load address: initialised data stands in flash until start-up.
+            // The load address: initialised data is in flash until start-up.
             let address = segment.p_paddr(endian);
             if segment.p_type(endian) != object::elf::PT_LOAD || data.is_empty() {
                 continue;
@@ -112,7 +112,7 @@ impl Image {
         })
     }
 
-    /// An image of these bytes alone.
+    /// An image with only these bytes.
     #[cfg(test)]
     pub(crate) fn bare(flash: Vec<u8>) -> Self {
         Self {
@@ -125,7 +125,7 @@ impl Image {
         }
     }
 
-    /// Word at an offset of the flash memory.
+    /// The word at an offset in the flash memory.
     pub(crate) fn word(&self, offset: usize) -> u32 {
         self.flash
             .get(offset..offset + 4)
@@ -133,14 +133,14 @@ impl Image {
             .map_or(0, u32::from_le_bytes)
     }
 
-    /// Address of a symbol; the name may leave out the hash of a mangled one.
+    /// Address of a symbol; the name may omit the hash of a mangled symbol.
     pub(crate) fn symbol(&self, name: &str) -> Option<u32> {
         let found = |(n, a): (&String, &u32)| n.contains(name).then_some(*a);
         let exact = self.symbols.get(name).copied();
         exact.or_else(|| self.symbols.iter().find_map(found))
     }
 
-    /// The function that holds an address, for messages.
+    /// The function that contains an address, for messages.
     pub(crate) fn function(&self, address: u32) -> String {
         match self.by_address.range(..=address & !1).next_back() {
             Some((start, name)) => format!("{name}+{:#x}", (address & !1) - start),

@@ -1,9 +1,8 @@
-//! The processor: Unicorn executes instructions; exceptions, sleep and time
-//! are here.
+//! The processor: Unicorn executes the instructions; exceptions, sleep and time are modelled here.
 //!
-//! Time is counted in processor cycles, one per instruction. Events of the
-//! peripherals and interrupts are taken between basic blocks: an interrupt
-//! comes some tens of cycles late at most, and every run is the same to the bit.
+//! Time is counted in processor cycles, one per instruction. Events of the peripherals and interrupts are
+//! taken between basic blocks. An interrupt is thus at most some tens of cycles late, and every run is the
+//! same to the bit.
 
 pub(crate) mod blocks;
 mod exceptions;
@@ -21,10 +20,10 @@ use crate::soc::flash::STORE_SIZE;
 use crate::soc::syscfg::BreakSource;
 use crate::soc::{Soc, Transfer};
 
-/// Blocks kept for messages.
+/// Number of blocks kept for messages.
 const TRACE: usize = 4;
 
-/// EPSR outside of an IT block.
+/// EPSR outside an IT block.
 const THUMB: u64 = 1 << 24;
 
 /// How far to run.
@@ -32,27 +31,26 @@ const THUMB: u64 = 1 << 24;
 pub(crate) enum Until {
     /// To the instant, whatever the processor does.
     Cycle,
-    /// To the instant, then on until the processor sleeps, at most to this
-    /// one [ns].
+    /// To the instant, then on until the processor sleeps, but no further than this time [ns].
     Asleep(u64),
 }
 
-/// Why the machine stopped before its time.
+/// Why the machine stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stop {
-    /// It did not.
+    /// It reached its time.
     Time,
-    /// A system reset was asked for, with the flag in RCC_CSR.
+    /// A system reset was requested; with its flag in RCC_CSR.
     Reset(u32),
-    /// The supply failed in a save.
+    /// The supply failed during a save.
     PowerFailed,
     /// The tick timer has been started.
     TickStarted,
-    /// The program looks for bytes on its second serial line, and none are on their way.
+    /// The program polls its second serial line for bytes, and none are on their way.
     Waits,
 }
 
-/// Where no memory answers.
+/// An address where no memory answers.
 const NOWHERE: u32 = 0xA000_0000;
 
 type Engine = Unicorn<'static, State>;
@@ -61,13 +59,13 @@ type Engine = Unicorn<'static, State>;
 pub(crate) struct Machine {
     uc: Engine,
     asleep: bool,
-    /// What DMA has stored and memory does not hold yet: address of the first byte,
-    /// and bytes in a row. The engine takes long over a single byte.
+    /// Bytes stored by DMA that memory does not hold yet: address of the first byte, and consecutive bytes.
+    /// Writing single bytes to the engine is slow.
     stored: (u32, Vec<u8>),
 }
 
-/// Pattern that RAM holds at power-up, and that the start-up code of the images
-/// paints their stack with; the watermark looks for it.
+/// Pattern that RAM holds at power-up, and with which the images' start-up code paints their stack; the
+/// watermark looks for it.
 const PAINT: u8 = 0xCC;
 
 fn engine(error: uc_error) -> String {
@@ -75,10 +73,10 @@ fn engine(error: uc_error) -> String {
 }
 
 impl Machine {
-    /// A machine with `image` in flash, in reset.
+    /// Creates a machine with `image` in flash, in reset.
     ///
     /// # Errors
-    /// A sentence of the engine.
+    /// A sentence from the engine.
     pub(crate) fn new(image: &Image, blocks: Blocks, soc: Soc) -> Result<Self, String> {
         let state = State::new(soc, blocks);
         // The mode for M-class processors would override the model with an M33.
@@ -90,10 +88,9 @@ impl Machine {
             .map_err(engine)?;
         uc.mem_write(u64::from(FLASH_BASE), &image.flash[..code])
             .map_err(engine)?;
-        // Runs until stopped. An address to stop at would be looked up at every stop.
+        // Run until stopped: an exit address would be looked up at every stop.
         uc.ctl_exits_enable().map_err(engine)?;
-        // Nothing of an image is executed from RAM; the engine stores faster to
-        // where no code can be.
+        // Images execute nothing from RAM, and the engine stores faster where there can be no code.
         let data = Prot::READ | Prot::WRITE;
         uc.mem_map(u64::from(RAM_BASE), u64::from(RAM_SIZE), data)
             .map_err(engine)?;
@@ -113,7 +110,7 @@ impl Machine {
         self.uc.mem_write(u64::from(RAM_BASE), &ram).map_err(engine)
     }
 
-    /// Registers as after reset.
+    /// Sets the registers as after a reset.
     fn start(&mut self) -> Result<(), String> {
         let mut vectors = [0; 8];
         let base = u64::from(FLASH_BASE);
@@ -149,31 +146,31 @@ impl Machine {
             .map_err(engine)
     }
 
-    /// What hooks and peripherals hold.
+    /// State shared with hooks and peripherals.
     pub(crate) fn state(&self) -> &State {
         self.uc.get_data()
     }
 
-    /// What hooks and peripherals hold, to be changed.
+    /// Mutable state shared with hooks and peripherals.
     pub(crate) fn state_mut(&mut self) -> &mut State {
         self.uc.get_data_mut()
     }
 
-    /// The processor goes on where no memory answers: it faults, and its program handles that.
+    /// Lets the processor continue where no memory answers, so that it faults and its program handles the
+    /// fault.
     ///
     /// # Errors
-    /// A sentence of the engine.
+    /// A sentence from the engine.
     pub(crate) fn derail(&mut self) -> Result<(), String> {
         self.asleep = false;
         self.state_mut().tolerant = true;
         self.set(R::PC, NOWHERE)
     }
 
-    /// A system reset: processor and peripherals start anew, RAM keeps its
-    /// contents unless the power was away.
+    /// A system reset: processor and peripherals restart; RAM keeps its contents unless power was lost.
     ///
     /// # Errors
-    /// A sentence of the engine.
+    /// A sentence from the engine.
     pub(crate) fn reset(&mut self, cause: u32, power_was_away: bool) -> Result<(), String> {
         let state = self.uc.get_data_mut();
         let mut soc = Soc::new(
@@ -204,7 +201,7 @@ impl Machine {
     /// Reads memory.
     ///
     /// # Errors
-    /// A sentence of the engine.
+    /// A sentence from the engine.
     pub(crate) fn memory(&mut self, address: u32, bytes: &mut [u8]) -> Result<(), String> {
         self.settle()?;
         self.uc.mem_read(u64::from(address), bytes).map_err(engine)
@@ -213,13 +210,13 @@ impl Machine {
     /// Writes memory.
     ///
     /// # Errors
-    /// A sentence of the engine.
+    /// A sentence from the engine.
     pub(crate) fn set_memory(&mut self, address: u32, bytes: &[u8]) -> Result<(), String> {
         self.settle()?;
         self.uc.mem_write(u64::from(address), bytes).map_err(engine)
     }
 
-    /// A byte stored by DMA: seen in memory when somebody looks.
+    /// Stores a byte for DMA; memory is updated before anything reads it.
     fn store(&mut self, address: u32, byte: u8) -> Result<(), String> {
         let (first, bytes) = &self.stored;
         if address != first.wrapping_add(bytes.len() as u32) {
@@ -230,7 +227,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Memory holds what DMA has stored.
+    /// Writes the bytes stored by DMA to memory.
     fn settle(&mut self) -> Result<(), String> {
         let (first, bytes) = &mut self.stored;
         if bytes.is_empty() {
@@ -241,7 +238,7 @@ impl Machine {
         written.map_err(|e| format!("DMA1 to {first:#010x}: {}", engine(e)))
     }
 
-    /// Lowest address in `bottom..top` that is not painted any more.
+    /// Lowest address in `bottom..top` that is no longer painted.
     pub(crate) fn watermark(&mut self, bottom: u32, top: u32) -> Result<u32, String> {
         let mut stack = vec![0; (top - bottom) as usize];
         self.memory(bottom, &mut stack)?;
@@ -249,9 +246,8 @@ impl Machine {
         Ok((bottom + free as u32) & !3)
     }
 
-    /// Whether the processor sleeps with nothing under way that it waits for, or was
-    /// stopped for good. (A tick begins when its inputs are converted; what was received
-    /// behind its edge waits until then.)
+    /// Whether the processor sleeps and nothing that it waits for is in progress, or it was stopped for good.
+    /// (A tick begins when its inputs are converted; bytes received after its edge wait until then.)
     pub(crate) fn rests(&self) -> bool {
         let state = self.state();
         let waits = state.soc.converts();
@@ -261,11 +257,11 @@ impl Machine {
     /// Runs to `ns`. Unless `started`, stops as soon as the tick timer runs.
     ///
     /// # Errors
-    /// A sentence that says what stopped the emulation for good.
+    /// A sentence that states what stopped the emulation for good.
     pub(crate) fn run(&mut self, ns: u64, until: Until, started: bool) -> Result<Stop, String> {
         self.uc.get_data_mut().await_tick = !started;
         loop {
-            // Anew each time: the clock may have changed.
+            // Recompute each time, because the clock may have changed.
             let time = self.uc.get_data().soc.time;
             let target = time.cycle_of(ns);
             let until = match until {
@@ -301,7 +297,7 @@ impl Machine {
         }
     }
 
-    /// Carries out all events that are due, none beyond `horizon`.
+    /// Carries out all due events, up to `horizon`.
     fn service(&mut self, horizon: u64) -> Result<Option<Stop>, String> {
         loop {
             let state = self.uc.get_data_mut();
@@ -314,7 +310,7 @@ impl Machine {
             if state.soc.flash.power_failed {
                 return Ok(Some(Stop::PowerFailed));
             }
-            // The flash memory is being written: nothing can be fetched.
+            // While the flash memory is being written, nothing can be fetched.
             if state.soc.flash.stall_ns > 0 {
                 let (time, cycle) = (state.soc.time, state.cycle);
                 let stall = state.soc.flash.take_stall(cycle, |ns| time.cycles(ns));
@@ -340,7 +336,7 @@ impl Machine {
             if !state.soc.serial.take_wait() {
                 return Ok(None);
             }
-            // A program that polls finds nothing new before the next byte has come or gone.
+            // A polling program finds nothing new before the next byte has arrived or left.
             match state.soc.serial.next() {
                 None => return Ok(Some(Stop::Waits)),
                 Some(at) => state.pass(at.min(horizon).saturating_sub(state.cycle)),
@@ -374,11 +370,11 @@ impl Machine {
         }
     }
 
-    /// Executes instructions until cycle `due` or something happens.
+    /// Executes instructions until cycle `due`, or until something happens.
     fn execute(&mut self, due: u64) -> Result<(), String> {
         self.settle()?;
         let state = self.uc.get_data_mut();
-        // While an exception waits behind PRIMASK, look after every block.
+        // While PRIMASK holds back an exception, check after every block.
         let masked = state.nvic.next(false, 0).is_some();
         state.due = if masked { state.cycle + 1 } else { due };
         let pc = u64::from(self.get(R::PC)? | 1);
@@ -413,9 +409,8 @@ impl Machine {
         }
     }
 
-    /// An access that nothing answers, or an instruction that does not exist.
-    /// After an injected fault the program handles it; otherwise the image, or
-    /// the emulation, is wrong.
+    /// Handles an access that nothing answers, or an instruction that does not exist. After an injected
+    /// fault, the program handles it; otherwise the image or the emulation is wrong.
     fn hard_fault(&mut self, what: &str, pc: u32) -> Result<(), String> {
         let state = self.uc.get_data();
         if !state.tolerant {
@@ -428,22 +423,21 @@ impl Machine {
         self.enter(HARD_FAULT)
     }
 
-    /// The processor faults in its fault handler: it executes nothing any more, and only a reset
-    /// helps.
+    /// The processor faults in its fault handler: it executes nothing more, and only a reset helps.
     pub(crate) fn lock_up(&mut self) {
         let state = self.uc.get_data_mut();
         state.stop_processor = true;
         state.soc.raise_break(BreakSource::LockUp);
     }
 
-    /// RAM has a parity error, of a bit that nobody reads.
+    /// Causes a parity error in RAM, in a bit that nobody reads.
     pub(crate) fn ram_parity_error(&mut self) {
         let state = self.uc.get_data_mut();
         state.soc.raise_break(BreakSource::RamParity);
         state.nvic.pend(NON_MASKABLE);
     }
 
-    /// The crystal stops.
+    /// Stops the crystal.
     pub(crate) fn crystal_stops(&mut self) {
         let state = self.uc.get_data_mut();
         if state.soc.crystal_stops(state.cycle) {
@@ -451,7 +445,7 @@ impl Machine {
         }
     }
 
-    /// Program counter, and where the processor came by last.
+    /// Program counter, and the last blocks the processor executed.
     pub(crate) fn whereabouts(&self, image: &Image) -> (u32, String) {
         let pc = self.get(R::PC).unwrap_or(0);
         let state = self.state();

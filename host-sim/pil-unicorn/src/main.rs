@@ -1,18 +1,16 @@
-//! Emulated STM32G431 boards, as a program of its own (GPL-2.0-only, see
-//! `LICENSE.md`).
+//! Emulated STM32G431 boards, as a separate program (GPL-2.0-only, see `LICENSE.md`).
 //!
 //!     wheeleg-pil-unicorn [--awake] IMAGE.elf…
 //!
-//! This form hosts one board per image, numbered from 0. It reads the requests of the
-//! simulator (crate `wheeleg-remote-link`) from standard input and answers them on standard
-//! output, in order. Nothing here reads a clock or a random number: equal
-//! requests get equal replies. `--awake` is for a process with a processor core of
-//! its own: it does not sleep between requests that follow each other closely.
+//! This form hosts one board per image, numbered from 0. It reads the requests of the simulator (crate
+//! `wheeleg-remote-link`) from standard input and answers them in order on standard output. The program reads
+//! neither a clock nor a random number: equal requests get equal replies. `--awake` is for a process that has
+//! a processor core to itself: it does not sleep between requests in close succession.
 //!
 //!     wheeleg-pil-unicorn --bench IMAGE.elf
 //!
-//! This form runs an image for a bench board with its second serial port on a
-//! pseudo-terminal, whose name it prints, until it is killed.
+//! This form runs an image for a bench board, with its second serial port on a pseudo-terminal whose name it
+//! prints, until it is killed.
 //!
 //! # Glossary
 //!
@@ -49,13 +47,13 @@ use crate::image::Image;
 use crate::machine::blocks::Blocks;
 use crate::usage::{Order, USAGE};
 
-/// Exit code of wrong arguments.
+/// Exit code for wrong arguments.
 const WRONG_ARGUMENTS: u8 = 2;
 
 fn main() -> ExitCode {
     let done = match Order::read(std::env::args_os().skip(1)) {
         Ok(Order::Help) => {
-            // A reader that has gone away is no error.
+            // A reader that has gone away is not an error.
             let _ = std::io::stdout().write_all(USAGE.as_bytes());
             Ok(())
         }
@@ -78,7 +76,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Answers requests until the input ends or every board has said good-bye.
+/// Answers requests until the input ends.
 fn serve(awake: bool, paths: &[OsString]) -> Result<(), String> {
     #[cfg(unix)]
     let mut watch = awake.then(Watch::default);
@@ -91,7 +89,7 @@ fn serve(awake: bool, paths: &[OsString]) -> Result<(), String> {
     let mut chunk = vec![0; 64 << 10];
     let mut replies = Vec::new();
     loop {
-        // (Standard input holds nothing back: a chunk is longer than its buffer.)
+        // (Standard input holds nothing back, because a chunk is longer than its buffer.)
         #[cfg(unix)]
         if let Some(watch) = &mut watch {
             watch.wait(&input);
@@ -120,7 +118,7 @@ fn serve(awake: bool, paths: &[OsString]) -> Result<(), String> {
     }
 }
 
-/// A board for each path. Those of one image share what is known of it.
+/// Creates a board for each path. Boards with the same image share what is known about it.
 fn boards(paths: &[OsString]) -> Result<Vec<Board>, String> {
     let mut images = BTreeMap::new();
     for path in paths {

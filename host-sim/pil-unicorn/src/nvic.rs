@@ -1,8 +1,8 @@
-//! NVIC and system control block: what is pending, what is active, what comes next.
+//! NVIC and system control block: which exceptions are pending, which are active, and which comes next.
 
-/// Exceptions that have a number below the interrupts'.
+/// Number of exceptions below the interrupts.
 pub(crate) const FIRST_IRQ: usize = 16;
-/// Interrupt lines of an STM32G431.
+/// Number of interrupt lines of an STM32G431.
 pub(crate) const IRQS: usize = 102;
 /// Non-maskable interrupt.
 pub(crate) const NON_MASKABLE: usize = 2;
@@ -23,7 +23,7 @@ const THREAD: i16 = 256;
 pub(crate) struct Nvic {
     enabled: u128,
     latched: u128,
-    /// Lines that are high now.
+    /// Lines that are currently high.
     pub(crate) lines: u128,
     system_pending: u32,
     priority: [u8; FIRST_IRQ + IRQS],
@@ -32,7 +32,7 @@ pub(crate) struct Nvic {
     scr: u32,
     /// Control, region number, base and attributes of the memory protection unit.
     mpu: [u32; 4],
-    /// The processor asked for a system reset.
+    /// The processor requested a system reset.
     pub(crate) reset_request: bool,
 }
 
@@ -78,7 +78,7 @@ impl Nvic {
         self.system_pending != 0 || self.pending() != 0
     }
 
-    /// The exception that is to be taken, given PRIMASK and BASEPRI.
+    /// The exception to be taken, given PRIMASK and BASEPRI.
     pub(crate) fn next(&self, primask: bool, basepri: u8) -> Option<usize> {
         let (priority, number) = self.best()?;
         let mut limit = self.current_priority();
@@ -135,7 +135,7 @@ impl Nvic {
         self.active.contains(&n)
     }
 
-    /// Exception `n` is entered.
+    /// Enters exception `n`.
     pub(crate) fn enter(&mut self, n: usize) {
         if n >= FIRST_IRQ {
             self.latched &= !(1 << (n - FIRST_IRQ));
@@ -145,7 +145,7 @@ impl Nvic {
         self.active.push(n);
     }
 
-    /// The newest exception returns; gives its number.
+    /// Returns from the newest exception, and returns its number.
     pub(crate) fn leave(&mut self) -> Option<usize> {
         self.active.pop()
     }
@@ -188,7 +188,7 @@ impl Nvic {
             (0x180..=0x18C, 4) => self.enabled &= !bits(0x180),
             (0x200..=0x20C, 4) => self.latched |= bits(0x200),
             (0x280..=0x28C, 4) => self.latched &= !bits(0x280),
-            // Four priority bits are built in.
+            // Four priority bits are implemented.
             (0x400..=0x465, 1) => {
                 self.priority[FIRST_IRQ + (offset - 0x400) as usize] = value as u8 & 0xF0;
             }

@@ -1,8 +1,8 @@
-//! Processor cycles against the simulator's nanoseconds.
+//! Converts between processor cycles and the simulator's nanoseconds.
 
 const SECOND_NS: i64 = 1_000_000_000;
 
-/// The clock has had `hz` since `cycle`, which was `ns`.
+/// The clock has had frequency `hz` since `cycle`, which was at `ns`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Time {
     cycle: u64,
@@ -11,7 +11,7 @@ pub(crate) struct Time {
 }
 
 impl Time {
-    /// Cycle 0 is 0 ns.
+    /// Begins with cycle 0 at 0 ns.
     pub(crate) fn new(hz: u64) -> Self {
         Self {
             cycle: 0,
@@ -20,24 +20,24 @@ impl Time {
         }
     }
 
-    /// Clock [Hz].
+    /// Clock frequency [Hz].
     pub(crate) fn hz(&self) -> u64 {
         self.hz
     }
 
-    /// Time for which the clock has been what it is at `cycle` [ns].
+    /// Time since the last change of the clock, as of `cycle` [ns].
     pub(crate) fn steady_ns(&self, cycle: u64) -> u64 {
         cycle.saturating_sub(self.cycle) * SECOND_NS as u64 / self.hz
     }
 
-    /// The clock changes.
+    /// Changes the clock frequency.
     pub(crate) fn clock(&mut self, cycle: u64, hz: u64) {
         self.ns = self.signed_ns(cycle);
         self.cycle = cycle;
         self.hz = hz;
     }
 
-    /// Cycle `cycle` is from now on `ns`; gives by how much the scale moved.
+    /// Sets the time of `cycle` to `ns`; returns how far the scale moved.
     pub(crate) fn align(&mut self, cycle: u64, ns: u64) -> i64 {
         let moved = ns as i64 - self.signed_ns(cycle);
         self.cycle = cycle;
@@ -49,7 +49,7 @@ impl Time {
     pub(crate) fn signed_ns(&self, cycle: u64) -> i64 {
         let cycles = cycle as i64 - self.cycle as i64;
         let (whole, rest) = (cycles / self.hz as i64, cycles % self.hz as i64);
-        // The rest is below a second: below 2^30 · 2^30.
+        // The rest is below a second, so the product is below 2^30 · 2^30.
         self.ns + whole * SECOND_NS + rest * SECOND_NS / self.hz as i64
     }
 
@@ -58,7 +58,7 @@ impl Time {
         self.signed_ns(cycle).max(0) as u64
     }
 
-    /// First cycle that is not before `ns`.
+    /// The first cycle not before `ns`.
     pub(crate) fn cycle_of(&self, ns: u64) -> u64 {
         let ahead = ns as i64 - self.ns;
         let (whole, rest) = (ahead.div_euclid(SECOND_NS), ahead.rem_euclid(SECOND_NS));

@@ -1,9 +1,9 @@
-//! What the program is told to do.
+//! Command line of the program.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// What the program is and takes.
+/// What the program is and which arguments it takes.
 pub(crate) const USAGE: &str = "\
 Emulated STM32G431 boards for the robot simulator `wheeleg` (GPL-2.0-only).
 
@@ -28,7 +28,7 @@ Example: wheeleg-pil-unicorn --bench target/firmware/joint-hil.elf
 /// What to do.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// Say what the program is.
+    /// Print what the program is.
     Help,
     /// Run an image for a bench board on a pseudo-terminal.
     Bench(PathBuf),
@@ -42,7 +42,7 @@ pub(crate) enum Order {
 }
 
 impl Order {
-    /// Reads the arguments behind the program's name.
+    /// Reads the arguments after the program's name.
     ///
     /// # Errors
     /// A sentence about the argument that is missing or wrong.

@@ -6,8 +6,7 @@ pub(crate) const WIPER: u32 = 0;
 pub(crate) const FOOT: [u32; 4] = [1, 4, 5, 7];
 /// Port A: 24 V present.
 pub(crate) const POWER_OK: u32 = 6;
-/// Port A: valves fill A, vent A, fill B, vent B, each with the alternate
-/// function that is its channel of TIM1.
+/// Port A: valves fill A, vent A, fill B, vent B, each with the alternate function of its TIM1 channel.
 pub(crate) const VALVES: [(u32, u32); 4] = [(8, 6), (9, 6), (10, 6), (11, 11)];
 /// Port A: supply-pressure switch.
 pub(crate) const SUPPLY: u32 = 12;
@@ -35,13 +34,13 @@ pub(crate) const DUMP: u32 = 15;
 pub(crate) const PULSE: u32 = 6;
 /// Alternate function of the motor pulse.
 pub(crate) const PULSE_FUNCTION: u32 = 4;
-/// Port A: serial line to the PC, USART2, of the images for a bench board.
+/// Port A: serial line to the PC, USART2, for images of a bench board.
 pub(crate) const SERIAL_TX: u32 = 2;
-/// Port A: its other direction.
+/// Port A: the other direction of this line.
 pub(crate) const SERIAL_RX: u32 = 3;
 /// Alternate function of both.
 pub(crate) const SERIAL_FUNCTION: u32 = 7;
-/// All that drives something: port (A = 0), pin, name.
+/// All pins that drive something: port (A = 0), pin, name.
 pub(crate) const POWER_PINS: [(usize, u32, &str); 7] = [
     (0, VALVES[0].0, "PA8 (valve fill A)"),
     (0, VALVES[1].0, "PA9 (valve vent A)"),

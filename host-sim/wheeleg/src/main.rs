@@ -2,9 +2,9 @@
 //!
 //! # Glossary
 //!
-//! * **study**: what a command computes, with folder, summary and report
+//! * **study**: the computation of a command, with folder, summary and report
 //! * **exit code**: 0 done, 1 a target missed or a run failed, 2 bad input;
-//!   `docs/reference/exit-codes.md` has all
+//!   `docs/reference/exit-codes.md` lists all
 
 mod cli;
 

@@ -1,7 +1,7 @@
-//! Campaigns as a user meets them: shared, killed, stopped, replayed, and refused.
+//! Campaigns from the user's point of view: shared, killed, stopped, replayed, and refused.
 //!
-//! A few cases here; `cargo xtask deep campaign` runs as many as the table of the specification
-//! asks for.
+//! This suite runs a few cases; `cargo xtask deep campaign` runs as many as the table of the specification
+//! demands.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
-/// Samples of the plan, and how often a run is killed.
+/// Variables for the samples of the plan and for how often a run is killed.
 const SAMPLES_VARIABLE: &str = "WHEELEG_CAMPAIGN_SAMPLES";
 const KILLS_VARIABLE: &str = "WHEELEG_CAMPAIGN_KILLS";
 /// Longest time that a program may take.
@@ -34,8 +34,8 @@ fn wheeleg() -> Command {
     command
 }
 
-/// Two laws on robots whose seals and valves differ; short, because their start-up is not. An exponent
-/// that is none of the simple ones is a power, which a C library would compute by the processor.
+/// Two laws on robots whose seals and valves differ. The runs are short, because their start-up is not. A
+/// non-trivial exponent makes a power, which a C library would compute differently on different processors.
 fn plan(folder: &Path, samples: u64) -> PathBuf {
     let text = format!(
         "name = \"short\"\nroot = 3\nsamples = {samples}\nblock = 4\nsampler = \"sobol\"\n\
@@ -63,7 +63,7 @@ fn output(command: &mut Command) -> Output {
     command.output().expect("started")
 }
 
-/// What was said, its wrapped lines joined.
+/// The output, with its wrapped lines joined.
 fn text(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     text.replace("\n  │ ", " ")
@@ -99,15 +99,16 @@ fn parts(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// What hides fused multiplication and wide vectors from the C library of a Linux computer, which
-/// else chooses its mathematics by the processor (manual of glibc, "Hardware Capability Tunables").
+/// Hides fused multiplication and wide vectors from the C library of a Linux computer, which otherwise
+/// chooses its mathematics by the processor (manual of glibc, "Hardware Capability Tunables").
 const MASKED: (&str, &str) = (
     "GLIBC_TUNABLES",
     "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX512F,-AVX",
 );
 
-/// One hash, and equal bytes of parts: one thread, two, seven processes, killed again and again, on
-/// a processor that seems to lack fused multiplication; and what is replayed is what it was.
+/// There is one hash, and the parts have equal bytes: with one thread, with two, with seven processes, when
+/// killed again and again, and on a processor that seems to lack fused multiplication. A replayed case equals
+/// its original.
 #[test]
 fn however_it_is_run_the_table_is_the_same() {
     let samples = number(SAMPLES_VARIABLE, 7);
@@ -169,7 +170,7 @@ fn however_it_is_run_the_table_is_the_same() {
         assert_eq!(merged(&[other], &at("other.parquet")), hash, "{name}");
         assert!(parts(other) == parts(&one), "{name}");
     }
-    // From the folder by place, from the table by identity.
+    // From the folder by index, from the table by identity.
     let list = succeeded(wheeleg().arg("run").arg(&plan).arg("--list"));
     let cases: Vec<&str> = list
         .lines()
@@ -259,7 +260,7 @@ fn a_signal_leaves_what_was_done_and_a_full_disk_is_named() {
     let rows = state["rows"].as_u64().expect("a number");
     assert!((4..80).contains(&rows), "{state}");
     assert_eq!(state["bad_parts"], serde_json::json!([]));
-    // No file above 4 kB can be written: a part is larger.
+    // No file above 4 kB can be written, and a part is larger.
     let full = Command::new("sh")
         .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
         .arg(env!("CARGO_BIN_EXE_wheeleg"))
@@ -284,7 +285,7 @@ fn a_signal_leaves_what_was_done_and_a_full_disk_is_named() {
     );
 }
 
-/// Files of blocks that are finished.
+/// Number of files of finished blocks.
 #[cfg(unix)]
 fn finished(out: &Path) -> usize {
     let entries = fs::read_dir(out.join("parts"))
@@ -322,7 +323,7 @@ fn strict_runs_end_with_1_where_a_case_failed() {
     }
 }
 
-/// A pilot names the command that makes a table of it, and that is one that the report takes.
+/// A pilot names the command that makes a table of it, and the report accepts this table.
 #[test]
 fn a_pilot_has_a_table_and_a_page() {
     let home = folder();
@@ -347,7 +348,7 @@ fn a_pilot_has_a_table_and_a_page() {
     let table = next.last().expect("the table");
     let told = succeeded(wheeleg().args(["report", table]));
     assert!(told.contains("rows    3"), "{told}");
-    // None of these short runs meets its targets: the worst is named, with the command that runs it again.
+    // None of these short runs meets its targets: the worst is named, with the command that replays it.
     let after = |word: &str| told.lines().find_map(|line| line.strip_prefix(word));
     let worst = after("worst   ").expect("the worst case");
     let (case, why) = worst.split_once(": ").expect("why");
@@ -360,7 +361,7 @@ fn a_pilot_has_a_table_and_a_page() {
     let state: serde_json::Value = serde_json::from_slice(&state.stdout).expect("JSON");
     assert_eq!((&state["rows"], &state["partial"]), (&3.into(), &3.into()));
     assert!(state["causes"][0]["cases"].as_u64() > Some(0), "{state}");
-    // What is told of a run that continues counts all cases that are done, and of the same all that failed.
+    // The progress of a continued run counts all finished cases, and all failed ones among them.
     let mut again = wheeleg();
     let again = again.arg("run").arg(&plan).arg("--out").arg(&out);
     let again = output(again.args(["--first", "5", "--progress", "json"]));
@@ -376,7 +377,7 @@ fn view(folder: &Path) -> Output {
     output(view.arg("view").arg(folder).env("NO_COLOR", "1"))
 }
 
-/// The page of the log of a robot says what its run missed.
+/// The page of a robot's log shows what its run missed.
 #[test]
 fn the_log_of_a_replayed_case_tells_what_it_missed() {
     let home = folder();
@@ -395,7 +396,7 @@ fn the_log_of_a_replayed_case_tells_what_it_missed() {
     assert!(told.contains("required targets missed"), "{told}");
     let page = fs::read_to_string(again.join("log.html")).expect("a page");
     assert!(page.contains("<h2>Missed</h2>") && page.contains("asked: "));
-    // A summary of another run says nothing of this log.
+    // The summary of another run is not used for this log.
     let summary = again.join("summary.json");
     let other = fs::read_to_string(&summary).expect("there");
     fs::write(&summary, other.replace("\"seed\": \"", "\"seed\": \"1")).expect("written");
@@ -514,8 +515,8 @@ fn bad_input_is_told_before_the_first_case() {
     assert!(text(&refused.stderr).contains("the Slurm array says 1/2"));
 }
 
-/// A pod of an indexed job has a completion index in its environment, and the manifest says the rest: so many
-/// pods, started by a loop in no order, come to the table of one process.
+/// A pod of an indexed job has a completion index in its environment, and the manifest contains the rest.
+/// Several pods, started by a loop in arbitrary order, produce the table of one process.
 #[test]
 fn an_indexed_job_of_kubernetes_comes_to_the_table_of_one_process() {
     const PODS: usize = 3;
@@ -557,7 +558,7 @@ fn an_indexed_job_of_kubernetes_comes_to_the_table_of_one_process() {
     assert_eq!(refused.status.code(), Some(2), "more pods than blocks");
 }
 
-/// Numbers at random, the same every time.
+/// Random numbers, the same every time.
 fn random(state: &mut u64) -> u64 {
     // Xorshift (Marsaglia 2003).
     *state ^= *state << 13;

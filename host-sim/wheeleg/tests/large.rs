@@ -1,6 +1,6 @@
-//! Tables of campaigns as large as they get: what merge, report and the first row of them take.
+//! Time, memory and size of the largest tables of campaigns: for merge, report and the first row.
 //!
-//! A few rows here; `cargo xtask deep large` makes as many as the specification asks for.
+//! This suite makes a few rows; `cargo xtask deep large` makes as many as the specification demands.
 
 // Times and memory of a process are read from `/proc`.
 #![cfg(target_os = "linux")]
@@ -14,7 +14,7 @@ use wheeleg_campaign::{Cases, Figure, PlanFile, Row, Status, Store, work_s};
 use wheeleg_config::plan::Plan;
 use wheeleg_studies::study::Stop;
 
-/// Rows of the table, and the variable that asks for another number.
+/// Rows of the table, and the variable that sets another number.
 const ROWS: u64 = 20_000;
 const ROWS_VARIABLE: &str = "WHEELEG_CAMPAIGN_ROWS";
 
@@ -24,7 +24,7 @@ fn campaign() -> Command {
     command
 }
 
-/// Numbers at random, the same every time.
+/// Random numbers, the same every time.
 fn random(state: &mut u64) -> u64 {
     // Xorshift (Marsaglia 2003).
     *state ^= *state << 13;
@@ -33,7 +33,7 @@ fn random(state: &mut u64) -> u64 {
     *state
 }
 
-/// A plan whose table has the 44 columns that the specification counts.
+/// A plan whose table has the 44 columns stated in the specification.
 fn wide_plan(folder: &Path, samples: u64) -> Plan {
     const MEASURES: [&str; 14] = [
         "speed",
@@ -108,20 +108,20 @@ fn made_up(cases: &Cases<'_>, indices: std::ops::Range<u64>, state: &mut u64) ->
         .collect()
 }
 
-/// What a command took.
+/// Time and memory that a command took.
 #[derive(Debug)]
 struct Weight {
-    /// Of a clock, s.
+    /// Elapsed time, s.
     wall_s: f64,
-    /// Of a processor, s: what an idle computer takes, whatever else runs on this one.
+    /// Processor time, s: the time on an idle computer, whatever else runs on this one.
     busy_s: f64,
-    /// Most memory, MB.
+    /// Peak memory, MB.
     peak_mb: f64,
 }
 
-/// Runs a command to its end, and weighs it.
+/// Runs a command to its end, and measures it.
 fn weighed(command: &mut Command) -> Weight {
-    /// Steps of the times in `/proc`, s: Linux tells all programs the same.
+    /// Resolution of the times in `/proc`, s: Linux reports the same to all programs.
     const STEP_S: f64 = 0.01;
     let begun = Instant::now();
     let mut child = command.stdout(Stdio::null()).spawn().expect("started");
@@ -132,7 +132,8 @@ fn weighed(command: &mut Command) -> Weight {
         let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         let kb = line.and_then(|line| line.trim().strip_suffix(" kB")?.trim().parse::<f64>().ok());
         peak_mb = kb.map_or(peak_mb, |kb| peak_mb.max(kb * 1e-3));
-        // Behind the name in brackets: state, and from there the 12th and 13th are times.
+        // After the name in brackets comes the state; counting from there, the 12th and 13th fields are
+        // times.
         let stat = read("stat").expect("not waited for yet");
         let (_, fields) = stat.rsplit_once(") ").expect("a name");
         let fields: Vec<&str> = fields.split(' ').collect();
@@ -152,9 +153,10 @@ fn weighed(command: &mut Command) -> Weight {
     }
 }
 
-/// Specification, numbers: 1,000,000 rows of 44 columns are merged in less than 10 s and 500 MB, and their report
-/// takes less than 30 s and 10 MB; the first row of as large a plan comes within 0.2 s and 200 MB. The suite makes fewer rows
-/// and judges sizes only. The rows are made up, and times are those of a processor.
+/// Numbers of the specification: 1,000,000 rows of 44 columns are merged in less than 10 s and 500 MB, and
+/// their report takes less than 30 s and 10 MB; the first row of a plan of this size comes within 0.2 s and
+/// 200 MB. The suite makes fewer rows and judges sizes only. The rows are made up, and the times are
+/// processor times.
 #[test]
 fn a_large_table_is_merged_and_told_in_time() {
     let asked = std::env::var(ROWS_VARIABLE).ok();

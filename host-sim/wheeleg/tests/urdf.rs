@@ -1,4 +1,4 @@
-//! `wheeleg export urdf`, read by a parser that is not ours.
+//! `wheeleg export urdf`, read by a third-party parser.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -28,7 +28,7 @@ fn isometry(pose: &urdf_rs::Pose) -> Isometry3<f64> {
     )
 }
 
-/// Frame of a link against the root.
+/// Frame of a link relative to the root.
 fn frame(urdf: &Robot, positions: &BTreeMap<String, f64>, link: &str) -> Isometry3<f64> {
     let Some(joint) = urdf.joints.iter().find(|j| j.child.link == link) else {
         return Isometry3::identity();

@@ -1,15 +1,15 @@
-//! A permutation of the numbers below n that needs no table: a Feistel network over the next even
-//! number of bits, walked until the number is below n again (Black and Rogaway 2002).
+//! A permutation of the numbers below n that needs no table: a Feistel network over the next even number of
+//! bits, repeated until the number is below n again (cycle walking, Black and Rogaway 2002).
 
-/// Rounds; four make a pseudorandom permutation of a pseudorandom function (Luby and Rackoff
-/// 1988), two more are cheap.
+/// Number of rounds. Four turn a pseudorandom function into a pseudorandom permutation (Luby and Rackoff
+/// 1988); two more are cheap.
 const ROUNDS: u8 = 6;
 
 /// A keyed permutation of 0 to n − 1.
 pub(super) struct Permutation {
     key: [u8; 32],
     n: u64,
-    /// Bits of one half.
+    /// Number of bits in one half.
     half: u32,
 }
 
@@ -23,11 +23,11 @@ impl Permutation {
         }
     }
 
-    /// Where a number goes.
+    /// Image of a number.
     pub(super) fn of(&self, number: u64) -> u64 {
         debug_assert!(number < self.n);
         let mut image = self.network(number);
-        // A quarter of the numbers at worst are below n: few steps.
+        // At worst a quarter of the numbers are below n, so this takes few steps.
         while image >= self.n {
             image = self.network(image);
         }
@@ -73,7 +73,7 @@ mod tests {
         };
         let (one, other) = (of(1), of(2));
         let same = one.iter().zip(&other).filter(|(a, b)| a == b).count();
-        // Of random permutations one number in a thousand stays, on average.
+        // A random permutation of a thousand numbers has one fixed point on average.
         assert!(same < 10, "{same}");
     }
 }

@@ -1,7 +1,7 @@
-//! Values of the factors that are drawn: that of any sample without those before it.
+//! Draws the values of the random factors; the value for any sample is available without those before it.
 //!
-//! Each sampler gives a share strictly between 0 and 1 for a factor and a sample; the factor's
-//! distribution makes a value of it ([`quantile::quantile`]).
+//! For a factor and a sample, each sampler returns a share strictly between 0 and 1. The factor's
+//! distribution turns it into a value ([`quantile::quantile`]).
 
 mod feistel;
 pub(crate) mod quantile;
@@ -13,7 +13,7 @@ use crate::CampaignError;
 use feistel::Permutation;
 use sobol::Directions;
 
-/// What draws the samples of a plan.
+/// Draws the samples of a plan.
 pub struct Draws<'a> {
     plan: &'a Plan,
     kind: Kind,
@@ -23,15 +23,15 @@ enum Kind {
     Random,
     LatinHypercube(Vec<Permutation>),
     Sobol(Vec<Directions>),
-    /// Of the first point of two, then of the second.
+    /// Directions of the first of the two points, then of the second.
     Saltelli(Vec<Directions>),
 }
 
 impl<'a> Draws<'a> {
-    /// The sampler of a plan.
+    /// Creates the sampler of a plan.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if a Sobol sequence has not so many dimensions.
+    /// [`CampaignError::Refused`] if a Sobol sequence does not have this many dimensions.
     pub fn new(plan: &'a Plan) -> Result<Self, CampaignError> {
         let drawn: Vec<&str> = plan.drawn().map(|factor| factor.name.as_str()).collect();
         let of_point = |point: u64| drawn.iter().map(move |name| (*name, point));
@@ -56,7 +56,7 @@ impl<'a> Draws<'a> {
     #[must_use]
     pub fn values(&self, cell: u64, sample: u64) -> Vec<Value> {
         let mut drawn = 0;
-        // The last factor with a list changes with every cell.
+        // The last factor with a list changes from one cell to the next.
         let mut rest = cell;
         let mut places: Vec<u64> = Vec::new();
         for factor in self.plan.factors.iter().rev() {
@@ -76,7 +76,7 @@ impl<'a> Draws<'a> {
             .collect()
     }
 
-    /// Share of a factor, the `dimension`-th that is drawn, in a sample.
+    /// The share for `factor`, which is the `dimension`-th drawn factor, in a sample.
     fn share(&self, factor: &str, dimension: usize, sample: u64) -> f64 {
         let root = self.plan.root;
         match &self.kind {
@@ -90,7 +90,8 @@ impl<'a> Draws<'a> {
             Kind::Saltelli(directions) => {
                 let factors = directions.len() / 2;
                 let (point, place) = (sample / (factors as u64 + 2), sample % (factors as u64 + 2));
-                // The first of two points, then the same with one factor of the other, then the other.
+                // The first of two points, then that point with one factor at a time from the second, then
+                // the second.
                 let of_other = place == factors as u64 + 1 || place == dimension as u64 + 1;
                 let dimension = dimension + if of_other { factors } else { 0 };
                 unit(directions[dimension].shifted(point))
@@ -99,11 +100,11 @@ impl<'a> Draws<'a> {
     }
 }
 
-/// Half of a 53rd bit from the ends.
+/// Half a unit of the 53rd bit away from either end.
 const LEAST: f64 = 0.5 / (1_u64 << 53) as f64;
 const MOST: f64 = 1.0 - 2.0 * LEAST;
 
-/// The first 53 bits as a share, in the middle of their step, so never 0 or 1.
+/// The first 53 bits as a share, taken at the middle of their step and therefore never 0 or 1.
 fn unit(bits: u64) -> f64 {
     (((bits >> 11) as f64 + 0.5) / (1_u64 << 53) as f64).min(MOST)
 }
@@ -113,7 +114,7 @@ fn first(hash: [u8; 32]) -> u64 {
     u64::from_le_bytes(*bytes)
 }
 
-/// BLAKE3 of the root, a purpose, a factor and a number.
+/// BLAKE3 hash of the root, a purpose, a factor and a number.
 fn hash(root: u64, purpose: &str, factor: &str, number: u64) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new_derive_key("wheeleg campaign draw v1");
     hasher.update(&root.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The value below which a share of a distribution lies.
+//! Quantile functions: the value below which a given share of a distribution lies.
 //!
 //! Every function comes from `libm` or is exact, so that a case is the same on every processor.
 
@@ -57,14 +57,14 @@ pub fn quantile(distribution: &Distribution, share: f64) -> Value {
     Value::Number(number)
 }
 
-/// Rounding must not lead out of the range.
+/// Keeps rounding from leaving the range.
 fn within(x: f64, min: f64, max: f64) -> f64 {
     x.clamp(min, max)
 }
 
-/// Standard normal quantile of a distribution that is cut to `low` … `high`.
+/// Standard normal quantile of a distribution truncated to `low` … `high`.
 fn cut_normal(share: f64, low: f64, high: f64) -> f64 {
-    // In the tail that is the smaller one, so that digits are left.
+    // Work in the smaller tail, so that significant digits remain.
     if low > 0.0 {
         return -cut_normal(1.0 - share, -high, -low);
     }
@@ -72,17 +72,17 @@ fn cut_normal(share: f64, low: f64, high: f64) -> f64 {
     normal(from + share * (to - from))
 }
 
-/// Probability of a standard normal number below `z`.
+/// Probability that a standard normal number is below `z`.
 fn below(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
-/// Standard normal quantile: bisection of [`below`] to its last bits.
+/// Standard normal quantile, by bisection of [`below`] down to its last bits.
 fn normal(share: f64) -> f64 {
     if share > 0.5 {
         return -normal(1.0 - share);
     }
-    // Below −38 a standard normal number has no probability in 64 bits.
+    // Below −38, the probability of a standard normal number vanishes in 64 bits.
     let (mut low, mut high) = (-39.0, 0.0);
     for _ in 0..64 {
         let middle = 0.5 * (low + high);
@@ -109,7 +109,7 @@ mod tests {
 
     const INF: f64 = f64::INFINITY;
 
-    /// `scipy.stats` 1.17.1: norm, truncnorm, lognorm, loguniform, triang; `ppf`.
+    /// Reference values from `scipy.stats` 1.17.1: `ppf` of norm, truncnorm, lognorm, loguniform and triang.
     #[test]
     fn quantiles_are_those_of_scipy() {
         let normal = |min, max| Distribution::Normal {

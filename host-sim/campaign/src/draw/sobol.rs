@@ -1,4 +1,4 @@
-//! The sequence of Sobol in Gray-code order, any point of it at once, with a digital shift.
+//! The Sobol sequence in Gray-code order with random access to any point, and with a digital shift.
 //!
 //! Point n is the exclusive or of the direction numbers at the set bits of n's Gray code.
 
@@ -7,7 +7,7 @@ use sobol::params::JoeKuoD6;
 
 use crate::CampaignError;
 
-/// Dimensions of the small table of direction numbers, and of the larger one.
+/// Dimensions of the small and the large table of direction numbers.
 const DIMENSIONS: [usize; 2] = [100, 1000];
 
 /// Direction numbers of one factor, and its shift.
@@ -16,7 +16,7 @@ pub(super) struct Directions {
     shift: u64,
 }
 
-/// Those of Joe and Kuo (2008, their table D6) for the factors of points, in their order.
+/// Direction numbers of Joe and Kuo (2008, their table D6) for the factors of the points, in this order.
 pub(super) fn directions<'a>(
     root: u64,
     factors: impl Iterator<Item = (&'a str, u64)>,
@@ -58,7 +58,7 @@ impl Directions {
         set.fold(0, |sum, bit| sum ^ self.numbers[bit as usize])
     }
 
-    /// The same, shifted.
+    /// The shifted coordinate of a point.
     pub(super) fn shifted(&self, number: u64) -> u64 {
         self.point(number) ^ self.shift
     }
@@ -77,7 +77,7 @@ mod tests {
             .collect()
     }
 
-    /// `scipy.stats.qmc.Sobol(d, scramble=False)` of SciPy 1.17.1.
+    /// Reference values from `scipy.stats.qmc.Sobol(d, scramble=False)` of SciPy 1.17.1.
     #[test]
     fn unshifted_points_are_those_of_scipy() {
         let first = [

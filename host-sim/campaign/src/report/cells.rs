@@ -1,4 +1,4 @@
-//! Rows by the cell of the grid that they are in.
+//! Groups rows by their cell of the grid.
 
 use std::collections::HashMap;
 
@@ -9,15 +9,15 @@ use crate::table::{Data, Table};
 /// One combination of the values of the factors that have a list.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cell {
-    /// The values in words; empty of a plan without a grid.
+    /// The values in words; empty for a plan without a grid.
     pub(super) name: String,
     /// The values, in the order of [`grid`].
     pub(super) values: Vec<Value>,
-    /// Places of its rows in the table.
+    /// Positions of its rows in the table.
     pub(super) rows: Vec<usize>,
 }
 
-/// The factors that have a list, with it.
+/// The factors that have a list, each with its list.
 pub(super) fn listed(plan: &Plan) -> impl Iterator<Item = (&Factor, &[Value])> {
     plan.factors
         .iter()
@@ -27,14 +27,14 @@ pub(super) fn listed(plan: &Plan) -> impl Iterator<Item = (&Factor, &[Value])> {
         })
 }
 
-/// Their names.
+/// Names of these factors.
 pub(super) fn grid(plan: &Plan) -> Vec<String> {
     listed(plan)
         .map(|(factor, _)| factor.name.clone())
         .collect()
 }
 
-/// The value that a row has of a factor.
+/// The value of a factor in a row.
 pub(super) fn value(table: &Table, factor: &str, row: usize) -> Option<Value> {
     match table.column(&format!("f.{factor}"))? {
         Data::Number(v) => v.get(row)?.map(Value::Number),
@@ -48,7 +48,7 @@ pub(super) fn value(table: &Table, factor: &str, row: usize) -> Option<Value> {
 pub(super) fn cells(table: &Table, plan: &Plan) -> Vec<Cell> {
     let grid = grid(plan);
     let mut cells: Vec<Cell> = Vec::new();
-    // Where each is: a plan may have very many.
+    // Position of each cell by name, because a plan may have very many.
     let mut places: HashMap<String, usize> = HashMap::new();
     for row in 0..table.rows() {
         let values = grid.iter().filter_map(|factor| value(table, factor, row));

@@ -1,4 +1,4 @@
-//! What a table says: rates, quantiles, correlations, the worst cases.
+//! What a table shows: rates, quantiles, correlations, the worst cases.
 
 use std::collections::BTreeMap;
 
@@ -16,19 +16,19 @@ use crate::row::Status;
 use crate::table::Table;
 use crate::{CampaignError, Cases, Setup};
 
-/// Kinds of errors that are listed.
+/// Number of kinds of errors listed.
 const ERRORS: usize = 20;
-/// Quantiles that are told of every target.
+/// Quantiles reported for every target.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
-/// Most values of which a bootstrap interval is drawn; beyond it ranks are as good.
+/// Most values for which a bootstrap interval is drawn; for more, ranks are as good.
 const BOOTSTRAP: usize = 500;
 
-/// How often something held.
+/// How often something was true.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Rate {
-    /// How often.
+    /// How often it was true.
     pub met: u64,
-    /// Of how many.
+    /// Out of how many.
     pub of: u64,
     /// Exact interval, 95 % two-sided.
     pub exact: [f64; 2],
@@ -54,9 +54,9 @@ pub struct Quantile {
     pub share: f64,
     /// Its value.
     pub value: f64,
-    /// Interval by ranks, 95 %; an end that so few values do not bound is none.
+    /// Interval by ranks, 95 %; an end that too few values cannot bound is null.
     pub ranks: [Option<f64>; 2],
-    /// Interval by drawing from the values; none of too many or too few.
+    /// Interval by resampling the values; null for too many or too few values.
     pub bootstrap: Option<[f64; 2]>,
 }
 
@@ -65,34 +65,35 @@ pub struct Quantile {
 pub struct InCell {
     /// The cell, in words.
     pub cell: String,
-    /// How often it was met, of the cases that ran to their end.
+    /// How often it was met, among the cases that ran to their end.
     pub rate: Rate,
     /// Quantiles of its value.
     pub quantiles: Vec<Quantile>,
-    /// Rank correlation with each factor that is drawn.
+    /// Rank correlation with each drawn factor.
     pub spearman: Vec<Option<f64>>,
-    /// Least and largest value of each of these factors in the cases that missed the target; none of fewer than two
-    /// such cases. An effect within a narrow range of a factor is no correlation.
+    /// Smallest and largest value of each of these factors among the cases that missed the target; null for
+    /// fewer than two such cases. An effect within a narrow range of a factor does not show as a correlation.
     pub missed_between: Vec<Option<[f64; 2]>>,
-    /// Shares of the variance that the factors of [`Findings::shared`] cause; empty where there are none.
+    /// Shares of the variance caused by the factors in [`Findings::shared`]; empty if there are none.
     pub shares: Vec<Shares>,
 }
 
-/// Shares of a target's variance that one factor causes.
+/// Shares of a target's variance caused by one factor.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Shares {
-    /// Alone.
+    /// By the factor alone.
     pub first: Share,
-    /// With all that it does together with others.
+    /// Including its interactions with other factors.
     pub total: Share,
 }
 
 /// A share of a variance. Noise may make it less than 0 or more than 1.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Share {
-    /// Its estimate; none where the interval is wider than all of the variance: these samples do not tell it.
+    /// Estimate; null if the interval is wider than the whole variance, so that these samples do not
+    /// determine it.
     pub value: Option<f64>,
-    /// Its interval, 95 %, by drawing from the samples; none of too many, and none beside no estimate.
+    /// 95 % interval, by resampling the samples; null for too many samples, or without an estimate.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -130,45 +131,45 @@ pub struct OfTarget {
     pub cells: Vec<InCell>,
 }
 
-/// What a scenario stands on, as its file has it.
+/// The ground of a scenario, as its file describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct OfScenario {
     /// Its name.
     pub scenario: String,
-    /// Its parts with their materials; none of a level floor of rock.
+    /// Parts of the ground with their materials; empty for a level floor of rock.
     pub parts: Vec<String>,
 }
 
-/// What a table says.
+/// What a table shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
     /// Rows.
     pub rows: u64,
     /// Rows by [`Status::ALL`].
     pub by_status: Vec<(String, u64)>,
-    /// In each cell, how often all required targets were met, of all cases.
+    /// For each cell, how often all required targets were met, among all cases.
     pub passed: Vec<(String, Rate)>,
     /// Names of the factors.
     pub factors: Vec<String>,
-    /// Names of the factors that are drawn and have numbers.
+    /// Names of the factors that are drawn and numeric.
     pub drawn: Vec<String>,
-    /// Least and largest value of each of these in the table.
+    /// Smallest and largest value of each of these in the table.
     pub drawn_between: Vec<Option<[f64; 2]>>,
-    /// Names of the factors that cause shares of the variance: those that Saltelli's design draws.
+    /// Names of the factors with shares of the variance: those that Saltelli's design draws.
     pub shared: Vec<String>,
     /// Each target.
     pub targets: Vec<OfTarget>,
     /// Errors by kind, the most frequent first.
     pub errors: Vec<(String, u64)>,
-    /// What the scenarios stand on; empty of cylinders on the bench.
+    /// The ground of each scenario; empty for cylinders on the bench.
     pub grounds: Vec<OfScenario>,
-    /// The worst cases, the worst first; those that passed come last, the nearest to a limit first.
+    /// The worst cases, worst first; those that passed come last, nearest to a limit first.
     pub worst: Vec<Worst>,
-    /// Values of paired factors against the first value of each.
+    /// Values of paired factors, each compared with the factor's first value.
     pub paired: Vec<Paired>,
 }
 
-/// Reads a table.
+/// Evaluates a table.
 pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
     let plan = merged.plan.plan()?;
     let table = &merged.table;
@@ -221,12 +222,12 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
     })
 }
 
-/// The column of a factor.
+/// Name of a factor's column.
 fn of_factor(name: &str) -> String {
     format!("f.{name}")
 }
 
-/// Least and largest of at least two values.
+/// Smallest and largest value; `None` for fewer than two values.
 fn between<'a>(values: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     let none = (0, [f64::INFINITY, f64::NEG_INFINITY]);
     let (count, between) = values.fold(none, |(count, [low, high]), value| {
@@ -235,10 +236,10 @@ fn between<'a>(values: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
     (count > 1).then_some(between)
 }
 
-/// Grounds that are listed.
+/// Number of grounds listed.
 const GROUNDS: usize = 20;
 
-/// The ground of the first case of each cell, each once.
+/// The ground of the first case of each cell, without repetitions.
 fn grounds(plan: &Plan, merged: &Merged, cells: &[Cell]) -> Result<Vec<OfScenario>, CampaignError> {
     let cases = Cases::new(plan)?;
     let indices = merged.table.wholes("index");
@@ -321,8 +322,8 @@ fn of_target(
     }
 }
 
-/// Shares of the variance of a cell's values; empty where they are the same, or too few sets of samples have
-/// all their values.
+/// Shares of the variance of a cell's values; empty if all values are equal, or too few sets of samples are
+/// complete.
 fn shares(table: &Table, cell: &Cell, values: &[Option<f64>], factors: usize) -> Vec<Shares> {
     let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
     let size = factors + 2;

@@ -1,4 +1,4 @@
-//! The page of a campaign: what its table says, with how sure that is.
+//! The report page of a campaign: what its table shows, and how certain that is.
 
 mod cells;
 mod findings;
@@ -37,10 +37,10 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// Reads one.
+    /// Reads a merged table.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] if it is none.
+    /// [`CampaignError::Unreadable`] if the file is not a merged table.
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
         let failed = |e: &dyn std::fmt::Display| CampaignError::unreadable(path, e);
         let plan = replay::plan_of_table(path)?;
@@ -58,14 +58,14 @@ impl Merged {
     }
 }
 
-/// What a table says, and a second one beside it.
+/// The findings of a table, optionally compared with a second one.
 pub struct Report {
-    /// Of the table.
+    /// Findings of the table.
     pub findings: Findings,
-    /// Of both.
+    /// Comparison of the two tables.
     pub pairs: Option<Pairs>,
     page: String,
-    /// What it was made of.
+    /// The tables it was made from.
     tables: Vec<PathBuf>,
 }
 
@@ -73,17 +73,17 @@ impl Report {
     /// Writes the page.
     ///
     /// # Errors
-    /// [`CampaignError::Study`] with the path, and what the operating system said or which table stands
-    /// there.
+    /// [`CampaignError::Study`] with the path, and either the error of the operating system or the table that
+    /// the page would overwrite.
     pub fn write(&self, out: &Path) -> Result<(), CampaignError> {
         let tables: Vec<&Path> = self.tables.iter().map(PathBuf::as_path).collect();
         Ok(write_new(out, &self.page, &tables)?)
     }
 
-    /// Reads a table, and compares it with another one.
+    /// Reads a table and, if `against` is given, compares it with another.
     ///
     /// # Errors
-    /// [`CampaignError::Unreadable`] if a table is none.
+    /// [`CampaignError::Unreadable`] if a file is not a table.
     pub fn of(path: &Path, against: Option<&Path>) -> Result<Self, CampaignError> {
         let merged = Merged::read(path)?;
         let findings = findings::find(&merged)?;

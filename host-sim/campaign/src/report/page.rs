@@ -1,4 +1,4 @@
-//! The page.
+//! The report page.
 
 use serde::Serialize;
 use wheeleg_report::number::{counted, fixed};
@@ -14,9 +14,9 @@ use crate::CampaignError;
 use crate::columns::Column;
 
 const TEMPLATE: &str = include_str!("page.html");
-/// Colours of the cells' curves.
+/// Colours of the curves, one per cell.
 const COLOURS: [Colour; 3] = [colour::ROBOT, colour::MODEL, colour::THIRD];
-/// Points of a curve at most.
+/// Most points of a curve.
 const POINTS: usize = 400;
 
 #[derive(Serialize)]
@@ -62,7 +62,7 @@ pub(super) fn render(
     Ok(page(TEMPLATE, values)?)
 }
 
-/// The page's first sentence: how many cases met everything, and in which cell the fewest.
+/// The first sentence of the page: how many cases met everything, and which cell has the fewest.
 fn verdict(findings: &Findings) -> String {
     let rates = || findings.passed.iter().map(|(_, rate)| rate);
     let all = Rate::of(rates().map(|r| r.met).sum(), rates().map(|r| r.of).sum());
@@ -88,7 +88,7 @@ fn verdict(findings: &Findings) -> String {
     )
 }
 
-/// Of each target the share of cases below a value, a curve for each cell, its limits marked.
+/// For each target, the share of cases below a value, with one curve per cell and the limits marked.
 fn distributions(merged: &Merged, cells: &[cells::Cell]) -> Vec<Figure> {
     let columns = merged.columns.all.iter();
     let targets = columns.filter(|column| merged.columns.targets.contains(&column.name));
@@ -110,7 +110,7 @@ fn distributions(merged: &Merged, cells: &[cells::Cell]) -> Vec<Figure> {
             return None;
         }
         let limits: Vec<f64> = [column.min, column.max].into_iter().flatten().collect();
-        // Limits that are near belong on the picture.
+        // Limits close to the values belong in the figure.
         let span = (high - low).max(1e-9 * high.abs()).max(1e-12);
         for limit in &limits {
             if (low - 2.0 * span..=high + 2.0 * span).contains(limit) {
@@ -137,7 +137,7 @@ fn distributions(merged: &Merged, cells: &[cells::Cell]) -> Vec<Figure> {
     figures.collect()
 }
 
-/// How a distribution is read, with the target's limits.
+/// Explains how to read a distribution, with the target's limits.
 fn caption(column: &Column, all_seen: bool) -> String {
     let read = "The curve is the share of cases with a smaller value.";
     match column.limits().strip_prefix(", ") {
@@ -151,7 +151,7 @@ fn caption(column: &Column, all_seen: bool) -> String {
     }
 }
 
-/// Share of values below each of them.
+/// Share of values below each value.
 fn steps(sorted: &[f64]) -> Vec<(f64, f64)> {
     let n = sorted.len();
     let every = n.div_ceil(POINTS).max(1);

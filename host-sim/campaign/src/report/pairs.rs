@@ -1,4 +1,4 @@
-//! Cases that differ in one thing alone: in the program, or in the value of a paired factor.
+//! Compares cases that differ in only one thing: the program, or the value of a paired factor.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ use super::cells::{self, Cell};
 use crate::CampaignError;
 use crate::columns::Column;
 
-/// A yes or no of pairs, before and after.
+/// A yes-or-no result of pairs, before and after.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Split {
     /// Yes before, no after.
@@ -21,7 +21,8 @@ pub struct Split {
     pub gained: u64,
     /// The same in both.
     pub same: u64,
-    /// Probability of as unequal a split if neither way is more likely: exact test of McNemar.
+    /// Probability of a split at least this unequal if both directions are equally likely: exact test of
+    /// McNemar.
     pub p: f64,
 }
 
@@ -42,7 +43,7 @@ pub struct Change {
     pub column: Column,
     /// Mean of after − before.
     pub mean: Option<f64>,
-    /// Its interval, 95 %, by drawing pairs; of very many by the normal distribution.
+    /// Its 95 % interval, by resampling the pairs; for very many pairs, by the normal distribution.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -53,22 +54,22 @@ pub struct Paired {
     pub what: String,
     /// Pairs.
     pub pairs: u64,
-    /// All required targets met.
+    /// Whether all required targets were met.
     pub passed: Split,
     /// Each target with limits.
     pub targets: Vec<TargetSplit>,
-    /// Each target without: nothing can be lost or gained.
+    /// Each target without limits: nothing can be lost or gained.
     pub values: Vec<Change>,
 }
 
 /// Pairs of two tables.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Pairs {
-    /// The comparison; before is the other table.
+    /// The comparison; the other table is "before".
     pub paired: Paired,
-    /// Cases of this table alone.
+    /// Cases only in this table.
     pub only_here: u64,
-    /// Cases of the other table alone.
+    /// Cases only in the other table.
     pub only_there: u64,
     /// Pairs with the same log.
     pub same_log: u64,
@@ -76,7 +77,7 @@ pub struct Pairs {
     pub program: String,
 }
 
-/// Compares a table with another one, case by case.
+/// Compares a table with another, case by case.
 pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignError> {
     let places = |of: &Merged| -> HashMap<String, usize> {
         let cases = of.table.texts("case").iter().enumerate();
@@ -120,7 +121,7 @@ pub(super) fn against(here: &Merged, there: &Merged) -> Result<Pairs, CampaignEr
     })
 }
 
-/// Each value of a paired factor against its first, where all else is the same.
+/// Compares each value of a paired factor with its first value, with everything else equal.
 pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired> {
     let table = &merged.table;
     let (samples, replicates) = (table.wholes("sample"), table.wholes("replicate"));
@@ -165,7 +166,7 @@ pub(super) fn within(merged: &Merged, plan: &Plan, cells: &[Cell]) -> Vec<Paired
     found
 }
 
-/// Pairs of rows, before and after.
+/// Compares pairs of rows, before and after.
 fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]) -> Paired {
     let flags = |name: &str| {
         let (b, a) = (before.table.flags(name), after.table.flags(name));
@@ -206,7 +207,7 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
     }
 }
 
-/// Most pairs that an interval is drawn from: of more a mean is normal.
+/// Most pairs for which an interval is drawn; the mean of more pairs is close to normal.
 const BOOTSTRAP: usize = 2_000;
 
 fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
@@ -221,7 +222,7 @@ fn interval_of_mean(values: &[f64]) -> Option<[f64; 2]> {
     Some([centre - half, centre + half])
 }
 
-/// What is neither yes nor no counts as no: a case without a result has not passed.
+/// A missing verdict counts as no: a case without a result has not passed.
 fn split(pairs: impl Iterator<Item = (Option<bool>, Option<bool>)>) -> Split {
     let (mut lost, mut gained, mut same) = (0, 0, 0);
     for (before, after) in pairs {

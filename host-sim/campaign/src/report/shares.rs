@@ -1,4 +1,4 @@
-//! The share of cases that meet all required targets, over a factor with a list of numbers.
+//! Plots the share of cases that meet all required targets over a factor with a list of numbers.
 
 use wheeleg_config::plan::{Factor, Plan, Value};
 use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
@@ -6,18 +6,18 @@ use wheeleg_report::plot::{Content, Figure, Panel, colour, line};
 use super::Merged;
 use super::cells::{self, Cell};
 
-/// Values of a factor from which on a curve says more than a table.
+/// Number of values from which a curve shows more than a table.
 const CURVE: usize = 3;
 /// Height of a panel, pixels.
 const HEIGHT: u32 = 110;
 
-/// A curve for each combination of the other listed factors, a panel for each value of the one of
-/// them that has most values. None of a plan without such a list, or with more curves than there are colours.
+/// Draws one curve for each combination of the other listed factors, and one panel for each value of the one
+/// with the most values. Returns `None` for a plan without such a list, or with more curves than colours.
 pub(super) fn figure(merged: &Merged, plan: &Plan, all: &[Cell]) -> Option<Figure> {
     let listed: Vec<(&Factor, &[Value])> = cells::listed(plan).collect();
     let most = |fits: &dyn Fn(usize) -> bool| {
         let places = (0..listed.len()).filter(|place| fits(*place));
-        // The first of those that have as many.
+        // The first one, if several have equally many values.
         places.rev().max_by_key(|place| listed[*place].1.len())
     };
     let is_curve = |place: usize| {
@@ -79,7 +79,7 @@ pub(super) fn figure(merged: &Merged, plan: &Plan, all: &[Cell]) -> Option<Figur
     })
 }
 
-/// The place of a value in a list, which gets it if it has not got it.
+/// Position of a value in a list; appends it if it is missing.
 fn place_of<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
     if let Some(place) = list.iter().position(|own| *own == value) {
         return place;

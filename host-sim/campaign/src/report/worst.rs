@@ -1,5 +1,5 @@
-//! The cases without a result, then those furthest outside of a required limit; of those that passed, the nearest
-//! to one.
+//! The worst cases: first those without a result, then those furthest outside a required limit. Among the
+//! cases that passed, the nearest to a limit come first.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,13 +10,13 @@ use super::{Merged, cells};
 use crate::columns::Column;
 use crate::row::Status;
 
-/// Cases that are listed.
+/// Number of cases listed.
 const WORST: usize = 20;
-/// A limit of less than this is none to be near to: a share of it tells nothing. What is missed is a share
-/// of this at least.
+/// A limit smaller than this counts as zero, because a share of it is meaningless. Misses are expressed as a
+/// share of at least this value.
 const NOTHING: f64 = 1e-9;
 
-/// A case with what was missed in it, or what was nearest to be.
+/// A case with what it missed, or what it was nearest to missing.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Worst {
     /// Identity.
@@ -27,15 +27,15 @@ pub struct Worst {
     pub passed: bool,
     /// Values of the factors.
     pub factors: Vec<String>,
-    /// Required targets outside of their limits, and by how much of the limit's value; those that were not measured
-    /// first, then the furthest outside.
+    /// Required targets outside their limits, and by what share of the limit: first those that were not
+    /// measured, then the furthest outside.
     pub missed: Vec<String>,
-    /// Of a case that passed, the required target nearest to a limit, and by how much of the limit's
-    /// value it was met.
+    /// For a case that passed, the required target nearest to a limit, and by what share of the limit it was
+    /// met.
     pub nearest: Option<String>,
 }
 
-/// By how much a value is outside of its limits, as a share of the limit that it missed.
+/// How far a value is outside its limits, as a share of the limit that it missed.
 fn excess(value: f64, column: &Column) -> f64 {
     let beyond = |limit: f64, by: f64| by.max(0.0) / limit.abs().max(NOTHING);
     let low = column.min.map_or(0.0, |min| beyond(min, min - value));
@@ -43,8 +43,8 @@ fn excess(value: f64, column: &Column) -> f64 {
     low.max(high)
 }
 
-/// By how much a value is outside of its limits, in words: a share of the limit, but of a limit of nothing the
-/// amount.
+/// How far a value is outside its limits, in words: as a share of the limit, or as an amount if the limit is
+/// zero.
 fn amount(value: f64, by: f64, column: &Column) -> String {
     let below = column.min.filter(|min| value < *min);
     let limit = below.or(column.max).unwrap_or(0.0);
@@ -52,17 +52,17 @@ fn amount(value: f64, by: f64, column: &Column) -> String {
         return percent(by);
     }
     let unit = match column.unit.as_str() {
-        // A number without a unit.
+        // A dimensionless number.
         "" | "1" => String::new(),
         unit => format!(" {unit}"),
     };
     format!("{}{unit}", short((value - limit).abs()))
 }
 
-/// How much room a value has within its limits, as a share of the limit that it is nearest to; none
-/// where no limit tells. It is below 0 where it is missed.
+/// How much room a value has within its limits, as a share of the nearest limit; negative if the value misses
+/// it. `None` if no limit provides a measure.
 fn room(value: f64, column: &Column) -> Option<f64> {
-    // Equal limits leave no room to anything.
+    // Equal limits leave no room.
     if column.min.is_some() && column.min == column.max {
         return None;
     }
@@ -72,7 +72,7 @@ fn room(value: f64, column: &Column) -> Option<f64> {
     [low, high].into_iter().flatten().min_by(f64::total_cmp)
 }
 
-/// A share in percent; what is below 1 % with a digit more.
+/// A share in percent, with one more digit below 1 %.
 fn percent(share: f64) -> String {
     let digits = usize::from(share < 0.01);
     format!("{:.digits$} %", 1e2 * share)
@@ -81,10 +81,10 @@ fn percent(share: f64) -> String {
 /// A target with its values and verdicts.
 type Judged<'a> = (&'a Column, &'a [Option<f64>], &'a [Option<bool>]);
 
-/// How bad a case is: the later, the worse.
+/// How bad a case is, from best to worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Class {
-    /// It met all that is required.
+    /// It met all required targets.
     Passed,
     /// It missed a required target.
     Missed,
@@ -94,10 +94,10 @@ enum Class {
     NoResult,
 }
 
-/// A required target that a case missed, and by how much of the limit's value; none where it was not measured.
+/// A required target that a case missed, and by what share of the limit; `None` if it was not measured.
 type Miss<'a> = (&'a Column, Option<f64>);
 
-/// Misses in the order in which they are told: those that were not measured, then the furthest.
+/// Misses in the order in which they are listed: first those not measured, then the furthest.
 fn furthest_first<'a>(missed: impl Iterator<Item = Miss<'a>>) -> Vec<Miss<'a>> {
     let mut missed: Vec<Miss<'a>> = missed.collect();
     let by = |(_, by): &Miss<'_>| by.unwrap_or(f64::INFINITY);
@@ -108,7 +108,7 @@ fn furthest_first<'a>(missed: impl Iterator<Item = Miss<'a>>) -> Vec<Miss<'a>> {
 pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
     let table = &merged.table;
     let (statuses, passed) = (table.texts("status"), table.flags("passed"));
-    // What only informs makes no case bad.
+    // A target that only informs does not make a case bad.
     let required: Vec<Judged<'_>> = merged
         .columns
         .all
@@ -127,16 +127,16 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
             (*column, values[row].map(|value| excess(value, column)))
         })
     };
-    // Of one that passed, the required target with the least room, as a share of the limit.
+    // For a case that passed, the required target with the least room, as a share of the limit.
     let nearest = |row: usize| -> Option<(&Column, f64)> {
         let rooms = required
             .iter()
             .filter_map(|(column, values, _)| Some((*column, room(values[row]?, column)?)))
-            // Where the case passed without room, its own scenario or move did not ask for it.
+            // If the case passed without room, its own scenario or move did not require the target.
             .filter(|(_, room)| *room >= 0.0);
         rooms.min_by(|a, b| a.1.total_cmp(&b.1))
     };
-    // Within a class by what is measured; less room is worse.
+    // Within a class, rank by the measured values; less room is worse.
     let rank = |row: usize| -> (Class, f64) {
         if statuses[row].as_deref() != Some(Status::Ok.name()) {
             return (Class::NoResult, 0.0);
@@ -153,7 +153,7 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
     };
     let mut ranked: Vec<(usize, (Class, f64))> =
         (0..table.rows()).map(|row| (row, rank(row))).collect();
-    // Stable: what is as bad stays in the order of the plan.
+    // The sort is stable: equally bad cases stay in the order of the plan.
     ranked.sort_by(|(_, (a, by_a)), (_, (b, by_b))| b.cmp(a).then(by_b.total_cmp(by_a)));
     let cases = table.texts("case");
     ranked

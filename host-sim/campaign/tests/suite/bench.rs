@@ -51,7 +51,7 @@ fn merged(folder: &Path) -> String {
     merged.expect("not stopped").hash
 }
 
-/// Summary and page of a replay in a folder say where the plant is not as its data sheet says.
+/// Checks that the summary and the page of a replay list where the plant deviates from its data sheet.
 fn assert_told(folder: &Path, bench: &Bench) {
     let read = |name: &str| fs::read_to_string(folder.join(name)).expect("read");
     let summary: Value = serde_json::from_str(&read("summary.json")).expect("JSON");
@@ -90,8 +90,8 @@ fn assert_told(folder: &Path, bench: &Bench) {
     assert!(page.contains("load: 0 of the force left"));
 }
 
-/// A row that a stop has cut off is computed later by another number of threads, and replayed: to the bit the
-/// same.
+/// The rows missing after a stop are computed later with a different number of threads, and replayed: they
+/// are the same to the bit.
 #[test]
 fn rows_of_cylinders_are_the_same_however_they_are_run_and_replayed() {
     let plan = plan_of(&format!("samples = 3\n{HEAD}{BASE}{SPREAD}"));
@@ -166,7 +166,7 @@ fn what_the_plant_is_and_what_its_board_is_told_are_told_apart() {
         (3.0, 3.0)
     );
     assert_ne!(plant_id, axis_id);
-    // A factor of the plant scales what the data sheet states.
+    // A factor of the plant scales the value stated in the data sheet.
     let plan = plan_of(&format!(
         "{HEAD}{BASE}[factor.a]\nparameter = \"axis.moving.mass\"\ngrid = [2.0]\nunit = \"kg\"\n\
          [factor.b]\nparameter = \"plant.moving.mass\"\nscale = true\ngrid = [1.5]\n"
@@ -178,7 +178,8 @@ fn what_the_plant_is_and_what_its_board_is_told_are_told_apart() {
     );
 }
 
-/// Pairs share the seed, so the noise and the air at power-up; all else has its own.
+/// Paired cases share the seed, and with it the noise and the air at power-up; all other cases have their
+/// own.
 #[test]
 fn paired_controllers_meet_the_same_cylinder() {
     let plan = plan_of(&format!("samples = 2\n{HEAD}{BASE}{SPREAD}"));
@@ -195,8 +196,8 @@ fn paired_controllers_meet_the_same_cylinder() {
     );
 }
 
-/// Valves that are slower than the data sheet says, friction, load and the source of the delays change the
-/// move, each as it must.
+/// Valves slower than the data sheet states, friction, load and the source of the delays change the move,
+/// each as expected.
 #[test]
 fn factors_that_matter_do() {
     let of = |factor: &str, base: &str| {
@@ -208,8 +209,8 @@ fn factors_that_matter_do() {
     let settling = figures(&of(delay, ""), "settling");
     let late_s = settling[1].unwrap_or(f64::INFINITY);
     assert!(settling[0] < Some(late_s), "{settling:?}");
-    // Whoever searches for the delays knows them. Who believes the sheet makes pulses that are too short to move a
-    // poppet: fewer movements, and the piston stays where it is.
+    // A controller with identified delays knows them. One that trusts the data sheet makes pulses that are
+    // too short to move a poppet: there are fewer movements, and the piston stays where it is.
     let source = "parameter = \"delays\"\ngrid = [\"sheet\", \"identified\"]\npaired = true\n\
         [factor.delay]\nparameter = \"plant.cylinder.timing_spread\"\nscale = true\ngrid = [2.5]\n";
     let edges = figures(&of(source, ""), "edges");
@@ -234,7 +235,7 @@ fn factors_that_matter_do() {
     );
 }
 
-/// Columns are those of all moves of the plan; what a move does not have is empty.
+/// The columns are those of all moves of the plan; a column that a move does not have is empty.
 #[test]
 fn what_a_move_does_not_have_is_empty() {
     let plan = plan_of(&format!(
@@ -248,7 +249,7 @@ fn what_a_move_does_not_have_is_empty() {
     assert!(figures(&plan, "settling")[1].is_none());
 }
 
-/// Without pressure in its supply no air can be drawn: the row says which field forbids it, and a replay as well.
+/// Without pressure in the supply, the air at power-up cannot be drawn: the row says which field prevents it.
 #[test]
 fn air_that_cannot_be_drawn_is_a_row_that_says_why() {
     let plan = plan_of(&format!(
@@ -264,7 +265,7 @@ fn air_that_cannot_be_drawn_is_a_row_that_says_why() {
     );
 }
 
-/// A move that is made between the first and the measured ones counts, too.
+/// A move between the first and the measured moves counts, too.
 #[test]
 fn the_simulated_time_is_that_of_all_moves() {
     let plan = plan_of(&format!(
@@ -298,7 +299,7 @@ fn the_shipped_plans_make_cases() {
     }
 }
 
-/// The first step is what is measured: nothing is played before it, and nothing after.
+/// The first step itself is measured: nothing is played before or after it.
 #[test]
 fn the_first_step_is_judged_itself() {
     let plan = plan_of(&format!(
@@ -322,7 +323,7 @@ fn the_first_step_is_judged_itself() {
     assert!(!outcome.targets.iter().any(|t| t.id.starts_with("first-")));
 }
 
-/// What no law can keep informs; of moves that keep their load it is required.
+/// A target that no control law can meet only informs; for moves without a change of load it is required.
 #[test]
 fn a_move_is_judged_by_the_limits_that_are_meant_for_it() {
     let plan = plan_of(&format!(

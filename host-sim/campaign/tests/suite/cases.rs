@@ -1,4 +1,4 @@
-//! Any case from its index: who it is, its seed, its values.
+//! Any case from its index: its identity, its seed, its values.
 
 use std::collections::BTreeSet;
 
@@ -31,7 +31,7 @@ fn paired_cells_share_their_seed_and_nothing_else_does() {
     let seeds: BTreeSet<u64> = all.iter().map(|c| c.seed).collect();
     let ids: BTreeSet<String> = all.iter().map(|c| c.id.to_string()).collect();
     assert_eq!((seeds.len(), ids.len()), (8, 16));
-    // Not paired, they meet other noise.
+    // Without pairing, they meet different noise.
     let text = format!("samples = 8\n{HEAD}{BASE}{SPREAD}").replace("paired = true\n", "");
     let plan = plan_of(&text);
     let cases = Cases::new(&plan).expect("a plan");
@@ -39,8 +39,8 @@ fn paired_cells_share_their_seed_and_nothing_else_does() {
     assert_eq!(cases.case(0).id, all[0].id, "pairing is no content");
 }
 
-/// Every leg of the shipped plan closes and stands, meets the same noise, and has the indices of its
-/// own dimensions in its row; the first is the paper's.
+/// Every leg of the shipped plan closes and stands, meets the same noise, and has the indices of its own
+/// dimensions in its row; the first is the paper's.
 #[test]
 fn legs_of_the_shipped_plan_are_all_there_with_their_own_indices() {
     let plan = Plan::load("leg-design").expect("built in");
@@ -74,7 +74,7 @@ fn legs_of_the_shipped_plan_are_all_there_with_their_own_indices() {
         }
         found.insert([leg.conditioning, leg.foot_force_n].map(f64::to_bits));
     }
-    // Crank and radius change the one, the bore the other; the place of the hip neither.
+    // Crank and radius change the one index, the bore the other; the position of the hip changes neither.
     assert_eq!(found.len(), 18);
 }
 
@@ -93,7 +93,7 @@ fn more_samples_and_another_order_of_work_leave_a_case_as_it_is() {
         );
         for index in (0..20).rev() {
             let (a, b) = (few.case(index), many.case(index));
-            // A Latin hypercube of another size is another one.
+            // A Latin hypercube of a different size is a different one.
             assert_eq!(
                 a.id == b.id,
                 sampler != "latin-hypercube",
@@ -108,8 +108,8 @@ fn more_samples_and_another_order_of_work_leave_a_case_as_it_is() {
     }
 }
 
-/// Of two points the design of Saltelli has the first, it with each factor of the other in turn, and the other.
-/// More samples leave those before them.
+/// For two points, Saltelli's design takes the first, the first with each factor of the second in turn, and
+/// the second. Adding samples leaves the existing ones unchanged.
 #[test]
 fn saltelli_takes_one_factor_after_the_other_from_the_other_point() {
     let of = |samples: u64| {
@@ -123,7 +123,7 @@ fn saltelli_takes_one_factor_after_the_other_from_the_other_point() {
         Cases::new(&many).expect("a plan"),
     );
     let mut points = BTreeSet::new();
-    // Two cells: a sample is every second case.
+    // With two cells, a sample is every second case.
     for set in 0..2 {
         let sample = |place: u64| few.case(2 * (4 * set + place));
         let values = [0, 1, 2, 3].map(|place| {
@@ -143,8 +143,8 @@ fn saltelli_takes_one_factor_after_the_other_from_the_other_point() {
     }
 }
 
-/// The content decides, not the unit that the plan's author likes for the file: names of files
-/// and comments do not enter either.
+/// Only the content matters, not the unit that the author uses in the file; names of files and comments do
+/// not enter either.
 #[test]
 fn comments_and_texts_about_a_plan_do_not_enter_a_case() {
     let text = format!("samples = 2\n{HEAD}{BASE}{SPREAD}");
@@ -162,7 +162,7 @@ fn comments_and_texts_about_a_plan_do_not_enter_a_case() {
     assert_ne!(ids[0].1, ids[2].1, "the root enters the seed");
 }
 
-/// Golden: an identity that changes by accident would make all tables of before incomparable.
+/// Golden values: an accidental change of identities would make all earlier tables incomparable.
 #[test]
 fn identities_are_those_of_format_1() {
     let plan = plan_of(&format!(
@@ -203,7 +203,7 @@ fn draws_follow_their_distribution() {
         let uniform: Vec<f64> = values.iter().map(|v| (v[0] - 0.2) / 0.2).collect();
         let z: Vec<f64> = values.iter().map(|v| v[1].ln() / 0.3).collect();
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-        // Four standard errors of random draws; the others are far within.
+        // Four standard errors of random draws; the other samplers stay well within.
         assert!(
             (mean(&uniform) - 0.5).abs() < 4.0 * 0.289 / 512_f64.sqrt(),
             "{sampler}"
@@ -225,7 +225,7 @@ fn draws_follow_their_distribution() {
         let mut cells: Vec<usize> = uniform.iter().map(|u| (u * 512.0) as usize).collect();
         cells.sort_unstable();
         cells.dedup();
-        // One in each of as many equal parts, but for draws that know nothing of each other.
+        // One value in each of as many equal parts, except for independent draws.
         assert_eq!(
             cells.len() == 512,
             sampler != "random",
@@ -235,8 +235,8 @@ fn draws_follow_their_distribution() {
     }
 }
 
-/// Values that contradict each other are a row, not the end: each end of a factor is sound beside
-/// the middle of the other, but the friction at rest is below that of sliding in one of eight.
+/// Values that contradict each other make a row and do not end the campaign. Each end of a factor is valid
+/// with the middle of the other, but static friction is below sliding friction in one case of eight.
 #[test]
 fn a_case_that_cannot_be_says_why() {
     let cylinder = "[base]\naxis = \"bench-vq110u\"\n";
@@ -269,7 +269,8 @@ fn a_case_that_cannot_be_says_why() {
     }
 }
 
-/// What could be written and never read is refused with the plan: its columns and its names.
+/// A table that could be written but never read is refused with the plan, because of its columns or its
+/// names.
 #[test]
 fn a_plan_whose_table_nobody_could_read_is_refused() {
     let told = |plan: &Plan| match Cases::new(plan) {
@@ -315,7 +316,7 @@ fn a_plan_whose_table_nobody_could_read_is_refused() {
     );
 }
 
-/// A campaign of as many cases as a plan may have is begun, and its state told, in a moment.
+/// A campaign with as many cases as a plan may have is begun, and its status reported, in a moment.
 #[test]
 fn the_largest_plan_is_begun_and_told_in_a_moment() {
     let text =
@@ -340,7 +341,7 @@ fn the_largest_plan_is_begun_and_told_in_a_moment() {
     assert!(seconds < 10.0, "{seconds} s");
 }
 
-/// Drawn from a list, the same value comes again: its noise is another one, and so is the case.
+/// A value drawn from a list repeats, but with different noise, so the case is different too.
 #[test]
 fn samples_from_a_list_alone_are_all_different_cases() {
     const CHOICE: &str = "[factor.droop]\nparameter = \"robot.supply.droop\"\n\
@@ -355,11 +356,11 @@ fn samples_from_a_list_alone_are_all_different_cases() {
     let ids: BTreeSet<_> = six.iter().map(|(id, _)| id).collect();
     let seeds: BTreeSet<_> = six.iter().map(|(_, seed)| seed).collect();
     assert_eq!((ids.len(), seeds.len()), (6, 6), "{six:?}");
-    // More samples leave those before them.
+    // Adding samples leaves the existing ones unchanged.
     assert_eq!(identities(9)[..6], six[..]);
 }
 
-/// What only the start of a run finds wrong in the ground is in the row, with its values.
+/// An error in the ground that only the start of a run detects appears in the row, with its values.
 #[test]
 fn a_ground_on_which_the_robot_does_not_stand_is_named_in_its_row() {
     const SLOPE: &str = "[factor.slope]\nparameter = \"scenario.terrain[0].slope\"\n\

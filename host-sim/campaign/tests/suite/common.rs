@@ -28,12 +28,12 @@ pub(crate) fn plan_of(text: &str) -> Plan {
     Plan::of(sources).unwrap_or_else(|e| panic!("{:#?}", e.problems()))
 }
 
-/// Samples of the spread, in two cells.
+/// The spread with this many samples, in two cells.
 pub(crate) fn spread(samples: u64) -> Plan {
     plan_of(&format!("samples = {samples}\n{HEAD}{BASE}{SPREAD}"))
 }
 
-/// A result that depends on every value and, by less than 0.1, on the seed, without a simulation.
+/// A result without a simulation that depends on every value and, by less than 0.1, on the seed.
 pub(crate) fn computed(case: &Case) -> Outcome {
     let setup = case.setup.as_ref().expect("it can be");
     let (scenario, robot) = setup.robot().expect("a robot");
@@ -70,7 +70,7 @@ pub(crate) fn options(threads: usize) -> Options {
     }
 }
 
-/// Runs a plan into a folder, and counts the cases that were simulated.
+/// Runs a plan into a folder, and counts the simulated cases.
 pub(crate) fn run_in(
     folder: &Path,
     plan: &Plan,

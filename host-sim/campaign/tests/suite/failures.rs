@@ -1,4 +1,4 @@
-//! What goes wrong in a campaign, line by line.
+//! Failures of a campaign, row by row.
 
 use std::fs;
 
@@ -38,7 +38,7 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
     let state = state.expect("readable");
     assert_eq!(state.by_status, [37, 1, 1, 0, 1]);
     assert!(state.failed >= 3 && state.missing.is_empty());
-    // Those without a result first, then targets; whoever ran it is told the same.
+    // Causes without a result come first, then targets; the run reports the same causes.
     let causes = state.causes.first(20);
     let no_result = |status, message: &str| Cause::NoResult {
         status,
@@ -67,7 +67,7 @@ fn a_case_that_errs_panics_or_does_not_end_is_a_row() {
         .table;
     let errors = read.texts("error");
     let told = errors[3].clone().expect("an error");
-    // With the line, without the folder that the program was built in.
+    // The message has the line, but not the folder that the program was built in.
     assert!(told.starts_with("planted in 3 (failures.rs:"), "{told}");
     assert_eq!(errors[5].as_deref(), Some("planted"));
     assert_eq!(read.flags("passed")[5], None);
@@ -91,7 +91,7 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
     let table = folder.path().join("cases.parquet");
     let expected = merge(&[folder.path().to_owned()], &table, &Stop::default()).expect("merged");
     let mut found = 0;
-    // A flip that changes no value may stay; any other is found.
+    // A flip that changes no value may pass; any other is detected.
     for at in (0..bytes.len()).step_by(37) {
         let mut flipped = bytes.clone();
         flipped[at] ^= 1 << (at % 8);
@@ -126,7 +126,7 @@ fn damaged_parts_are_found_set_aside_and_computed_again() {
         );
         assert!(parts(folder.path()) == whole);
     }
-    // The part of another program.
+    // A part of another plan.
     let other = tempfile::tempdir().expect("a folder");
     let foreign = spread(7);
     run_in(other.path(), &foreign, &options(1), &|case| {
@@ -181,7 +181,7 @@ fn holes_are_named_with_the_command_that_fills_them() {
     assert!(error.contains("different plans"), "{error}");
 }
 
-/// A folder that takes nothing: finished parts stay, the path is named.
+/// A folder that cannot be written to: finished parts stay, and the error names the path.
 #[cfg(unix)]
 #[test]
 fn what_cannot_be_written_is_named_and_finished_parts_stay() {
@@ -190,7 +190,7 @@ fn what_cannot_be_written_is_named_and_finished_parts_stay() {
     let parts_folder = folder.path().join("parts");
     let moved = folder.path().join("gone");
     let (ran, _) = run_in(folder.path(), &plan, &options(1), &|case| {
-        // Its folder goes away under it.
+        // Move the folder away while it is in use.
         if case.place.index == 9 {
             fs::rename(&parts_folder, &moved).expect("moved");
         }

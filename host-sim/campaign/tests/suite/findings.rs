@@ -1,4 +1,4 @@
-//! The page says what the table says.
+//! The page agrees with the table.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use wheeleg_studies::study::Stop;
 
 use crate::common::{BASE, HEAD, computed, options, plan_of, run_in, spread};
 
-/// The table of a campaign in a folder, whose outcomes are changed by the index of their case.
+/// The table of a campaign in a folder, with outcomes changed depending on the index of their case.
 fn merged(
     folder: &Path,
     plan: &Plan,
@@ -50,7 +50,7 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     assert_eq!(told, passed.count() as u64);
     assert_eq!(findings.passed.len(), 2);
     assert!(findings.passed.iter().all(|(_, rate)| rate.of == 40));
-    // "fuzzy" is 5 letters long, "predictive" 10: the sum passes under the first alone.
+    // "fuzzy" is 5 letters long, "predictive" 10: the sum passes only with the first.
     let pair = &findings.paired[0];
     assert_eq!((pair.pairs, pair.passed.gained), (40, 0));
     assert!(
@@ -69,7 +69,7 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     assert_eq!(findings.grounds.len(), 1);
     assert_eq!(findings.grounds[0].scenario, "stand");
     assert_eq!(findings.errors, [("planted <b>".to_owned(), 1)]);
-    // The first target grows with both factors; the table against itself differs in nothing.
+    // The first target grows with both factors; the table compared with itself shows no difference.
     let first = &findings.targets[0].cells[0];
     assert!(
         first.spearman.iter().all(|r| r.is_some()),
@@ -81,7 +81,7 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
         "{:?}",
         first.spearman
     );
-    // Where the misses lie, of what was drawn.
+    // Range of the missed cases within the drawn values.
     let target = &findings.targets[0];
     let flags = read.flags(&format!("{}.pass", target.column.name));
     for (place, name) in findings.drawn.iter().enumerate() {
@@ -134,7 +134,7 @@ fn rates_pairs_and_the_worst_cases_are_those_of_the_rows() {
     assert!(html.len() < 10_000_000);
 }
 
-/// A plan by Saltelli of two factors.
+/// A Saltelli plan with two factors.
 fn by_saltelli(samples: u32) -> Plan {
     let head = HEAD.replace("block = 4", "block = 256");
     plan_of(&format!(
@@ -146,8 +146,8 @@ fn by_saltelli(samples: u32) -> Plan {
     ))
 }
 
-/// A sum of two factors of which the second has four times the variance of the first: shares of 0.2 and 0.8.
-/// A set of samples without a value is left out.
+/// A sum of two factors, the second with four times the variance of the first: shares of 0.2 and 0.8. A set
+/// of samples without a value is left out.
 #[test]
 fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
     let plan = by_saltelli(512);
@@ -179,8 +179,8 @@ fn a_campaign_by_saltelli_says_what_share_of_the_variance_each_factor_causes() {
     }
 }
 
-/// One value of eight sets of samples is not 0: drawing from the sets gives anything, and the page says that they do
-/// not tell.
+/// Only one value in eight sets of samples is not 0. Resampling the sets can then give anything, and the page
+/// says that the shares are undetermined.
 #[test]
 fn shares_that_so_few_samples_do_not_tell_are_not_told() {
     let plan = by_saltelli(32);
@@ -213,7 +213,7 @@ fn shares_that_so_few_samples_do_not_tell_are_not_told() {
     );
 }
 
-/// The page begins with what came of it; of very many cells it shows the first twenty, and folds the others.
+/// The page begins with its verdict; of very many cells it shows the first twenty and folds the others.
 #[test]
 fn the_page_begins_with_its_verdict_and_folds_what_is_long() {
     let grid: Vec<String> = (0..25).map(|i| format!("0.{:02}", 20 + i)).collect();
@@ -249,7 +249,7 @@ fn the_page_begins_with_its_verdict_and_folds_what_is_long() {
     assert!(html.contains(&targets), "{targets}");
 }
 
-/// Where all passed, those are listed that were nearest to a limit.
+/// If all cases passed, those nearest to a limit are listed.
 #[test]
 fn where_all_passed_the_nearest_to_a_limit_are_listed() {
     let plan = spread(10);
@@ -260,7 +260,7 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
         for target in &mut outcome.targets {
             (target.value, target.pass) = (None, true);
         }
-        // One required target with an upper limit is met with the less room the later the case.
+        // The later the case, the less room there is below the upper limit of one required target.
         let required = outcome.targets.iter_mut();
         let target = required
             .filter(|target| target.required && target.max.is_some_and(|max| max > 0.0))
@@ -278,13 +278,13 @@ fn where_all_passed_the_nearest_to_a_limit_are_listed() {
         .expect("a target");
     assert_eq!(findings.worst.len(), 20);
     let told = |place: usize| findings.worst[place].nearest.clone().expect("near to one");
-    // Of 20 cases the last has 12 % of room left, the first 50.
+    // Of 20 cases, the last has 12 % of room left and the first 50.
     assert_eq!(told(0), format!("{id} within its limit by 12 %"));
     assert_eq!(told(19), format!("{id} within its limit by 50 %"));
     assert!(findings.worst.iter().all(|worst| worst.passed));
 }
 
-/// What is more than nothing is no share of it: the amount is told.
+/// A value above a limit of zero cannot be expressed as a share of it, so its amount is reported.
 #[test]
 fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
     let plan = spread(2);
@@ -304,14 +304,14 @@ fn what_misses_a_limit_of_nothing_is_told_by_its_amount() {
     assert_eq!(findings.worst.len(), 4);
 }
 
-/// A target that only informs ranks no case, even where it could not be measured; one that is required and could not
-/// be measured stands between the cases without a result and those that missed.
+/// A target that only informs ranks no case, even if it could not be measured. A required target that could
+/// not be measured ranks between the cases without a result and those that missed.
 #[test]
 fn the_worst_cases_are_ranked_by_what_is_required() {
     let plan = spread(20);
     let folder = tempfile::tempdir().expect("a folder");
     let table = merged(folder.path(), &plan, &|index, mut outcome| {
-        // Nothing that only informs was measured in the first cases.
+        // No informational target was measured in the first cases.
         for target in &mut outcome.targets {
             target.pass = target.required || index > 10;
             target.value = (index > 10).then_some(0.0);
@@ -322,7 +322,7 @@ fn the_worst_cases_are_ranked_by_what_is_required() {
             assert!(target.required && target.max == Some(5.0), "{target:?}");
             (target.value, target.pass) = (value, false);
         };
-        // R2 and R3 are allowed up to 5 mm.
+        // The limit of R2 and R3 is 5 mm.
         match index {
             0 | 3 => miss("R2", Some(37.5)),
             5 => miss("R2", Some(70.0)),
@@ -362,7 +362,7 @@ fn the_worst_cases_are_ranked_by_what_is_required() {
     ];
     assert_eq!(told, expected);
     assert!(worst[5..].iter().all(|w| w.passed && w.missed.is_empty()));
-    // The page has the same order.
+    // The page uses the same order.
     let page = folder.path().join("cases.html");
     report.write(&page).expect("a page");
     let html = fs::read_to_string(&page).expect("there");
@@ -370,8 +370,8 @@ fn the_worst_cases_are_ranked_by_what_is_required() {
     assert!(at("R3 not measured") < at("R2 by 1300 %") && at("R2 by 1300 %") < at("R2 by 650 %"));
 }
 
-/// A target that one scenario only tells and the next asks for has the limits of the one that asks; a case that passed
-/// because nobody asked is near to none.
+/// A target that one scenario only reports and another requires has the limits of the one that requires it. A
+/// case that passed because its scenario required nothing is near to no limit.
 #[test]
 fn limits_are_those_of_the_scenario_that_asks() {
     let folder = tempfile::tempdir().expect("a folder");

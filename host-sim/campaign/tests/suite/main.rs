@@ -1,5 +1,5 @@
-//! Tests of campaigns as a whole, with cases that cost nothing: what a case is computed from is
-//! the real thing, its simulation is not.
+//! Tests of whole campaigns with cases that cost nothing: the inputs of a case are real, its simulation is
+//! not.
 
 mod bench;
 mod cases;

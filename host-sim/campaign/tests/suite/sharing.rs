@@ -1,4 +1,4 @@
-//! However the work is shared and wherever it stops, the table is the same.
+//! The table is the same, however the work is shared and wherever it stops.
 
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -46,7 +46,7 @@ fn threads_and_shards_give_the_same_bytes() {
         .expect("it runs");
     assert_eq!(merged(two.path()), expected);
     assert!(parts(two.path()) == parts(one.path()));
-    // Seven shards into three folders, one of them twice.
+    // Seven shards into three folders; one shard is run twice.
     let folders: Vec<_> = (0..3)
         .map(|_| tempfile::tempdir().expect("a folder"))
         .collect();
@@ -79,7 +79,7 @@ fn what_is_stopped_goes_on_where_it_was() {
         let options = options(3);
         let (stop, count) = (options.stop.clone(), AtomicUsize::new(0));
         let (ran, simulated) = run_in(folder.path(), &plan, &options, &|case| {
-            // What is under way then is left.
+            // Cases in progress at this point are abandoned.
             if count.fetch_add(1, Ordering::Relaxed) >= 23 {
                 stop.ask(Signal::Terminate);
                 return None;
@@ -128,7 +128,7 @@ fn a_pilot_is_taken_up() {
     assert_eq!((ran.computed, ran.of, ran.found), (10, 10, 0));
     let (again, count) = run_in(folder.path(), &plan, &pilot, &|case| Some(computed(case)));
     assert_eq!((again.expect("it runs").found, count), (10, 0));
-    // Its table has what there is, in the order of the plan.
+    // Its table has the existing rows, in the order of the plan.
     let table = folder.path().join("pilot.parquet");
     let merged_so_far = merge_partial(&[folder.path().to_owned()], &table, &Stop::default());
     let merged_so_far = merged_so_far.expect("merged").expect("not stopped");
@@ -158,7 +158,7 @@ fn a_pilot_is_taken_up() {
     assert_eq!(merged(folder.path()), whole(&plan).1);
 }
 
-/// A table takes no place of a part or of the plan.
+/// A merged table may not take the place of a part or of the plan.
 #[test]
 fn a_table_is_no_file_of_its_campaign() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -183,8 +183,8 @@ fn a_table_is_no_file_of_its_campaign() {
     assert_eq!(merged.expect("not stopped").rows, 8);
 }
 
-/// A block is about a minute of work on one core, a start-up of each case included: a thousand short
-/// cases are more than one.
+/// A block is about a minute of work on one core, including a start-up for each case: a thousand short cases
+/// fill more than one.
 #[test]
 fn a_block_that_nobody_chose_is_a_minute_of_work() {
     let text = "name = \"short\"\nroot = 1\nreplicates = 1000\n[base]\nscenario = \"stand\"\n";

@@ -1,5 +1,4 @@
-//! What a board shows: outputs, inputs as its program read them, transmissions,
-//! measurements.
+//! What a board shows: outputs, inputs as its program read them, transmissions, measurements.
 
 use wheeleg_remote_link::{Figures, Inputs, MAX_TRANSMISSIONS, Outputs, Ran, Sent, Switches};
 
@@ -7,16 +6,15 @@ use super::Board;
 use crate::machine::Machine;
 use crate::wiring;
 
-/// Edges between two looks at the stack.
+/// Number of edges between two checks of the stack.
 const STACK_EVERY: u32 = 64;
 
-/// Most by which the boards' microsecond clock leads the tick: both are started by one
-/// store after the other (firmware/board/src/g431/tick.rs), ten cycles apart at most, as
-/// the compiler lays them out [ns].
+/// Maximum lead of the boards' microsecond clock over the tick [ns]. Both are started by consecutive stores
+/// (firmware/board/src/g431/tick.rs), at most ten cycles apart in the compiler's layout.
 const LEAD_NS: u64 = 60;
 
-/// The microsecond that a start of the boards' clock means. One that is off by more than
-/// the lead stays as it is, and differs.
+/// The microsecond that a start of the boards' clock stands for. A start that is off by more than the lead is
+/// left as it is, and differs.
 fn on_grid(ns: u64) -> u64 {
     let next = ns.next_multiple_of(1_000);
     if next - ns <= LEAD_NS { next } else { ns }
@@ -81,7 +79,7 @@ impl Board {
         (inputs, state.soc.time.ns_of(seen.edge))
     }
 
-    /// What the board shows now: outputs, and the newest tick that was worked off.
+    /// What the board shows now: outputs, and the newest tick it has processed.
     pub(super) fn take_ran(&mut self) -> Ran {
         let (seen, seen_at_ns) = self.seen();
         let state = self.machine.as_ref().map(Machine::state);
@@ -97,7 +95,7 @@ impl Board {
         }
     }
 
-    /// What the board has put out at an edge, and the rest of the reply as of now.
+    /// The board's outputs at an edge, with the rest of the reply as of now.
     pub(super) fn reply(&mut self, ran: Ran) -> Result<Ran, String> {
         let sent = self.sent()?;
         let period_us = self.period_us() as u32;
@@ -118,15 +116,15 @@ impl Board {
         })
     }
 
-    /// What stands ready to go out and has not been told yet. What has gone
-    /// out must be what was told.
+    /// Transmissions that are ready to go out and have not been announced yet. Whatever has gone out must
+    /// match its announcement.
     fn sent(&mut self) -> Result<heapless::Vec<Sent, MAX_TRANSMISSIONS>, String> {
         let mut sent = heapless::Vec::new();
         let Some(machine) = &mut self.machine else {
             return Ok(sent);
         };
         let time = machine.state().soc.time;
-        // Started since the last reply, or standing ready.
+        // Started since the last reply, or ready to start.
         let cycle = machine.state().cycle;
         let started = machine.state_mut().soc.started.take();
         let armed = machine.state().soc.armed(cycle);
@@ -146,7 +144,7 @@ impl Board {
             self.announced.push_back((start, bytes));
         }
         for frame in std::mem::take(&mut machine.state_mut().soc.gone) {
-            // Told before it: replaced, or cut off by the driver's time limit.
+            // Announced before this frame: it was replaced, or cut off by the driver's time limit.
             while self
                 .announced
                 .front()
@@ -192,8 +190,8 @@ impl Board {
         Ok(())
     }
 
-    /// Writes where the worst tick spent its instructions, if somebody wants to know and
-    /// there has been a worse one.
+    /// Writes where the worst tick spent its instructions, if profiles are requested and there has been a
+    /// worse tick.
     fn write_profile(&mut self) -> Result<(), String> {
         let name = format!("{}-{}.txt", self.image.name, self.address);
         let (Some(folder), Some(machine)) = (&self.profiles, &mut self.machine) else {

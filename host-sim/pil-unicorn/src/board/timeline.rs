@@ -7,15 +7,15 @@ use crate::machine::{Stop, Until};
 use crate::soc::rcc::{BROWN_OUT_RESET, PIN_RESET};
 use crate::wiring;
 
-/// How far the board runs beyond an edge, so that what acts "at the edge" in
-/// its interrupt has acted; below 1 µs, the grid of all bus times [ns].
+/// How far the board runs beyond an edge, so that whatever acts "at the edge" in its interrupt has acted;
+/// below 1 µs, the grid of all bus times [ns].
 const BEYOND_EDGE_NS: u64 = 900;
-/// Longest work on received bytes before the board is taken for busy [ns].
+/// Longest processing of received bytes before the board counts as busy [ns].
 const WORK_NS: u64 = 500_000;
-/// From the voltage detector's threshold to the brown-out reset (ASSUMED: a
-/// capacitor that lasts so long) [ns].
+/// Time from the voltage detector's threshold to the brown-out reset [ns] (ASSUMED: a capacitor that lasts
+/// this long).
 const FALL_NS: u64 = 20_000;
-/// What an image for a bench board does here.
+/// Error for an image that is meant for a bench board.
 const WAITS: &str = "the program waits for its second serial port, which nothing is connected to";
 /// The byte between bus frames.
 const DELIMITER: u8 = 0;
@@ -29,8 +29,8 @@ impl Board {
         }
     }
 
-    /// The tick timer has been started: its next edge is `edge_ns`. (The
-    /// oscillators' start-up takes as long as it must for that.)
+    /// Records that the tick timer has been started and that its next edge is `edge_ns`. (The start-up of the
+    /// oscillators takes as long as this requires.)
     pub(super) fn align(&mut self, edge_ns: u64) {
         self.running = true;
         self.first_edge_ns = edge_ns;
@@ -40,7 +40,7 @@ impl Board {
                 let now = state.cycle;
                 state.soc.align(edge, edge_ns, now);
             }
-            // The cycles before this edge count as up to one period.
+            // The cycles before this edge count as at most one period.
             self.grid_ns = self.period_us().max(1) * 1000;
         }
         for (at_ns, edges) in self.turned.into_iter().rev() {
@@ -48,8 +48,8 @@ impl Board {
         }
     }
 
-    /// The counter of the encoder is started just before the tick timer, and that a period
-    /// before the first edge: what the wheel has turned by an edge before that is not counted.
+    /// Starts the encoder's counter. The program does this just before it starts the tick timer, which is one
+    /// period before the first edge; what the wheel has turned by an earlier edge is not counted.
     fn start_counter(&mut self, at_ns: u64, edges: i32) {
         if self.running
             && at_ns + 2 * self.grid_ns <= self.first_edge_ns
@@ -62,13 +62,13 @@ impl Board {
     pub(super) fn run(&mut self, run: &Run) -> Result<Ran, String> {
         self.deliver(run)?;
         if self.power == Power::BrownOut && run.power == Power::Good {
-            // The supply comes back at the end of this run.
+            // The supply returns at the end of this run.
             self.advance(run.until_ns, Until::Cycle)?;
         }
         self.supply(run.power)?;
-        // Only behind a delimiter is there anything to work off; before one, the
-        // next byte of the frame would come late. What comes with an edge nobody answers
-        // before the next run: to wait for it would make the next bytes late.
+        // Only after a delimiter is there anything to process; before one, the next byte of the frame would
+        // be delayed. Bytes that arrive with an edge are not answered before the next run, and waiting for
+        // them would delay the next bytes.
         self.owes |= run.edge.is_none() && run.received.last() == Some(&DELIMITER);
         if let Some(inputs) = run.edge {
             self.edge_ns = run.until_ns;
@@ -93,8 +93,7 @@ impl Board {
         }
     }
 
-    /// Last instant before the next tick edge, whose inputs come with a run of
-    /// its own.
+    /// Last instant before the next tick edge, whose inputs come with a separate run.
     fn before_next_edge(&mut self) -> Result<u64, String> {
         let running = self.running;
         let soc = &self.machine()?.state().soc;
@@ -102,24 +101,22 @@ impl Board {
         Ok(edge.map_or(u64::MAX, |cycle| soc.time.ns_of(cycle).saturating_sub(6)))
     }
 
-    /// Runs on until all that was received is worked off, so that the
-    /// transmissions it leads to are known in time. What a tick edge cuts short
-    /// goes on in the next run.
+    /// Runs on until all received bytes are processed, so that the resulting transmissions are known in time.
+    /// Work that a tick edge interrupts continues in the next run.
     fn work_off(&mut self, now_ns: u64) -> Result<(), String> {
         if self.owes {
             let cap = self.before_next_edge()?;
             let longest = cap.min(now_ns + WORK_NS);
             self.advance(cap.min(now_ns), Until::Asleep(longest))?;
-            // (A byte that ends with a tick edge arrives after this run, which ends before it.)
+            // (A byte that ends at a tick edge arrives after this run, which ends before it.)
             let machine = self.machine()?;
             self.owes = !machine.rests() || machine.state().soc.expects();
         }
         Ok(())
     }
 
-    /// Runs on until the tick under way is worked off. A program that stops at an instant
-    /// has done its newest tick, as the one on the host has, although the board answered
-    /// before that.
+    /// Runs on until the current tick is finished. A program that stops at an instant has finished its newest
+    /// tick, like the one on the host, although the board answered earlier.
     pub(super) fn finish_tick(&mut self) -> Result<(), String> {
         if !self.running {
             return Ok(());
@@ -131,7 +128,7 @@ impl Board {
         self.advance(cap.min(now_ns), Until::Asleep(longest))
     }
 
-    /// The board's tick timer keeps the simulator's time.
+    /// Checks that the board's tick timer keeps the simulator's time.
     fn check_edge(&mut self, edge_ns: u64) -> Result<(), String> {
         let runs = self.running && self.first_edge_ns <= edge_ns;
         let state = self.machine()?.state();
@@ -145,9 +142,8 @@ impl Board {
         ))
     }
 
-    /// Puts the received bytes on the line at their times. A board that has just started hears
-    /// nothing of what ended before its tick timer was started: its start-up code was executed
-    /// ahead of them.
+    /// Puts the received bytes on the line at their times. A board that has just started hears nothing that
+    /// ended before its tick timer started, because its start-up code was executed ahead of these bytes.
     fn deliver(&mut self, run: &Run) -> Result<(), String> {
         let mut late = 0;
         let hears_from_ns = if self.running {
@@ -189,9 +185,8 @@ impl Board {
         }
     }
 
-    /// The supply falls: first through the threshold of the voltage detector,
-    /// [`FALL_NS`] later through that of the brown-out reset, which holds the
-    /// processor until the supply is back.
+    /// The supply falls: first through the threshold of the voltage detector, then, [`FALL_NS`] later,
+    /// through that of the brown-out reset, which holds the processor until the supply returns.
     fn power_fails(&mut self) -> Result<(), String> {
         let soc = &mut self.machine()?.state_mut().soc;
         soc.ports[0].outside &= !(1 << wiring::POWER_OK);

@@ -1,21 +1,21 @@
-//! How many instructions a block has.
+//! Counts the instructions of a block.
 
 use std::cell::Cell;
 use std::rc::Rc;
 
 use crate::image::{FLASH_BASE, Image};
 
-/// Blocks of an image in flash, counted when they are met first. Boards of one image
-/// share it: it is looked into at every block, and must stay in the cache.
+/// Blocks of an image in flash, each counted when it is first executed. Boards with the same image share this
+/// table: it is consulted at every block and must stay in the cache.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     flash: Rc<[u8]>,
-    /// Size and instructions of the block at each half-word, as far as the image goes.
+    /// Size and number of instructions of the block at each half-word, up to the end of the image.
     known: Rc<[Cell<(u16, u16)>]>,
 }
 
 impl Blocks {
-    /// None met yet.
+    /// No block counted yet.
     pub(crate) fn new(image: &Image) -> Self {
         let used = image.flash.iter().rposition(|byte| *byte != 0xFF);
         let bytes = used.map_or(0, |last| last + 1).next_multiple_of(4);
@@ -25,11 +25,11 @@ impl Blocks {
         }
     }
 
-    /// Instructions of the block of `size` bytes at `address`.
+    /// Number of instructions in the block of `size` bytes at `address`.
     pub(crate) fn instructions(&self, address: u32, size: u32) -> u64 {
         let offset = address.wrapping_sub(FLASH_BASE) as usize;
         let Some(known) = self.known.get(offset / 2) else {
-            // Outside of the image: two bytes each.
+            // Outside the image, assume two bytes each.
             return u64::from(size / 2);
         };
         let (bytes, count) = known.get();

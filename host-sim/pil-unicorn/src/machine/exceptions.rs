@@ -5,7 +5,7 @@ use unicorn_engine::RegisterARM as R;
 use super::{Machine, THUMB};
 
 impl Machine {
-    /// Takes the most urgent exception that nothing holds back.
+    /// Takes the most urgent exception that is not masked.
     pub(super) fn take_exception(&mut self) -> Result<bool, String> {
         let state = self.uc.get_data_mut();
         if state.stop_processor {
@@ -17,7 +17,7 @@ impl Machine {
         }
         let primask = self.get(R::PRIMASK)? & 1 != 0;
         let basepri = self.get(R::BASEPRI)? as u8;
-        // A processor that sleeps wakes even if the exception is masked.
+        // A sleeping processor wakes even if the exception is masked.
         if self.uc.get_data().nvic.next(false, 0).is_some() {
             self.asleep = false;
         }
@@ -51,7 +51,7 @@ impl Machine {
         let mut handler = [0; 4];
         self.memory(vector, &mut handler)?;
         self.set(R::IPSR, n as u32)?;
-        // An IT block may have been interrupted: the handler is not part of it.
+        // An IT block may have been interrupted; the handler is not part of it.
         self.set(R::EPSR, THUMB as u32)?;
         self.mode_changed(xpsr)?;
         self.set(R::PC, u32::from_le_bytes(handler) | 1)?;
@@ -61,8 +61,8 @@ impl Machine {
         Ok(())
     }
 
-    /// Makes the engine see that thread or handler mode has begun, which decides
-    /// whether a jump to 0xFFFF_FFFx is a return: it looks when flags are written.
+    /// Tells the engine that thread or handler mode has begun, which decides whether a jump to 0xFFFF_FFFx is
+    /// a return. The engine checks this when flags are written.
     fn mode_changed(&mut self, flags: u32) -> Result<(), String> {
         self.set(R::APSR_NZCV, flags)
     }

@@ -1,4 +1,4 @@
-//! What the engine calls: accesses to peripherals, each block, what nothing answers.
+//! Callbacks of the engine: accesses to peripherals, every block, and accesses that nothing answers.
 
 use unicorn_engine::{
     HookType, MemType, Prot, RegisterARM as R, TlbEntry, TlbType, Unicorn, uc_error,
@@ -10,7 +10,7 @@ use crate::image::{RAM_BASE, RAM_SIZE};
 use crate::nvic::NON_MASKABLE;
 use crate::soc::flash::{STORE_BASE, STORE_SIZE};
 
-/// Interrupt numbers of the engine for ARM (`EXCP_…` of QEMU).
+/// The engine's exception numbers for ARM (`EXCP_…` of QEMU).
 const EXCP_SWI: u32 = 2;
 const EXCP_EXCEPTION_EXIT: u32 = 8;
 
@@ -32,7 +32,7 @@ impl Machine {
                         let cycle = state.cycle;
                         match state.soc.read(base + offset as u32, size, cycle) {
                             Ok(value) => {
-                                // A read takes flags away at most: nothing is due sooner.
+                                // A read can only clear flags, so nothing becomes due sooner.
                                 state.nvic.lines = state.soc.lines();
                                 if state.soc.serial.waits() {
                                     state.due = 0;
@@ -125,7 +125,7 @@ impl Machine {
                 profile.trace.push((address as u32, size));
             }
         })?;
-        // Around RAM: where a hook of memory stands, every store takes the slow way.
+        // Cover everything but RAM: where there is a memory hook, every store takes the slow path.
         let ram_end = u64::from(RAM_BASE + RAM_SIZE);
         for (begin, end) in [(0, u64::from(RAM_BASE) - 1), (ram_end, u64::from(u32::MAX))] {
             uc.add_mem_hook(
@@ -139,14 +139,14 @@ impl Machine {
                 },
             )?;
         }
-        // Addresses are what they are. Of the default memory map this leaves out
-        // that RAM can be executed: the engine would look for code at every store.
+        // Virtual addresses are physical ones. Unlike in the default memory map, RAM is not executable;
+        // otherwise the engine would look for code at every store.
         uc.ctl_set_tlb_type(TlbType::VIRTUAL)?;
         uc.add_tlb_hook(0, u64::from(u32::MAX), move |uc, address, kind| {
             if kind != MemType::FETCH {
-                // Before it asks, the engine has put the IT state of the instruction
-                // back into the registers, where it is zero within a block; left
-                // there, the next block would be taken for conditional.
+                // Before this call, the engine has put the instruction's IT state back into the registers,
+                // where it is zero within a block. If it stayed there, the next block would be treated as
+                // conditional.
                 let _ = uc.reg_write(R::EPSR, THUMB);
             }
             let ram = (u64::from(RAM_BASE)..ram_end).contains(&address);

@@ -1,4 +1,4 @@
-//! What the engine's hooks reach: peripherals, interrupts, and the count of time.
+//! State accessible to the engine's hooks: peripherals, interrupts, and the count of time.
 
 use std::collections::BTreeMap;
 
@@ -7,13 +7,13 @@ use super::blocks::Blocks;
 use crate::nvic::Nvic;
 use crate::soc::Soc;
 
-/// Interrupts that begin a tick and those that only bring bytes.
+/// Interrupts that begin a tick; all others only bring bytes.
 const TICK_LINES: [usize; 2] = [16 + 18, 16 + 28];
 
-/// One stretch between two sleeps.
+/// A period between two sleeps.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Awake {
-    /// Instructions executed before it.
+    /// Instructions executed before this period.
     since: u64,
     ticks: u32,
     others: u32,
@@ -22,9 +22,9 @@ pub(super) struct Awake {
 /// Inputs as the program read them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Seen {
-    /// Edge of the tick.
+    /// Tick edge.
     pub(crate) edge: u64,
-    /// Converter.
+    /// Converter result.
     pub(crate) adc: u16,
     /// Levels of port A.
     pub(crate) port_a: u32,
@@ -37,11 +37,11 @@ pub(crate) struct Seen {
 pub(crate) struct Profile {
     /// Address and size of each block since the processor woke.
     pub(super) trace: Vec<(u32, u32)>,
-    /// The same of the worst tick.
+    /// The same for the worst tick.
     worst: Vec<(u32, u32)>,
-    /// Its instructions.
+    /// Number of instructions of the worst tick.
     instructions: u64,
-    /// Nobody has taken it yet.
+    /// The worst tick has not been reported yet.
     fresh: bool,
 }
 
@@ -55,7 +55,7 @@ impl Profile {
     }
 }
 
-/// All that hooks reach.
+/// Everything that the hooks can access.
 pub(crate) struct State {
     pub(crate) soc: Soc,
     pub(crate) nvic: Nvic,
@@ -66,15 +66,15 @@ pub(crate) struct State {
     pub(super) refused: Option<String>,
     pub(super) returns: bool,
     pub(super) service_call: bool,
-    /// An exception of the engine that no handler here knows.
+    /// An exception of the engine for which there is no handler here.
     pub(super) fault: Option<u32>,
     /// The last access that nothing answered.
     pub(super) unanswered: String,
-    /// Faults have been injected: a hard fault is the program's to handle.
+    /// Faults have been injected, so the program must handle a hard fault.
     pub(crate) tolerant: bool,
     /// No pin that drives something may ever leave its idle state.
     pub(crate) outputs_forbidden: bool,
-    /// What the program read in the last tick that was worked off.
+    /// What the program read in the newest processed tick.
     pub(crate) seen: Seen,
     /// Stop as soon as the tick timer runs.
     pub(super) await_tick: bool,
@@ -82,25 +82,24 @@ pub(crate) struct State {
     pub(super) trace_at: usize,
     pub(super) blocks: Blocks,
     pub(super) awake: Awake,
-    /// Instructions of the newest tick that nothing interrupted: from waking at its
-    /// edge until the watchdog is fed.
+    /// Instructions of the newest uninterrupted tick, from waking at its edge until the watchdog is fed.
     pub(crate) tick_instructions: u64,
-    /// Longest stretch so far.
+    /// The longest waking period so far.
     pub(crate) longest_awake: u64,
     /// Instructions from the newest reset until all outputs were driven low.
     pub(crate) outputs_low_after: Option<u64>,
     /// Instructions at the newest reset.
     reset_at: u64,
-    /// Kept if somebody asks for it.
+    /// Kept if profiles are requested.
     pub(crate) profile: Option<Profile>,
-    /// The main loop stands still.
+    /// The main loop is stopped.
     pub(crate) stop_main_loop: bool,
-    /// The processor stands still.
+    /// The processor is stopped.
     pub(crate) stop_processor: bool,
 }
 
 impl State {
-    /// At power-up.
+    /// State at power-up.
     pub(super) fn new(soc: Soc, blocks: Blocks) -> Self {
         Self {
             soc,
@@ -131,7 +130,7 @@ impl State {
         }
     }
 
-    /// Peripherals, interrupts and all that was provoked start anew.
+    /// Resets peripherals and interrupts, and clears all injected stops.
     pub(super) fn reset(&mut self, soc: Soc) {
         self.soc = soc;
         self.nvic = Nvic::default();
@@ -150,8 +149,8 @@ impl State {
         self.cycle - self.idle
     }
 
-    /// Address, instructions in one execution and number of executions of every block
-    /// of the worst tick, by address; `None` if profiles are off or it is no news.
+    /// Address, instructions in one execution and number of executions of every block of the worst tick, by
+    /// address; `None` if profiles are off or the tick is not new.
     pub(crate) fn worst_tick(&mut self) -> Option<BTreeMap<u32, (u64, u32)>> {
         let profile = self.profile.as_mut()?;
         if !std::mem::take(&mut profile.fresh) {
@@ -170,7 +169,7 @@ impl State {
         self.retired() - self.awake.since
     }
 
-    /// Time passes without instructions.
+    /// Lets time pass without instructions.
     pub(super) fn pass(&mut self, cycles: u64) {
         self.cycle += cycles;
         self.idle += cycles;
@@ -181,7 +180,7 @@ impl State {
         self.due = 0;
     }
 
-    /// After an access to a peripheral: what is due, and when.
+    /// After an access to a peripheral, determines what is due, and when.
     pub(super) fn touched(&mut self) {
         if self.outputs_forbidden
             && let Some(pin) = self.soc.power_pin_in_use()
@@ -191,7 +190,7 @@ impl State {
         if self.outputs_low_after.is_none() && self.soc.outputs_are_low() {
             self.outputs_low_after = Some(self.retired() - self.reset_at);
         }
-        // Bytes may be worked off before the next sleep; they are no part of the tick.
+        // Bytes may be processed before the next sleep; they are not part of the tick.
         if self.soc.watchdog.take_fed() && self.awake.ticks == 1 && self.awake.others == 0 {
             self.tick_instructions = self.awake_instructions();
             if let Some(profile) = &mut self.profile {

@@ -1,12 +1,11 @@
-//! The processor on small programs.
+//! The processor executing small programs.
 
 use super::*;
 use crate::soc::flash::STORE_SIZE;
 
 const CODE: usize = 0x200;
 
-/// A machine whose reset handler is `code` (Thumb half-words at 0x200);
-/// exception `n` goes to `handlers[n]`.
+/// A machine whose reset handler is `code` (Thumb half-words at 0x200); exception `n` goes to `handlers[n]`.
 fn machine(code: &[u16], handlers: &[(usize, u32)]) -> Machine {
     let mut flash = vec![0xFF; FLASH_SIZE as usize];
     let mut put = |at: usize, word: u32| flash[at..at + 4].copy_from_slice(&word.to_le_bytes());
@@ -92,7 +91,7 @@ fn an_exception_stacks_runs_and_returns_and_waits_for_primask() {
     assert!(!machine.state().nvic.in_handler());
 }
 
-/// What a read of an address and a write of the address to itself come to.
+/// Errors of a read of an address, and of a write of the address to itself.
 fn accesses(address: u32) -> [String; 2] {
     // r1 = address; ldr r0, [r1] or str r1, [r1]; b .
     [0x6808, 0x6009].map(|access| {
@@ -107,17 +106,17 @@ fn accesses(address: u32) -> [String; 2] {
 fn an_access_that_nothing_models_ends_the_run_by_its_name_on_every_bus() {
     let (read, write) = ("read of", "write");
     let places = [
-        // System memory: all but the unique id.
+        // System memory: everything but the unique id.
         (0x1FFF_7500, "no peripheral at 0x1fff7500", read, write),
-        // APB1: TIM4. APB2: nothing is there. AHB1: DMA2.
+        // APB1: TIM4. APB2: a gap. AHB1: DMA2.
         (0x4000_0800, "no peripheral at 0x40000800", read, write),
         (0x4001_2000, "no peripheral at 0x40012000", read, write),
         (0x4002_0400, "no peripheral at 0x40020400", read, write),
-        // Within peripherals that are modelled: APB1, APB2, AHB1.
+        // Registers of modelled peripherals: APB1, APB2, AHB1.
         (0x4000_3010, "IWDG+0x010", read, write),
         (0x4001_0400 + 0x3FC, "EXTI+0x3fc", read, write),
         (0x4002_1028, "RCC+0x028", read, write),
-        // AHB2: GPIOD; behind the converters.
+        // AHB2: GPIOD; beyond the converters.
         (0x4800_0C00, "no peripheral at 0x48000c00", read, write),
         (0x5000_0400, "no peripheral at 0x50000400", read, write),
         // With the clock off: APB1, APB2, AHB1, AHB2.
@@ -126,9 +125,9 @@ fn an_access_that_nothing_models_ends_the_run_by_its_name_on_every_bus() {
         (0x4002_0000, "DMA1+0x000 with its clock off", read, write),
         (0x4800_0000, "GPIOA+0x000 with its clock off", read, write),
         (0x5000_0000, "ADC1+0x000 with its clock off", read, write),
-        // The processor's own: the system timer, which no image uses.
+        // The processor's own peripherals: the system timer, which no image uses.
         (0xE000_E010, "PPB 0xe000e010", read, write),
-        // Between all regions, and where the regions of buses have holes.
+        // Between all regions, and in the gaps of the bus regions.
         (
             0x6000_0000,
             "at 0x60000000",
@@ -248,7 +247,7 @@ fn where_outputs_are_forbidden_a_program_that_drives_one_ends_by_the_name_of_its
         machine.state_mut().outputs_forbidden = forbidden;
         machine.run(10_000, Until::Cycle, true)
     };
-    // As after a reset but for PA8: an output, and in the hands of a timer.
+    // As after a reset except for PA8, which is an output or controlled by a timer.
     let (output, timer) = (0xABFD_FFFF, 0xABFE_FFFF);
     assert_eq!(ended(true, output, 1 << 5), Ok(Stop::Time), "kept low");
     for (mode, set) in [(output, 1 << 8), (timer, 0)] {

@@ -10,7 +10,7 @@ const ADVREGEN: u32 = 1 << 28;
 const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 
-/// Trigger edges in CFGR; none: by software.
+/// Trigger edges in CFGR; zero means triggered by software.
 const TRIGGERED: u32 = 3 << 10;
 
 const ADRDY: u32 = 1;
@@ -19,7 +19,7 @@ const EOS: u32 = 1 << 3;
 
 /// Sampling times in half cycles of the converter's clock.
 const SAMPLING_HALF: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
-/// Conversion of 12 bits, half cycles.
+/// Duration of a 12-bit conversion in half cycles.
 const CONVERSION_HALF: u64 = 25;
 
 /// The converter.
@@ -34,9 +34,9 @@ pub(crate) struct Adc {
     sqr1: u32,
     dr: u16,
     common: u32,
-    /// Result and end of the conversion under way.
+    /// End and result of the conversion in progress.
     running: Option<(u64, u16)>,
-    /// What the program read last.
+    /// The value the program read last.
     pub(crate) read: u16,
 }
 
@@ -59,7 +59,7 @@ impl Default for Adc {
 }
 
 impl Adc {
-    /// Processor cycles of one converter cycle.
+    /// Processor cycles per converter cycle.
     fn divider(&self) -> u64 {
         match self.common >> 16 & 3 {
             1 => 1,
@@ -91,7 +91,7 @@ impl Adc {
     fn result(&self, code: u16) -> u16 {
         let samples = self.samples();
         let sum = if samples >= 16 {
-            // Sixteen samples resolve sixteen bits; more only add up.
+            // Sixteen samples resolve sixteen bits; more samples only increase the sum.
             u64::from(code) * (samples / 16)
         } else {
             u64::from(code >> 4) * samples
@@ -110,8 +110,7 @@ impl Adc {
         ((value << alignment) & 0xFFFF) as u16
     }
 
-    /// The trigger `event` of the external inputs comes; the wiper of channel
-    /// 1 stands at `code`.
+    /// Handles the external trigger `event`, with the wiper of channel 1 at `code`.
     pub(crate) fn trigger(&mut self, event: u32, code: u16, cycle: u64) {
         let armed = self.cr & (ADEN | ADSTART) == ADEN | ADSTART && self.isr & ADRDY != 0;
         let rising = self.cfgr >> 10 & 1 != 0;
@@ -120,7 +119,7 @@ impl Adc {
         }
     }
 
-    /// A start without a trigger converts at once, and once.
+    /// A start without a trigger converts immediately, and only once.
     pub(crate) fn start_by_software(&mut self, code: u16, cycle: u64) {
         let armed = self.cr & (ADEN | ADSTART) == ADEN | ADSTART && self.isr & ADRDY != 0;
         if armed && self.cfgr & TRIGGERED == 0 && self.running.is_none() {
@@ -128,12 +127,12 @@ impl Adc {
         }
     }
 
-    /// End of the conversion under way.
+    /// End of the conversion in progress.
     pub(crate) fn next(&self) -> Option<u64> {
         self.running.map(|(end, _)| end)
     }
 
-    /// The conversion ends.
+    /// Ends the conversion.
     pub(crate) fn happen(&mut self) {
         if let Some((_, code)) = self.running.take() {
             self.dr = code;
@@ -153,7 +152,7 @@ impl Adc {
         Ok(match offset {
             0x00 => self.isr,
             0x04 => self.ier,
-            // Calibration and stop are done at once.
+            // Calibration and stop complete immediately.
             0x08 => self.cr,
             0x0C => self.cfgr,
             0x10 => self.cfgr2,
@@ -180,7 +179,7 @@ impl Adc {
             0x08 => {
                 only(ADEN | ADDIS | ADSTART | ADSTP | ADVREGEN | DEEPPWD | ADCAL)?;
                 let powered = value & DEEPPWD == 0 && value & ADVREGEN != 0;
-                // From the bus clock: the asynchronous one is not modelled.
+                // Clocked from the bus; the asynchronous clock is not modelled.
                 let clocked = self.divider() != 0;
                 if value & (ADEN | ADCAL) != 0 && !(powered && clocked) {
                     return Err(Refusal::Bits(value));
@@ -191,7 +190,7 @@ impl Adc {
                 if value & (ADDIS | ADSTP) != 0 {
                     self.running = None;
                 }
-                // Set-only bits stay set until the hardware takes them away.
+                // Set-only bits stay set until the hardware clears them.
                 let kept = self.cr & (ADEN | ADSTART);
                 self.cr = (value | kept) & !(ADCAL | ADDIS | ADSTP);
                 if value & ADSTP != 0 {
@@ -205,7 +204,7 @@ impl Adc {
             0x0C => {
                 // Overrun mode, trigger and alignment; no DMA, no discontinuous mode.
                 only(1 << 31 | 1 << 15 | 1 << 12 | 3 << 10 | 0x1F << 5)?;
-                // Not while it converts, or waits for a trigger (RM0440 §21.7.4).
+                // Not during a conversion or while waiting for a trigger (RM0440 §21.7.4).
                 if self.cr & ADSTART != 0 {
                     return Err(Refusal::Bits(value));
                 }

@@ -1,9 +1,9 @@
-//! Which clock the part bears: with its wait states, at its core voltage, and in which
-//! steps. A real part would read wrong instructions from its flash memory, or none.
+//! Checks that the part can run at its clock, given its wait states, its core voltage and the steps of the
+//! change. A real part would read wrong instructions from its flash memory, or none.
 
 use super::Soc;
 
-/// Voltage of the core (RM0440 section 6.1.5).
+/// Voltage range of the core (RM0440 section 6.1.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Range {
     /// Range 1, boost mode.
@@ -15,14 +15,13 @@ pub(crate) enum Range {
 }
 
 const MHZ: u64 = 1_000_000;
-/// A system clock above this is divided for 1 µs before the processor has all of it
-/// (RM0440 section 7.2.7).
+/// A system clock above this must be divided for 1 µs before the processor may run at full speed (RM0440
+/// section 7.2.7).
 const STEP_ABOVE_HZ: u64 = 80 * MHZ;
 const STEP_NS: u64 = 1_000;
 
 impl Range {
-    /// What each wait state adds to the clock that the flash memory can follow, and the
-    /// highest clock of all [Hz] (RM0440 table 29).
+    /// The clock that the flash memory supports per wait state, and the maximum clock [Hz] (RM0440 table 29).
     const fn limits_hz(self) -> (u64, u64) {
         match self {
             Self::Boost => (34 * MHZ, 170 * MHZ),
@@ -33,7 +32,7 @@ impl Range {
 }
 
 impl Soc {
-    /// Whether the part bears its present clock; otherwise why not.
+    /// Checks that the part supports its present clock; otherwise returns why not.
     pub(super) fn bears_its_clock(&self) -> Result<(), String> {
         let (system, processor) = (self.rcc.system_hz(), self.rcc.hclk_hz());
         let (range, waits) = (self.pwr.range(), self.flash.wait_states());
@@ -58,7 +57,7 @@ impl Soc {
         Ok(())
     }
 
-    /// Whether the processor's clock may go from what it is to `hz` at `cycle`.
+    /// Whether the processor's clock may change from its present value to `hz` at `cycle`.
     pub(super) fn may_step(&self, hz: u64, cycle: u64) -> bool {
         let present = self.time.hz();
         let divided = hz < self.rcc.system_hz();
@@ -80,7 +79,7 @@ mod tests {
     const PWR_CR1: u32 = 0x4000_7000;
     const PWR_CR5: u32 = 0x4000_7080;
 
-    /// The board's way to 170 MHz: from 16 MHz at cycle 0, undivided at `at`.
+    /// The board's sequence to 170 MHz: from 16 MHz at cycle 0, to the divided clock.
     const WAY: [(u32, u32); 8] = [
         (APB1ENR1, 1 << 28),
         (PWR_CR1, 1 << 9),
@@ -92,8 +91,8 @@ mod tests {
         (CFGR, 3 | 8 << 4),
     ];
 
-    /// Goes the way with each write changed by `change`, which leaves one out as `None`,
-    /// and then to the whole clock after `steady` cycles of its half.
+    /// Runs the sequence with each write changed by `change`, which omits a write by returning `None`, then
+    /// switches to the full clock after `steady` cycles at half of it.
     fn go(
         change: impl Fn(u32, u32) -> Option<u32>,
         steady: u64,
@@ -113,7 +112,7 @@ mod tests {
         Ok(())
     }
 
-    /// The way without the writes of `register`, or with another value in them.
+    /// The sequence without the writes to `register`, or with another value in them.
     fn other(register: u32, value: Option<u32>) -> Result<(), String> {
         go(|r, v| if r == register { value } else { Some(v) }, 85, &[])
     }
@@ -149,7 +148,7 @@ mod tests {
             let done = go(|_, v| Some(v), 85, &[(register, value)]);
             assert!(done.is_err(), "{register:#x} = {value:#x}");
         }
-        // Down again in any steps.
+        // Going down again takes no particular steps.
         let down = [(CFGR, 1), (CR, 1 << 8), (ACR, 0x0004_0700)];
         go(|_, value| Some(value), 85, &down).expect("16 MHz needs none of it");
     }

@@ -2,7 +2,7 @@
 
 use super::Refusal;
 
-/// Channels of DMA1 on an STM32G431.
+/// Number of channels of DMA1 on an STM32G431.
 pub(crate) const CHANNELS: usize = 6;
 
 const EN: u32 = 1;
@@ -26,27 +26,27 @@ pub(crate) struct Channel {
 }
 
 impl Channel {
-    /// Enabled, with something left to move.
+    /// Whether it is enabled and has units left to move.
     pub(crate) fn ready(&self) -> bool {
         self.ccr & EN != 0 && self.left > 0
     }
 
-    /// From memory to a peripheral.
+    /// Whether it moves data from memory to a peripheral.
     pub(crate) fn sends(&self) -> bool {
         self.ccr & DIR != 0
     }
 
-    /// Units left.
+    /// Number of units left.
     pub(crate) fn left(&self) -> u32 {
         self.left
     }
 
-    /// Bytes of one unit in memory.
+    /// Bytes per unit in memory.
     pub(crate) fn unit(&self) -> u32 {
         1 << (self.ccr >> 10 & 3)
     }
 
-    /// Address in memory of the next unit.
+    /// Memory address of the next unit.
     pub(crate) fn address(&self) -> u32 {
         let done = self.total - self.left;
         let step = if self.ccr & MINC != 0 { self.unit() } else { 0 };
@@ -62,14 +62,14 @@ pub(crate) struct Dma {
 }
 
 impl Dma {
-    /// Channel that serves a request line and is ready.
+    /// The ready channel that serves a request line.
     pub(crate) fn serving(&self, request: u32) -> Option<usize> {
         self.channels
             .iter()
             .position(|c| c.request == request && c.ready())
     }
 
-    /// One unit of a channel has been moved.
+    /// Records that a channel has moved one unit.
     pub(crate) fn moved(&mut self, channel: usize) {
         let c = &mut self.channels[channel];
         c.left -= 1;
@@ -114,7 +114,7 @@ impl Dma {
     pub(crate) fn write(&mut self, offset: usize, value: u32) -> Result<(), Refusal> {
         if offset == 4 {
             for n in 0..CHANNELS {
-                // Clearing the global flag clears all of the channel.
+                // Clearing the global flag clears all flags of the channel.
                 let clear = value >> (4 * n) & 0xF;
                 let clear = if clear & 1 != 0 { 0xF } else { clear };
                 self.isr &= !(clear << (4 * n));
@@ -125,7 +125,7 @@ impl Dma {
         let c = &mut self.channels[channel];
         let register = (offset - 8) % 20;
         if register != 0 && c.ccr & EN != 0 {
-            // The hardware would ignore it; an image that does so is wrong.
+            // The hardware would ignore this write; an image that makes it is wrong.
             return Err(Refusal::Bits(value));
         }
         match register {

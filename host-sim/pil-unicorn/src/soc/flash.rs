@@ -1,9 +1,9 @@
 //! Flash interface and the two pages of the parameter store.
 //!
-//! The data cache is modelled for the store: what was read through it stays as it was read until
-//! the cache is reset, whatever happens to the flash meanwhile (RM0440 §5.3.7). So is the error
-//! correction: a double word that a falling supply has torn raises the NMI when it is read,
-//! unless the flag of an earlier error stands (§5.7.7).
+//! The data cache is modelled for the store: data read through it stays as first read until the cache is
+//! reset, whatever happens to the flash meanwhile (RM0440 §5.3.7). Error correction is modelled too: reading
+//! a double word that a falling supply has torn raises the NMI, unless the flag of an earlier error is still
+//! set (§5.7.7).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,12 +16,12 @@ pub(crate) const STORE_SIZE: usize = 4096;
 const PAGE: usize = 2048;
 const FIRST_PAGE: u32 = 62;
 
-/// Erase of a page, typical (DATASHEET DS12589: 22.02 ms).
+/// Typical erase time of a page (DATASHEET DS12589: 22.02 ms).
 const ERASE_NS: u64 = 22_020_000;
-/// Programming of a double word, typical (DATASHEET DS12589: 81.69 µs).
+/// Typical programming time of a double word (DATASHEET DS12589: 81.69 µs).
 const PROGRAM_NS: u64 = 81_690;
 
-/// FLASH_ACR: wait states, prefetch and caches, access of the debugger.
+/// FLASH_ACR: wait states, prefetch and caches, debugger access.
 const LATENCY: u32 = 0xF;
 const CACHES: u32 = 7 << 8;
 const DCEN: u32 = 1 << 10;
@@ -30,7 +30,7 @@ const DCRST: u32 = 1 << 12;
 const ICEN: u32 = 1 << 9;
 const DEBUG: u32 = 1 << 18;
 
-/// FLASH_ECCR: an error was corrected, one was found.
+/// FLASH_ECCR: an error was corrected; an error was detected.
 const ECCC: u32 = 1 << 30;
 const ECCD: u32 = 1 << 31;
 const ECC_ADDRESS: u32 = 0x7_FFFF;
@@ -47,7 +47,7 @@ const PGAERR: u32 = 1 << 5;
 const PGSERR: u32 = 1 << 7;
 const BSY: u32 = 1 << 16;
 
-/// The interface and what it holds.
+/// The interface and the contents of the store.
 #[derive(Debug, Clone)]
 pub(crate) struct Flash {
     acr: u32,
@@ -57,21 +57,21 @@ pub(crate) struct Flash {
     eccr: u32,
     /// Double words of the store in the data cache.
     cached: BTreeMap<usize, [u8; UNIT]>,
-    /// Double words that a falling supply has left half written; they outlive resets, too.
+    /// Double words that a falling supply has left half written; they, too, survive resets.
     pub(crate) torn: BTreeSet<usize>,
-    /// A double error was found since this was asked last.
+    /// A double error was found since the last query.
     double_error: bool,
-    /// Contents of the store; outlives resets and power.
+    /// Contents of the store; they survive resets and power loss.
     pub(crate) store: Vec<u8>,
     /// First half of a double word being written.
     half: Option<(usize, u32)>,
-    /// End of the operation under way.
+    /// End of the operation in progress.
     busy_until: u64,
-    /// Cycles for which the processor stalls, to be taken by the machine.
+    /// Time for which the processor stalls [ns]; the machine takes it from here.
     pub(crate) stall_ns: u64,
-    /// Units still completed before the supply fails.
+    /// Units that will still be completed before the supply fails.
     pub(crate) units_left: Option<u16>,
-    /// The supply has failed in a save.
+    /// The supply has failed during a save.
     pub(crate) power_failed: bool,
 }
 
@@ -100,7 +100,7 @@ impl Flash {
         u64::from(self.acr & LATENCY)
     }
 
-    /// One more unit; false when the supply fails in it.
+    /// Counts one more unit; returns false if the supply fails during it.
     fn completes(&mut self) -> bool {
         match &mut self.units_left {
             Some(0) => {
@@ -116,7 +116,7 @@ impl Flash {
         }
     }
 
-    /// Takes the stall that the last access has caused, and notes its end.
+    /// Takes the stall caused by the last access, and notes its end.
     pub(crate) fn take_stall(&mut self, cycle: u64, cycles_of: impl Fn(u64) -> u64) -> u64 {
         let stall = cycles_of(std::mem::take(&mut self.stall_ns));
         if stall > 0 {
@@ -135,7 +135,7 @@ impl Flash {
         })
     }
 
-    /// Whether a double error was found since the last call: the NMI.
+    /// Whether a double error, which raises the NMI, was found since the last call.
     pub(crate) fn take_double_error(&mut self) -> bool {
         std::mem::take(&mut self.double_error)
     }
@@ -144,7 +144,7 @@ impl Flash {
         match offset {
             0x00 => {
                 Refusal::beyond(LATENCY | CACHES | DEBUG | ICRST | DCRST, value)?;
-                // A cache is reset only while it is off.
+                // A cache can only be reset while it is off.
                 let on = |reset: u32, enable: u32| value & reset != 0 && value & enable != 0;
                 if on(DCRST, DCEN) || on(ICRST, ICEN) {
                     return Err(Refusal::Bits(value & (DCRST | ICRST)));
@@ -236,7 +236,7 @@ impl Flash {
         bytes[offset % UNIT]
     }
 
-    /// Writes to the store: two words, low one first, make a unit.
+    /// Writes to the store; two words, low word first, make a unit.
     pub(crate) fn program(
         &mut self,
         offset: usize,

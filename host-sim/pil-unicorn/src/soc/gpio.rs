@@ -11,9 +11,9 @@ pub(crate) struct Port {
     pupdr: u32,
     pub(crate) odr: u32,
     afr: [u32; 2],
-    /// Levels that come from outside, of the pins in `driven`.
+    /// External levels of the pins in `driven`.
     pub(crate) outside: u32,
-    /// Pins that something outside drives.
+    /// Pins that are driven from outside.
     pub(crate) driven: u32,
     /// Levels at the last read of the inputs.
     pub(crate) read: u32,
@@ -48,7 +48,7 @@ impl Port {
         self.mode(pin) == 1 && self.odr >> pin & 1 == 0
     }
 
-    /// Whether a pin is an input, analogue as after a reset, or an output at low.
+    /// Whether a pin is an input, analogue as after a reset, or an output driven low.
     pub(crate) fn is_idle(&self, pin: u32) -> bool {
         matches!(self.mode(pin), 0 | 3) || self.drives_low(pin)
     }
@@ -69,7 +69,7 @@ impl Port {
             1 => self.odr >> pin & 1 != 0,
             3 => false,
             _ if self.driven >> pin & 1 != 0 => self.outside >> pin & 1 != 0,
-            // Nobody drives it: the pull decides; a floating pin reads low.
+            // Nothing drives the pin: the pull resistor decides; a floating pin reads low.
             _ => self.pupdr >> (2 * pin) & 3 == 1,
         }
     }

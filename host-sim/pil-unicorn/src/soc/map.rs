@@ -1,9 +1,9 @@
-//! The memory map: which peripheral answers at an address, and with what refusal.
+//! The memory map: which peripheral answers at an address, and what it refuses.
 
 use super::{ADC, Refusal, Soc, USART, USART2};
 
 impl Soc {
-    /// Name and clock-enable of the peripheral at an address.
+    /// Name, base and clock enable of the peripheral at an address.
     fn block(&self, address: u32) -> Option<(&'static str, u32, bool)> {
         let enr = &self.rcc.enr;
         let on = |bus: usize, bit: u32| enr[bus] >> bit & 1 != 0;
@@ -32,7 +32,7 @@ impl Soc {
         })
     }
 
-    /// The peripheral and register of an address, for messages.
+    /// Peripheral and register at an address, for messages.
     pub(crate) fn name(&self, address: u32) -> String {
         match self.block(address) {
             Some((name, base, _)) => format!("{name}+{:#05x}", address - base),
@@ -46,7 +46,7 @@ impl Soc {
             .position(|n| *n == name)
     }
 
-    /// A read of a peripheral's register.
+    /// Reads a peripheral's register.
     ///
     /// # Errors
     /// A sentence that names the register and what is wrong.
@@ -63,7 +63,7 @@ impl Soc {
         if !clocked {
             return Err(format!("read of {} with its clock off", self.name(address)));
         }
-        // Narrow reads see their part of the word.
+        // Narrow reads return their part of the word.
         let part = (address & 3) * 8;
         let offset = ((address - base) & !3) as usize;
         let value = match name {
@@ -96,7 +96,7 @@ impl Soc {
             })
     }
 
-    /// A write to a peripheral's register.
+    /// Writes a peripheral's register.
     ///
     /// # Errors
     /// A sentence that names the register and what is wrong.
@@ -116,8 +116,7 @@ impl Soc {
                 self.name(address)
             ));
         }
-        // Half-word writes are taken for 16-bit registers; the flash data
-        // path is elsewhere.
+        // Half-word writes are accepted as writes to 16-bit registers; the flash data path is elsewhere.
         if size == 1 && !name.starts_with("USART") || address & 3 != 0 {
             return Err(format!("{size}-byte write to {}", self.name(address)));
         }

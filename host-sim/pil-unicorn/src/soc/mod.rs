@@ -1,8 +1,7 @@
-//! The peripherals of an STM32G431, register by register, as far as the
-//! board's images use them.
+//! The peripherals of an STM32G431, register by register, to the extent that the board's images use them.
 //!
-//! What is not modelled is refused with the names of peripheral and register:
-//! a silent zero would let an image run that fails on the real part.
+//! Anything not modelled is refused with the names of the peripheral and the register: a silent zero would
+//! let an image run that fails on the real part.
 
 pub(crate) mod adc;
 mod clock;
@@ -30,16 +29,16 @@ use crate::wiring;
 /// Why an access is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Refusal {
-    /// No model of this register.
+    /// The register is not modelled.
     Register,
-    /// Bits that no model knows, or a value that makes no sense.
+    /// Bits that are not modelled, or an invalid value.
     Bits(u32),
-    /// A write to the flash memory out of order.
+    /// An out-of-order write to the flash memory.
     Store,
 }
 
 impl Refusal {
-    /// Of a value with other bits than those that a model knows.
+    /// Refuses a value with bits other than the modelled ones.
     fn beyond(known: u32, value: u32) -> Result<(), Self> {
         match value & !known {
             0 => Ok(()),
@@ -48,12 +47,12 @@ impl Refusal {
     }
 }
 
-/// Requests of the multiplexer that the images use (RM0440 table 91).
+/// Multiplexer requests that the images use (RM0440 table 91).
 const REQUEST_USART1_RX: u32 = 24;
 const REQUEST_USART1_TX: u32 = 25;
 const REQUEST_TIM2_CH4: u32 = 59;
 
-/// Lines of the NVIC (RM0440 table 97).
+/// NVIC lines (RM0440 table 97).
 const IRQ_PVD: u32 = 1;
 const IRQ_DMA1_1: u32 = 11;
 const IRQ_ADC: u32 = 18;
@@ -73,8 +72,8 @@ const TIM3: usize = 2;
 const TIM8: usize = 3;
 const TIM15: usize = 4;
 
-/// What has events, in the order in which they are taken at one cycle: timers,
-/// converter, serial interfaces.
+/// Sources of events, in the order in which events of the same cycle are taken: timers, converter, serial
+/// interfaces.
 const ADC: usize = 5;
 const USART: usize = 6;
 const USART2: usize = 7;
@@ -83,9 +82,9 @@ const SOURCES: usize = 8;
 /// A transfer that the machine carries out in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Transfer {
-    /// A byte received, to this address.
+    /// Store a received byte at this address.
     Store { address: u32, byte: u8 },
-    /// One unit from this address to a register of a peripheral.
+    /// Move one unit from this address to a peripheral's register.
     Load {
         channel: usize,
         address: u32,
@@ -93,7 +92,7 @@ pub(crate) enum Transfer {
     },
 }
 
-/// All of it.
+/// All peripherals.
 #[derive(Debug, Clone)]
 pub(crate) struct Soc {
     pub(crate) rcc: Rcc,
@@ -104,51 +103,50 @@ pub(crate) struct Soc {
     pub(crate) ports: [Port; 4],
     pub(crate) tim: [Tim; 5],
     pub(crate) adc: Adc,
-    /// The bus.
+    /// The bus interface.
     pub(crate) usart: Usart,
-    /// USART2: the line to the PC of the images for a bench board.
+    /// USART2: the line to the PC, for images of a bench board.
     pub(crate) serial: Usart,
-    /// What went out on that line.
+    /// Bytes sent on that line.
     pub(crate) serial_out: Vec<u8>,
     pub(crate) dma: Dma,
     pub(crate) unique_id: [u8; 12],
     pub(crate) time: Time,
     /// Wiper of the potentiometer as latched at the newest edge.
     pub(crate) wiper: u16,
-    /// Transmissions that did not leave whole: they outlasted the driver's one-shot, or
-    /// their pin or the driver's is not switched to them.
+    /// Transmissions that did not leave complete: they outlasted the driver's one-shot, or the transmit pin
+    /// or the driver's pin is not switched to its function.
     pub(crate) driver_timeouts: u16,
-    /// Longest that the driver was on, whole µs.
+    /// Longest time that the driver was on, in whole µs.
     pub(crate) driver_on_us: u32,
     /// Cycle of the newest tick edge.
     pub(crate) edge: Option<u64>,
-    /// Frames that went out whole: start cycle and bytes.
+    /// Frames sent completely: start cycle and bytes.
     pub(crate) gone: Vec<(u64, Vec<u8>)>,
-    /// The frame that has been started last: start cycle, address, length.
+    /// The frame started last: start cycle, address, length.
     pub(crate) started: Option<(u64, u32, u32)>,
     burst_high: Option<(u64, u64)>,
-    /// Cycle of the next event of each source. Asked after every block, so it is
-    /// kept: whoever changes a source calls [`Self::plan`].
+    /// Cycle of the next event of each source. It is needed after every block and is therefore kept: code
+    /// that changes a source calls [`Self::plan`].
     due: [u64; SOURCES],
     /// The next event of each timer.
     events: [Event; ADC],
-    /// Cycle at which the watchdog bites.
+    /// Cycle at which the watchdog expires.
     bites_at: u64,
-    /// The program starts, as it does after every reset: how long that takes is known when its
-    /// tick timer is started, and so what of the line it can have heard. Until then it hears
-    /// nothing.
+    /// The program is starting, as after every reset. How long this takes, and so what it can have heard on
+    /// the line, is known only when its tick timer is started. Until then it hears nothing.
     pub(crate) starting: bool,
 }
 
 impl Soc {
-    /// Whether every pin that drives a valve, the motor or the dump is an output at low.
+    /// Whether every pin that drives a valve, the motor or the dump is an output driven low.
     pub(crate) fn outputs_are_low(&self) -> bool {
         let mut pins = wiring::POWER_PINS.iter();
         pins.all(|(port, pin, _)| self.ports[*port].drives_low(*pin))
     }
 
-    /// The first pin that drives a valve, the motor or the dump and is neither as a reset
-    /// leaves it nor an output at low: its name.
+    /// Name of the first pin that drives a valve, the motor or the dump and is neither as a reset leaves it
+    /// nor an output driven low.
     pub(crate) fn power_pin_in_use(&self) -> Option<&'static str> {
         let mut pins = wiring::POWER_PINS.iter();
         let used = pins.find(|(port, pin, _)| !self.ports[*port].is_idle(*pin));
@@ -206,7 +204,7 @@ impl Soc {
         &self.tim[TIM8]
     }
 
-    /// Whether a conversion is under way.
+    /// Whether a conversion is in progress.
     pub(crate) fn converts(&self) -> bool {
         self.adc.next().is_some()
     }
@@ -225,7 +223,7 @@ impl Soc {
         }
     }
 
-    /// When a source has its next event, after it was changed.
+    /// Updates the next event of a source after a change.
     fn plan(&mut self, source: usize) {
         self.due[source] = match source {
             ADC => self.adc.next(),
@@ -239,19 +237,19 @@ impl Soc {
         .unwrap_or(u64::MAX);
     }
 
-    /// Cycle at which the watchdog bites.
+    /// Cycle at which the watchdog expires.
     pub(crate) fn bites_at(&self) -> u64 {
         self.bites_at
     }
 
-    /// When the watchdog bites, after it was changed or the clock was.
+    /// Updates when the watchdog expires, after it or the clock has changed.
     fn plan_bite(&mut self) {
         let bite = self.watchdog.bites_at_ns();
         self.bites_at = bite.map_or(u64::MAX, |ns| self.time.cycle_of(ns));
     }
 
-    /// Cycle `cycle` is `ns` from now, cycle `now`, on. Bytes on the line keep their times;
-    /// those whose times have been passed over are lost.
+    /// From now (cycle `now`) on, cycle `cycle` is at `ns`. Bytes on the line keep their times; bytes whose
+    /// times have been skipped are lost.
     pub(crate) fn align(&mut self, cycle: u64, ns: u64, now: u64) {
         self.starting = false;
         let moved = self.time.align(cycle, ns);
@@ -267,7 +265,7 @@ impl Soc {
         self.due.iter().copied().min().unwrap_or(u64::MAX)
     }
 
-    /// Carries out the next event if it is due; gives its cycle.
+    /// Carries out the next event if it is due; returns its cycle.
     pub(crate) fn step(&mut self, cycle: u64) -> Option<u64> {
         let at = self.next_at();
         if at > cycle {
@@ -299,7 +297,7 @@ impl Soc {
         Some(at)
     }
 
-    /// A byte will have arrived at `cycle`.
+    /// Announces a byte that arrives completely at `cycle`.
     pub(crate) fn expect(&mut self, cycle: u64, byte: u8) {
         self.usart.expect(cycle, byte);
         self.plan(USART);
@@ -310,7 +308,8 @@ impl Soc {
         self.usart.expects()
     }
 
-    /// The wheel stands at `edges` since power-up; what its pins do not carry is not counted.
+    /// Sets the wheel's position, `edges` since power-up; movement while the encoder's pins are not connected
+    /// to the counter is not counted.
     pub(crate) fn turn(&mut self, edges: i32) {
         let carries = |pin: &u32| self.ports[1].carries(*pin, wiring::ENCODER_FUNCTION);
         if wiring::ENCODER.iter().all(carries) {
@@ -328,7 +327,7 @@ impl Soc {
         }
     }
 
-    /// What the converter sees of the wiper.
+    /// The wiper's value as the converter sees it.
     fn wiper_code(&self) -> u16 {
         if self.ports[0].is_analogue(wiring::WIPER) {
             self.wiper
@@ -338,7 +337,7 @@ impl Soc {
         }
     }
 
-    /// From when to when the transceiver drives the line in the one-shot that runs.
+    /// Interval in which the transceiver drives the line in the current one-shot.
     fn driver(&self) -> Option<(u64, u64)> {
         let pin = self.ports[1].carries(wiring::DRIVER_ENABLE, 1);
         let tim = &self.tim[TIM15];
@@ -353,7 +352,7 @@ impl Soc {
         let driver = self.driver();
         let drives = driver.is_some_and(|(on, off)| (on..off).contains(&at));
         let hears = self.ports[1].carries(wiring::BUS_RX, wiring::BUS_FUNCTION);
-        // DE and /RE are one line.
+        // DE and /RE share one line.
         self.usart.happen(at, drives || !hears || self.starting);
         if let Some(driver) = driver {
             self.burst_high = Some(driver);
@@ -361,7 +360,7 @@ impl Soc {
         self.finish_burst();
     }
 
-    /// Bytes come in on the second serial line, one after the other from `cycle` on.
+    /// Announces bytes that arrive on the second serial line, back to back from `cycle` on.
     pub(crate) fn expect_serial(&mut self, cycle: u64, bytes: &[u8]) {
         let byte_cycles = self.serial.byte_cycles();
         for (count, byte) in (1..).zip(bytes) {
@@ -399,8 +398,7 @@ impl Soc {
         }
     }
 
-    /// The one-shot of the driver ends. What still wants to go out goes nowhere: the
-    /// transmitter does not know of it.
+    /// Ends the driver's one-shot. Anything still being sent goes nowhere; the transmitter does not notice.
     fn driver_off(&mut self, at: u64) {
         if let Some((on, _)) = self.driver() {
             let us = at.saturating_sub(on) * 1_000_000 / self.time.hz();
@@ -408,7 +406,7 @@ impl Soc {
         }
     }
 
-    /// The next transfer that DMA owes, and its bookkeeping.
+    /// The next pending DMA transfer, with its bookkeeping.
     pub(crate) fn transfer(&mut self) -> Option<Transfer> {
         if self.usart.dma_waits()
             && let Some(channel) = self.dma.serving(REQUEST_USART1_RX)
@@ -423,7 +421,7 @@ impl Soc {
             && self.tim[TIM2].sr & 1 << 4 != 0
             && let Some(channel) = self.dma.serving(REQUEST_TIM2_CH4)
         {
-            // The request is answered once a match.
+            // The request is answered once per match.
             self.tim[TIM2].sr &= !(1 << 4);
             return Some(self.load(channel));
         }
@@ -446,8 +444,7 @@ impl Soc {
         transfer
     }
 
-    /// What stands ready in hardware to be sent without the program: start,
-    /// address and length of the frame.
+    /// The frame that hardware is ready to send without the program: start, address and length.
     pub(crate) fn armed(&self, cycle: u64) -> Option<(u64, u32, u32)> {
         let clock = &self.tim[TIM2];
         let driver = &self.tim[TIM15];

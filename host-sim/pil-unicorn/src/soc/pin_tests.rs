@@ -1,4 +1,4 @@
-//! What the pins of bus and encoder are switched to decides what comes and goes.
+//! The functions selected for the pins of bus and encoder decide what comes in and goes out.
 
 use super::*;
 

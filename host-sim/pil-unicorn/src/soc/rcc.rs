@@ -1,5 +1,5 @@
-//! Reset and clock control, power control, external interrupt of the
-//! brown-out detector, and the independent watchdog.
+//! Reset and clock control, power control, the external interrupt of the voltage detector, and the
+//! independent watchdog.
 
 use super::Refusal;
 use super::clock::Range;
@@ -36,9 +36,9 @@ pub(crate) struct Rcc {
     /// Flag of the clock security system.
     cssf: bool,
     csr: u32,
-    /// AHB1, AHB2, APB1-1, APB2 enables.
+    /// Enable bits of AHB1, AHB2, APB1-1, APB2.
     pub(crate) enr: [u32; 4],
-    /// The crystal swings.
+    /// The crystal oscillates.
     pub(crate) crystal: bool,
 }
 
@@ -51,14 +51,14 @@ impl Rcc {
             cier: 0,
             cssf: false,
             csr: cause,
-            // Flash interface on at reset.
+            // The flash interface is on after a reset.
             enr: [1 << 8, 0, 0, 0],
             crystal,
         }
     }
 
-    /// The crystal stops. With the clock security system the processor goes on with the internal
-    /// oscillator, and is told; gives whether it is.
+    /// The crystal stops. With the clock security system, the processor continues on the internal oscillator
+    /// and is notified. Returns whether this is the case.
     pub(crate) fn crystal_stops(&mut self) -> bool {
         let watched = self.cr & CSSON != 0 && self.ready() & HSERDY != 0;
         self.crystal = false;
@@ -101,7 +101,7 @@ impl Rcc {
         }
     }
 
-    /// Whether the source of the system clock of this choice runs.
+    /// Whether the selected source of the system clock is running.
     fn runs(&self, choice: u32) -> bool {
         let ready = self.ready();
         match choice & 3 {
@@ -154,13 +154,13 @@ impl Rcc {
             0x00 => {
                 only(HSION | HSIRDY | HSEON | HSERDY | CSSON | PLLON | PLLRDY)?;
                 self.cr = value | HSIRDY;
-                // Nor is the clock taken away that it runs on.
+                // The clock on which the processor runs may not be removed either.
                 if !self.runs(self.cfgr) {
                     return Err(Refusal::Bits(value));
                 }
             }
             0x08 => {
-                // The processor would stand still on a clock that is not there.
+                // The processor would stop on a clock that is not running.
                 if !self.runs(value) {
                     return Err(Refusal::Bits(value & 3));
                 }
@@ -175,7 +175,7 @@ impl Rcc {
             0x4C => self.enr[1] = value,
             0x58 => self.enr[2] = value,
             0x60 => self.enr[3] = value,
-            // Other clocks of serial ports and converter are not modelled.
+            // Other clocks for serial ports and converter are not modelled.
             0x88 => only(0)?,
             0x94 => {
                 if value & RMVF != 0 {
@@ -205,14 +205,14 @@ pub(crate) struct Pwr {
 }
 
 const PVD_LINE: u32 = 1 << 16;
-/// Range of the core's voltage: 1 or 2.
+/// Voltage range of the core: 1 or 2.
 const VOS: u32 = 3 << 9;
 const VOS_RANGE_1: u32 = 1 << 9;
 const VOS_RANGE_2: u32 = 2 << 9;
 /// Internal wake-up line, on after reset; dead-battery resistors of USB-C off.
 const EIWUL: u32 = 1 << 15;
 const UCPD1_DBDIS: u32 = 1 << 14;
-/// No boost in range 1.
+/// Range 1 without boost.
 const R1MODE: u32 = 1 << 8;
 
 impl Default for Pwr {
@@ -243,17 +243,17 @@ impl Pwr {
         self.low = low;
     }
 
-    /// Whether the detector says that the supply is low.
+    /// Whether the detector reports a low supply.
     pub(crate) fn detects(&self) -> bool {
         self.low && self.cr2 & 1 != 0
     }
 
-    /// Whether the dead-battery resistors are off the pins.
+    /// Whether the dead-battery resistors are disconnected from the pins.
     pub(crate) fn dead_battery_is_off(&self) -> bool {
         self.cr3 & UCPD1_DBDIS != 0
     }
 
-    /// Voltage of the core: ready at once.
+    /// Voltage range of the core, which is ready immediately.
     pub(crate) fn range(&self) -> Range {
         match (self.cr1 & VOS == VOS_RANGE_1, self.cr5 & R1MODE != 0) {
             (true, false) => Range::Boost,
@@ -272,7 +272,7 @@ impl Pwr {
             0x00 => self.cr1,
             0x04 => self.cr2,
             0x08 => self.cr3,
-            // Regulators are ready at once; the flag of the detector.
+            // The regulators are ready immediately; this is the detector's flag.
             0x14 => u32::from(self.low && self.cr2 & 1 != 0) << 11,
             0x80 => self.cr5,
             _ => return Err(Refusal::Register),
@@ -319,15 +319,15 @@ impl Pwr {
     }
 }
 
-/// Independent watchdog. Once started it stops at a reset alone.
+/// Independent watchdog. Once started, only a reset stops it.
 #[derive(Debug, Clone)]
 pub(crate) struct Watchdog {
     open: bool,
     prescaler: u32,
     reload: u32,
-    /// When it was fed last [ns], if it runs; negative before time zero.
+    /// When it was last fed [ns], if it runs; negative before time zero.
     fed_ns: Option<i64>,
-    /// It has been fed since this was asked last.
+    /// Whether it has been fed since the last query.
     fed: bool,
 }
 
@@ -349,19 +349,18 @@ impl Watchdog {
         (u64::from(self.reload) + 1) * divider * 1_000_000_000 / LSI_HZ
     }
 
-    /// When it bites [ns].
+    /// When it expires [ns].
     pub(crate) fn bites_at_ns(&self) -> Option<u64> {
         let at = self.fed_ns? + self.timeout_ns() as i64;
         Some(at.max(0) as u64)
     }
 
-    /// Whether it has been fed since the last call: the program feeds it when the
-    /// work of a tick is done.
+    /// Whether it has been fed since the last call: the program feeds it at the end of a tick's work.
     pub(crate) fn take_fed(&mut self) -> bool {
         std::mem::take(&mut self.fed)
     }
 
-    /// The time scale moves by `ns`.
+    /// Moves the time scale by `ns`.
     pub(crate) fn shift(&mut self, ns: i64) {
         self.fed_ns = self.fed_ns.map(|fed| fed + ns);
     }

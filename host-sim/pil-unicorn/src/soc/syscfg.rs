@@ -1,4 +1,4 @@
-//! System configuration: what raises the timers' breaks besides their pins (RM0440 §10.2.8).
+//! System configuration: sources of the timers' breaks other than their pins (RM0440 §10.2.8).
 
 use super::{Refusal, Soc, TIM1, TIM8, TIM15};
 
@@ -9,12 +9,12 @@ const PVDL: u32 = 1 << 2;
 const ECCL: u32 = 1 << 3;
 const SPF: u32 = 1 << 8;
 
-/// What can raise the breaks of all timers at once.
+/// A source that can raise the breaks of all timers at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BreakSource {
     /// The processor has locked up.
     LockUp,
-    /// A parity error of RAM.
+    /// RAM has a parity error.
     RamParity,
     /// The supply is below the level of the voltage detector.
     Supply,
@@ -25,7 +25,7 @@ pub(crate) enum BreakSource {
 /// The registers that the images use.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Syscfg {
-    /// Connections, which only a reset takes away, and the flag of the parity error.
+    /// Connections, which only a reset removes, and the flag of the parity error.
     cfgr2: u32,
 }
 
@@ -59,7 +59,7 @@ impl Syscfg {
 }
 
 impl Soc {
-    /// Something has happened that raises the breaks if it is connected.
+    /// Raises the breaks if this source is connected.
     pub(crate) fn raise_break(&mut self, source: BreakSource) {
         if source == BreakSource::RamParity {
             self.syscfg.cfgr2 |= SPF;
@@ -71,7 +71,7 @@ impl Soc {
         }
     }
 
-    /// The crystal stops; whether the processor is told.
+    /// The crystal stops; returns whether the processor is notified.
     pub(crate) fn crystal_stops(&mut self, cycle: u64) -> bool {
         let stops = self.rcc.crystal_stops();
         if stops {
@@ -101,7 +101,7 @@ mod tests {
     const MOE: u32 = 1 << 15;
     const BKE: u32 = 1 << 12;
 
-    /// Outputs of TIM1 on, with the break enabled and `cfgr2` written.
+    /// A part with the outputs of TIM1 on, the break enabled and `cfgr2` written.
     fn running(cfgr2: u32) -> Soc {
         let mut soc = Soc::new(vec![0xFF; STORE_SIZE], [0; 12], true, 0);
         soc.rcc.enr[3] = 1 | 1 << 11;
@@ -122,7 +122,7 @@ mod tests {
                 soc.raise_break(source);
                 let on = soc.read(BDTR, 4, 0).expect("modelled") & MOE != 0;
                 assert_eq!(on, !connected, "{source:?}");
-                // Not while the flag of the break stands.
+                // Not while the break flag is set.
                 soc.write(BDTR, 4, MOE | BKE, 0).expect("modelled");
                 let on = soc.read(BDTR, 4, 0).expect("modelled") & MOE != 0;
                 assert_eq!(on, !connected, "{source:?}");

@@ -1,5 +1,5 @@
-//! USART1: 8N1, reception by DMA with character match, transmission by DMA. USART2: the
-//! same interface, polled, with its FIFOs.
+//! USART1: 8N1, reception by DMA with character match, transmission by DMA. USART2: the same interface,
+//! polled, with its FIFOs.
 
 use std::collections::VecDeque;
 
@@ -24,12 +24,12 @@ const ORE: u32 = 1 << 3;
 const TEACK: u32 = 1 << 21;
 const REACK: u32 = 1 << 22;
 
-/// Bytes of either FIFO.
+/// Bytes per FIFO.
 const FIFO: usize = 8;
-/// Looks at an interface with nothing received after which the program is taken to wait.
+/// Number of polls with nothing received after which the program counts as waiting.
 const LOOKS: u32 = 8;
 
-/// Bits of one byte on the line.
+/// Bits per byte on the line.
 const BITS: u64 = 10;
 
 /// The interface.
@@ -40,21 +40,20 @@ pub(crate) struct Usart {
     cr3: u32,
     brr: u32,
     isr: u32,
-    /// Byte that was read last.
+    /// Byte read last.
     rdr: u8,
     received: VecDeque<u8>,
-    /// Bytes that wait for the shift register.
+    /// Bytes waiting for the shift register.
     waiting: VecDeque<u8>,
-    /// Looks since the program did anything else here, or found something received.
+    /// Polls since the program did anything else here, or found something received.
     looks: u32,
-    /// Byte in the shift register: its end.
+    /// End of the byte in the shift register.
     shifting_until: Option<u64>,
-    /// Bytes on their way in: end of each and the byte.
+    /// Arriving bytes, each with its end.
     incoming: VecDeque<(u64, u8)>,
-    /// Bytes that went out since the transmitter was last idle: start of the
-    /// first, and all.
+    /// Bytes sent since the transmitter was last idle: start of the first, and all bytes.
     pub(crate) burst: Option<(u64, Vec<u8>)>,
-    /// A byte that is sent takes this many times as long as it should.
+    /// Factor by which a sent byte takes longer than it should.
     pub(crate) stretch: u64,
 }
 
@@ -79,7 +78,7 @@ impl Default for Usart {
 }
 
 impl Usart {
-    /// A byte will have arrived at `cycle`.
+    /// Announces a byte that arrives completely at `cycle`.
     pub(crate) fn expect(&mut self, cycle: u64, byte: u8) {
         self.incoming.push_back((cycle, byte));
     }
@@ -89,8 +88,7 @@ impl Usart {
         !self.incoming.is_empty()
     }
 
-    /// All bytes on their way come `cycles` sooner; those that would have come before
-    /// `now` do not come.
+    /// Makes all bytes on their way arrive `cycles` sooner; bytes that would arrive before `now` are lost.
     pub(crate) fn come_sooner(&mut self, cycles: u64, now: u64) {
         self.incoming.retain_mut(|(at, _)| {
             *at = at.saturating_sub(cycles);
@@ -108,7 +106,7 @@ impl Usart {
         self.byte_cycles() * self.stretch
     }
 
-    /// Whether the program looks again and again and finds nothing received; once.
+    /// Whether the program polls repeatedly and finds nothing received. Reports each wait once.
     pub(crate) fn take_wait(&mut self) -> bool {
         let waits = self.waits();
         if waits {
@@ -117,13 +115,12 @@ impl Usart {
         waits
     }
 
-    /// As [`Self::take_wait`], which is still to come.
+    /// As [`Self::take_wait`], without resetting it.
     pub(crate) fn waits(&self) -> bool {
         self.looks >= LOOKS
     }
 
-    /// Room of the receiver. Without overrun detection its FIFO is passed by (RM0440,
-    /// USART_CR3.OVRDIS).
+    /// Capacity of the receiver. Without overrun detection its FIFO is bypassed (RM0440, USART_CR3.OVRDIS).
     fn receiver_room(&self) -> usize {
         if self.cr1 & FIFOEN != 0 && self.cr3 & OVRDIS == 0 {
             FIFO
@@ -132,12 +129,12 @@ impl Usart {
         }
     }
 
-    /// Room of the transmitter.
+    /// Capacity of the transmitter.
     fn transmitter_room(&self) -> usize {
         if self.cr1 & FIFOEN != 0 { FIFO } else { 1 }
     }
 
-    /// The flags, with those that follow from what is held.
+    /// The flags, including those derived from the FIFOs.
     fn flags(&self) -> u32 {
         let flag = |on: bool, flag: u32| if on { flag } else { 0 };
         self.isr
@@ -151,7 +148,7 @@ impl Usart {
         arrival.into_iter().chain(self.shifting_until).min()
     }
 
-    /// Carries out what is due at `cycle`. `deaf`: the transceiver's receiver is off.
+    /// Carries out what is due at `cycle`. If `deaf`, the transceiver's receiver is off.
     pub(crate) fn happen(&mut self, cycle: u64, deaf: bool) {
         if let Some((at, byte)) = self.incoming.front().copied()
             && at <= cycle
@@ -203,7 +200,7 @@ impl Usart {
         }
     }
 
-    /// A received byte waits for DMA.
+    /// Whether a received byte waits for DMA.
     pub(crate) fn dma_waits(&self) -> bool {
         self.cr3 & DMAR != 0 && !self.received.is_empty()
     }
@@ -217,12 +214,12 @@ impl Usart {
         }
     }
 
-    /// Whether DMA may hand over a byte to send.
+    /// Whether DMA may supply a byte to send.
     pub(crate) fn wants_byte(&self) -> bool {
         self.cr3 & DMAT != 0 && self.flags() & TXE != 0 && self.cr1 & (UE | TE) == UE | TE
     }
 
-    /// A byte to send.
+    /// Sends a byte.
     pub(crate) fn send(&mut self, byte: u8, cycle: u64) {
         if self.waiting.len() >= self.transmitter_room() {
             self.waiting.pop_back();
@@ -287,7 +284,7 @@ impl Usart {
                 only(0xFFFF)?;
                 self.brr = value;
             }
-            // Requests: to flush what was received.
+            // Request register: flush the received bytes.
             0x18 => {
                 only(1 << 3)?;
                 self.received.clear();

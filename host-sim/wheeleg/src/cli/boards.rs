@@ -11,7 +11,7 @@ use wheeleg_telemetry::{Keep, Recorder};
 
 use super::{print, stop_on_signals, tell};
 
-/// Scenario without a name: a level floor.
+/// Default scenario: a level floor.
 const SCENARIO: &str = "stand";
 
 /// Arguments of `wheeleg boards`.
@@ -28,7 +28,7 @@ pub(super) struct BoardsArgs {
     pty: bool,
 }
 
-/// Lets the boards live until it is told to stop.
+/// Runs the boards until told to stop.
 pub(super) fn command(args: &BoardsArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let scenario = builtin::scenario(&args.scenario)?;

@@ -1,4 +1,4 @@
-//! `wheeleg campaign`: one scenario or cylinder many times, on as many computers as there are.
+//! `wheeleg campaign`: one scenario or cylinder many times, on as many computers as are available.
 
 mod print;
 
@@ -36,13 +36,13 @@ enum Command {
     Submit(SubmitArgs),
     /// Show the progress of a campaign; needs only its folder.
     Status(StatusArgs),
-    /// Make one table of the parts in one or more folders.
+    /// Merge the parts in one or more folders into one table.
     Merge(MergeArgs),
-    /// Make a page of a table: rates with intervals, distributions, correlations, worst cases.
+    /// Make a page from a table: rates with intervals, distributions, correlations, worst cases.
     Report(ReportArgs),
     /// Repeat one case, with its row, log, figures and report.
     Replay(ReplayArgs),
-    /// Run one case into a file: what `run` does with one that may end the process.
+    /// Run one case and write its row to a file; `run` does this for a case that may crash the process.
     #[command(hide = true)]
     Case(CaseArgs),
 }
@@ -61,10 +61,10 @@ struct RunArgs {
     /// Completions of an indexed Kubernetes job.
     #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
     shards: Option<u64>,
-    /// Threads [default: all cores].
+    /// Number of threads [default: all cores].
     #[arg(long, value_name = "N", value_parser = whole(1_u64, 4096))]
     threads: Option<u64>,
-    /// Only the first cases, as a pilot; a later run continues from them.
+    /// Run only the first cases, as a pilot; a later run continues from them.
     #[arg(long, value_name = "N", value_parser = whole(1_u64, u64::MAX))]
     first: Option<u64>,
     /// Print the cases instead of running them.
@@ -73,7 +73,8 @@ struct RunArgs {
     /// Exit with code 1 if a case of this shard misses a required target or has no result.
     #[arg(long)]
     strict: bool,
-    /// How progress is shown: a bar, or a line every 30 s if standard error is no terminal; or lines of JSON.
+    /// Form of the progress report: a bar, or a line every 30 s if standard error is not a terminal; or lines
+    /// of JSON.
     #[arg(long, value_enum, default_value = "bar")]
     progress: Shown,
 }
@@ -91,16 +92,16 @@ struct SubmitArgs {
     /// Folder for the parts, on a disk that all computers share.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Tasks.
+    /// Number of tasks.
     #[arg(long, value_name = "N", value_parser = whole(1_u64, 1_000_000))]
     shards: u64,
     /// Submit a Slurm array, and a job that merges its results.
     #[arg(long, required_unless_present = "kubernetes")]
     slurm: bool,
-    /// Print an indexed job of Kubernetes, for `kubectl apply -f -`.
+    /// Print an indexed Kubernetes job, for `kubectl apply -f -`.
     #[arg(long, conflicts_with = "slurm")]
     kubernetes: bool,
-    /// Print what would be submitted.
+    /// Print what would be submitted instead of submitting it.
     #[arg(long)]
     dry_run: bool,
     /// Further argument of sbatch, such as `--partition=long`; may be given several times.
@@ -118,13 +119,13 @@ struct SubmitArgs {
 struct StatusArgs {
     /// Folder of a campaign.
     dir: PathBuf,
-    /// Only one shard.
+    /// Show only one shard.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Print it every two seconds until all cases have a row.
+    /// Print the status every two seconds until all cases have a row.
     #[arg(long)]
     watch: bool,
-    /// Print it as JSON.
+    /// Print the status as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -134,7 +135,7 @@ struct MergeArgs {
     /// Folders of one campaign.
     #[arg(required = true)]
     dirs: Vec<PathBuf>,
-    /// The table.
+    /// Table to write.
     #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
     out: PathBuf,
     /// Merge even if cases are missing: a table of the finished cases, for example of a pilot.
@@ -152,7 +153,7 @@ struct ReportArgs {
     /// Second table, from another version of the program, for a case-by-case comparison.
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
-    /// The page [default: next to the table].
+    /// Page to write [default: next to the table].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the findings as JSON on stdout.
@@ -181,7 +182,7 @@ struct CaseArgs {
     row: PathBuf,
 }
 
-/// Does what the command line says. Errors have exit codes of their own.
+/// Runs the command. Errors have their own exit codes.
 pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
     let result = match &args.command {
         Command::Run(args) => run_command(args),
@@ -199,7 +200,7 @@ pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
     }))
 }
 
-/// Exit code of a command that a signal has stopped: what a scheduler has ended, it starts again.
+/// Exit code of a command that a signal has stopped: a scheduler restarts what it has ended.
 fn stopped_code(signal: Signal) -> u8 {
     match signal {
         Signal::Interrupt => signal.exit_code(),
@@ -207,7 +208,7 @@ fn stopped_code(signal: Signal) -> u8 {
     }
 }
 
-/// A plan, and what `plan.json` says of it.
+/// A plan and its `plan.json`.
 fn plan_of(name_or_path: &str) -> Result<(Plan, PlanFile), CampaignError> {
     let is_json = Path::new(name_or_path)
         .extension()
@@ -273,10 +274,10 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// From so much on the program says how much disk the logs of a campaign take, bytes.
+/// Size from which the disk space of a campaign's logs is announced, bytes.
 const MUCH_BYTES: f64 = 1e9;
 
-/// Tells of the disk that logs take, where every case keeps its own.
+/// Announces the disk space of the logs, if every case keeps its log.
 fn announce(cases: &Cases<'_>, first: Option<u64>) {
     let plan = cases.plan();
     if plan.keep != KeepLogs::All {
@@ -370,9 +371,9 @@ fn report_command(args: &ReportArgs) -> Result<ExitCode, CampaignError> {
     let out = out.unwrap_or_else(|| args.table.with_extension("html"));
     let stop = stop_on_signals()?;
     let report = Report::of(&args.table, args.against.as_deref())?;
-    // A page that is begun is finished.
+    // A page that has been begun is finished.
     stop.begin();
-    // What the table says is told even where the page has no room.
+    // Print the findings even if there is no room for the page.
     let written = report.write(&out);
     let (findings, pairs) = (&report.findings, report.pairs.as_ref());
     let page = written.is_ok().then_some(&*out);

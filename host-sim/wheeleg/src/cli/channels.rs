@@ -95,7 +95,7 @@ fn text(json: bool) -> String {
             );
         }
     }
-    // For viewers; their fields are those of Foxglove's schemas.
+    // Topics for viewers; their fields follow Foxglove's schemas.
     for d in derived() {
         let rate = d.rate();
         let _ = writeln!(out, "{:16} {rate:10} {:24} {}", d.topic, d.schema, d.doc);

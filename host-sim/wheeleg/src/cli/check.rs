@@ -1,4 +1,4 @@
-//! `wheeleg check`: the model against numbers that others computed.
+//! `wheeleg check`: compares the model with independently computed numbers.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::{print, show};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::check::vectors::{self, Comparison};
 
-/// Exit code of a comparison with a quantity beyond its tolerance.
+/// Exit code if a quantity is beyond its tolerance.
 const DISAGREES: u8 = 1;
 
 /// Arguments of `wheeleg check`.
@@ -24,9 +24,9 @@ pub(super) struct CheckArgs {
 enum What {
     /// Compare kinematics and dynamics with a file of reference vectors.
     ///
-    /// Prints the largest absolute error of every quantity next to its tolerance.
-    /// Dimensions and masses are the file's. Exit codes: 0 all within
-    /// tolerance, 1 a quantity is beyond it, 2 the file cannot be compared.
+    /// Prints the largest absolute error of every quantity next to its tolerance. Dimensions and masses are
+    /// those of the file. Exit codes: 0 all within tolerance, 1 a quantity is beyond it, 2 the file cannot be
+    /// compared.
     Vectors(VectorsArgs),
 }
 

@@ -1,5 +1,5 @@
-//! `wheeleg commands`: the commands of the master with their arguments, as text, JSON or the
-//! page of the reference.
+//! `wheeleg commands`: the master's commands with their arguments, as text, JSON or the page of the
+//! reference.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -30,7 +30,7 @@ pub(super) fn command(args: &CommandsArgs) -> Result<ExitCode, StudyError> {
     }
     if args.markdown {
         let mut page = String::new();
-        // A text grows as long as there is memory.
+        // Writing to a string cannot fail.
         let _ = write_markdown(&mut page);
         return print(&page);
     }

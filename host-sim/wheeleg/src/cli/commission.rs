@@ -1,4 +1,4 @@
-//! `wheeleg commission`: the unique ids of a robot's boards, for its file.
+//! `wheeleg commission`: the unique ids of a robot's boards, for the robot file.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -21,18 +21,19 @@ pub(super) struct CommissionArgs {
     /// Robot, built in or path of a TOML file.
     #[arg(default_value = "wheeleg-2003")]
     robot: String,
-    /// Injects a fault, as for `wheeleg run`; only those that a board is built with.
+    /// Inject a fault, as for `wheeleg run`; only faults that a board is built with.
     #[arg(long = "fault", value_name = "FAULT", value_parser = built_in)]
     faults: Vec<FaultSpec>,
     /// Where the nodes run, as for `wheeleg run`.
     #[arg(long, value_name = "KIND", default_value = "sil")]
     nodes: NodeKind,
-    /// Where one node runs, instead, as for `wheeleg run`.
+    /// Where a single node runs instead, as for `wheeleg run`.
     #[arg(long = "node", value_name = "NODE=KIND")]
     node: Vec<NodeChoice>,
 }
 
-/// A fault that a board is built with: no other is there while the boards are asked who they are.
+/// Accepts only a fault that a board is built with: no other fault exists while the boards are asked for
+/// their ids.
 fn built_in(text: &str) -> Result<FaultSpec, String> {
     let fault: FaultSpec = text.parse().map_err(|e| format!("{e}"))?;
     if fault.kind.is_built_in() {

@@ -15,7 +15,7 @@ use wheeleg_studies::axis_sim::{Kind, ValveResolution};
 use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
 use wheeleg_studies::study::Finished;
 
-/// So many false alarms are named; all of them are in the report.
+/// Number of false alarms that are listed; the report has all of them.
 const ALARMS_LISTED: usize = 5;
 
 /// Arguments of `wheeleg compare`.
@@ -35,14 +35,14 @@ pub(super) struct CompareArgs {
     /// Number of seeds for the cases with the data-sheet values.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
     seeds: u64,
-    /// The first seed.
+    /// First seed.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX - 1000))]
     seed: u64,
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
     #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]
     combinations: Option<u64>,
-    /// Number of the first random combination. A fixed one serves to compare two versions
-    /// [default: from a hash of the sources of firmware/control, so that no law is tuned to it].
+    /// Number of the first random combination. Fix it to compare two versions [default: from a hash of the
+    /// sources of firmware/control, so that no law is tuned to it].
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     root: Option<u64>,
     /// `summary.json` of another version, run with the same --root; counts the random
@@ -52,11 +52,11 @@ pub(super) struct CompareArgs {
     /// One seed, fewer factors and combinations, a coarser bound.
     #[arg(long)]
     quick: bool,
-    /// Threads [default: as many as the machine has].
+    /// Number of threads [default: as many as the machine has].
     #[arg(long, value_name = "N", value_parser = whole(1_u16, 1024))]
     threads: Option<u16>,
-    /// Folder for report, figures and tables. Results of an earlier run in it move to
-    /// its folder `previous`.
+    /// Folder for report, figures and tables. Results of an earlier run in it move to its subfolder
+    /// `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/compare")]
     out: PathBuf,
     /// Run only one case, by its id in the tables:
@@ -65,7 +65,7 @@ pub(super) struct CompareArgs {
     case: Option<CaseId>,
     #[command(flatten)]
     drawing: Drawing,
-    /// Print every false alarm, not the first few alone.
+    /// Print every false alarm, not only the first few.
     #[arg(long)]
     verbose: bool,
     /// Print the summary as JSON on stdout: all cases, one object each.
@@ -73,7 +73,7 @@ pub(super) struct CompareArgs {
     json: bool,
 }
 
-/// A controller by its name; the help lists them.
+/// Parses the name of a controller; the help lists the names.
 pub(super) fn controller() -> impl TypedValueParser<Value = Kind> {
     let names = PossibleValuesParser::new(Kind::ALL.map(Kind::name));
     names.map(|name| Kind::of_name(&name).expect("one of the names"))
@@ -84,7 +84,7 @@ fn motion() -> impl TypedValueParser<Value = Move> {
     names.map(|name| Move::of_name(&name).expect("one of the names"))
 }
 
-/// What was given, each once; all if nothing was.
+/// The given items without repetitions; all items if none were given.
 fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
     let mut list = Vec::new();
     for item in if given.is_empty() { all } else { given } {
@@ -95,8 +95,8 @@ fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
     list
 }
 
-/// Columns on the terminal: the heading, the cell of [`Comparison::table`], and whether
-/// it is shown if no moves were chosen.
+/// Columns on the terminal: the heading, the cell of [`Comparison::table`], and whether the column is shown
+/// if no moves were chosen.
 const COLUMNS: [(&str, usize, bool); 12] = [
     ("error mm", 0, true),
     ("20 mm", 1, false),
@@ -112,7 +112,7 @@ const COLUMNS: [(&str, usize, bool); 12] = [
     ("cycles", 15, false),
 ];
 
-/// The table of an axis: of the moves that were chosen, columns with figures.
+/// The table of an axis. If moves were chosen, it has the columns that contain figures.
 fn axis_table(comparison: &Comparison, axis: &str) -> String {
     let table = comparison.table(axis);
     let is_played = |index: usize| table.iter().any(|(_, cells)| cells[index] != "–");
@@ -143,7 +143,7 @@ fn axis_table(comparison: &Comparison, axis: &str) -> String {
     text
 }
 
-/// Plays, writes and prints.
+/// Runs the comparison, writes the report and prints the result.
 pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
     let built_in: Vec<String> = AXES.iter().map(|(name, ..)| (*name).to_owned()).collect();
     let axes = chosen(&args.axes, &built_in);
@@ -204,7 +204,7 @@ fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
     out
 }
 
-/// What the random combinations say, a line each.
+/// The verdicts of the random combinations, one per line.
 fn combinations(comparison: &Comparison) -> String {
     let mut out = String::new();
     for judged in comparison.judged() {

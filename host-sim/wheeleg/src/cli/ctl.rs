@@ -57,29 +57,29 @@ enum CtlCommand {
         #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1_u32, HZ_MAX as u32))]
         hz: u32,
     },
-    /// Show the robot on the whole terminal: Esc stops it, q quits.
+    /// Show the robot on the whole terminal: Esc stops the robot, q quits.
     #[cfg(unix)]
     Top,
-    /// Take control, send one command, wait until it has finished, and release control. Ctrl-C ends what
-    /// it has begun: a walk with both feet down, any other motion where it is.
+    /// Take control, send one command, wait until it has finished, and release control. Ctrl-C ends the
+    /// motion: a walk with both feet down, any other motion where it is.
     Take {
         /// Command of the master and its arguments: `JointReference joint=3 stroke=120`. `Ready` is Arm, then Stand.
         #[arg(required = true, value_name = "COMMAND [ARG=VALUE]")]
         command: Vec<String>,
     },
-    /// Print the newest events, the oldest of them first.
+    /// Print the newest events, oldest first.
     Events {
-        /// How many, 1 to 256.
+        /// Number of events, 1 to 256.
         #[arg(long, value_name = "N", default_value_t = 20, value_parser = whole(1_u32, EVENTS as u32))]
         last: u32,
-        /// Also logs and modes of the boards, their accounts of a stop, and contacts of the feet.
+        /// Include logs and modes of the boards, their reports of a stop, and contacts of the feet.
         #[arg(long)]
         all: bool,
     },
     /// Stop the robot.
     Stop,
-    /// End the control of whoever has it, on the robot's own computer: an armed robot then holds. Take
-    /// control there next; others have to wait.
+    /// Take control away from whoever has it, on the robot's own computer: an armed robot then holds. Take
+    /// control there next; other clients have to wait.
     Revoke {
         #[arg(
             long,
@@ -100,7 +100,7 @@ enum CtlCommand {
     },
     /// End a fault.
     EndFault {
-        /// Fault and target, as it was begun.
+        /// Fault and target, as given to `inject`.
         fault: String,
     },
     /// Stop the clock.
@@ -125,7 +125,7 @@ enum CtlCommand {
         )]
         speed: f64,
     },
-    /// Record: log, and every command with its time, so that `wheeleg replay` can repeat it.
+    /// Record the log, and every command with its time, so that `wheeleg replay` can repeat the session.
     Rec {
         /// Start or stop.
         #[arg(value_enum)]
@@ -137,7 +137,7 @@ enum CtlCommand {
 enum Recording {
     /// Begin a recording.
     Start,
-    /// End it.
+    /// End the recording.
     Stop,
 }
 
@@ -147,7 +147,7 @@ fn parse_pace(text: &str) -> Result<f64, String> {
     pace.ok_or_else(|| format!("allowed are numbers from {min} to {max}"))
 }
 
-/// Does what is asked of the server.
+/// Carries out the command on the server.
 pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
     let CtlArgs { reach, command } = args;
     let host = |name: &str, arguments: Value| {
@@ -164,7 +164,7 @@ pub(super) fn command(args: &CtlArgs) -> miette::Result<ExitCode> {
             let stopped = reach.key(VIEW_FILE).and_then(|key| stop(reach, &key));
             stopped.or_else(|why| match why.downcast_ref() {
                 Some(StudyError::Stdout(_)) => Err(why),
-                // Whatever kept the answer away, nobody knows of a stop.
+                // Whatever kept the answer away, the stop is not confirmed.
                 _ => {
                     tell_error(why);
                     Ok(not_confirmed())
@@ -195,7 +195,7 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     if reach.json {
         return Ok(print(&format!("{state:#}\n"))?);
     }
-    // A false server may have written it, and a file keeps it for a terminal.
+    // A false server may have written this, and a file may later be shown on a terminal.
     let word = |value: &Value| match value {
         Value::String(text) => plain(text),
         Value::Null => "none".to_owned(),
@@ -265,13 +265,14 @@ fn status(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     Ok(show(&text)?)
 }
 
-/// The board that a part of the state is about.
+/// The board that a part of the state describes.
 fn address(board: &Value) -> Option<Address> {
     let address = u8::try_from(board["address"].as_u64()?).ok()?;
     Address::new(address)
 }
 
-/// What the robot is, in the words of the page. A stop is more than the hold that it may have met.
+/// The mode of the robot, in the words of the page. A stop takes precedence over a hold that was already
+/// active.
 fn mode(state: &Value) -> String {
     let more = |why: &str| match has_board_fault(state) && why != BOARD_FAULT {
         true => ", board fault",
@@ -288,20 +289,20 @@ fn mode(state: &Value) -> String {
     }
 }
 
-/// The hold that a fault of a board has caused.
+/// Name of the hold caused by a fault of a board.
 const BOARD_FAULT: &str = hold_name(&HoldReason::NodeFault { node: 0, faults: 0 });
 
-/// Whether a board has a fault, beside the stop that all of them report.
+/// Whether a board has a fault other than the stop that all of them report.
 fn has_board_fault(state: &Value) -> bool {
     let boards = state["boards"].as_array().into_iter().flatten();
     let mut faults = boards.flat_map(|board| board["faults"].as_array().into_iter().flatten());
     faults.any(|fault| fault["number"] != Fault::EmergencyStop.code())
 }
 
-/// How a robot goes on that was stopped, or holds.
+/// How to continue after a stop or a hold.
 const GO_ON: &str = "To go on: `wheeleg ctl take -- ClearFault`, then, once the reservoir is full, `wheeleg ctl take -- Ready`";
 
-/// The same, after the end of what somebody has injected: until then a board keeps its fault.
+/// As [`GO_ON`], preceded by how to end injected faults: a board keeps its fault until then.
 fn go_on(state: &Value) -> String {
     let faults = state["faults"]
         .as_array()
@@ -313,7 +314,8 @@ fn go_on(state: &Value) -> String {
     format!("{ends}{GO_ON}")
 }
 
-/// Who has stopped the robot, or why it holds, and how it goes on; none: it does neither.
+/// Who has stopped the robot or why it holds, and how to continue; `None` if it is neither stopped nor
+/// holding.
 fn why_held(state: &Value) -> Option<String> {
     if state["emergency_stop"] == true {
         let stopped = &state["stopped"];
@@ -342,7 +344,7 @@ fn why_held(state: &Value) -> Option<String> {
     ))
 }
 
-/// Prints the newest events that the server keeps: `last` of them, of all kinds or without the many details.
+/// Prints the newest `last` events that the server keeps; without `all`, the many details are left out.
 fn events(reach: &Reach, key: &Key, last: u32, all: bool) -> miette::Result<ExitCode> {
     let (code, mut list) = http(&reach.url(), "GET", "events", key)?;
     if code != 200 {
@@ -359,7 +361,8 @@ fn events(reach: &Reach, key: &Key, last: u32, all: bool) -> miette::Result<Exit
     Ok(show(&lines.map(event_line).collect::<String>())?)
 }
 
-/// Whether an event is one of many that would push out what counts: after a stop each board tells of it four times.
+/// Whether an event is one of the many that would push out what matters: after a stop, each board reports it
+/// four times.
 fn is_detail(event: &Value) -> bool {
     let of_board = event["board"] != 0;
     let of_stop = event["fault"] == Fault::EmergencyStop.code();
@@ -368,7 +371,7 @@ fn is_detail(event: &Value) -> bool {
 
 fn event_line(event: &Value) -> String {
     let t_s = event["t_ns"].as_f64().unwrap_or(0.0) * 1e-9;
-    // A false server may have written it.
+    // A false server may have written this.
     let text = plain(event["text"].as_str().unwrap_or_default());
     format!("{t_s:10.3} s  {text}\n")
 }
@@ -391,7 +394,7 @@ fn stop(reach: &Reach, key: &Key) -> miette::Result<ExitCode> {
     }
 }
 
-/// Who is in control, or for whom control is reserved; none: control is free.
+/// Who is in control, or for whom control is reserved; `None` if control is free.
 fn holder(state: &Value) -> Option<String> {
     let control = &state["control"];
     if let Some(name) = control["holder"].as_str() {
@@ -403,17 +406,18 @@ fn holder(state: &Value) -> Option<String> {
     Some(format!("reserved for {}", plain(name)))
 }
 
-/// Time within which the master ends a lease that was revoked, and is seen to.
+/// Time within which the master ends a revoked lease, and this is observed.
 const ENDS: Duration = Duration::from_secs(3);
 
-/// Revokes control, and waits until the lease of its holder is over, which takes long where the clock is slow or paused.
+/// Revokes control and waits until the holder's lease has ended, which takes long if the clock is slow or
+/// paused.
 fn revoke(reach: &Reach, hold_s: u32) -> miette::Result<ExitCode> {
     let mut client = reach.control()?;
     let before = match state_when(&mut client, |_| true) {
         Ok(state) => state,
         Err(unknown) => return reach.print_outcome(&unknown),
     };
-    // Also where nobody is in control yet: somebody may have asked for it.
+    // Revoke even if nobody is in control yet: somebody may have requested it.
     let end = client.carry_out("Revoke", &json!({ "hold": hold_s }), 1_000)?;
     if end != Outcome::Done {
         return reach.print_outcome(&end);
@@ -451,8 +455,8 @@ fn revoke(reach: &Reach, hold_s: u32) -> miette::Result<ExitCode> {
     reach.print_outcome(&Outcome::Done)
 }
 
-/// The state, as soon as the server reports it as wanted. [`Outcome::Unknown`]: it has not within
-/// [`ENDS`]; [`Outcome::Lost`]: the connection has ended.
+/// Waits for a state that is `wanted`. Returns [`Outcome::Unknown`] if none arrives within [`ENDS`], and
+/// [`Outcome::Lost`] if the connection has ended.
 fn state_when(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Value, Outcome> {
     let begin = Instant::now();
     while begin.elapsed() < ENDS {
@@ -467,7 +471,7 @@ fn state_when(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Result<Va
     Err(Outcome::Unknown)
 }
 
-/// Over plain HTTP no key may be sent: the frames of a session prove it without.
+/// No key may be sent over plain HTTP; the frames of a session prove it without sending it.
 fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> miette::Result<ExitCode> {
     let mut client = Client::connect(url, "view", PROGRAM, key)?;
     let stopped = client.prompt(json!({ "op": "stop" }))?;
@@ -481,7 +485,7 @@ fn stop_by_session(reach: &Reach, url: &Url, key: &Key) -> miette::Result<ExitCo
     }
 }
 
-/// Nobody knows of a stop that was asked for.
+/// Reports that a requested stop is not confirmed.
 fn not_confirmed() -> ExitCode {
     tell("NOT CONFIRMED: CUT THE AIR");
     ExitCode::from(LOST)
@@ -547,7 +551,7 @@ fn line(
     out
 }
 
-/// Time and values of a sample by their names.
+/// Time of a sample, and its values by name.
 fn sample(channel: u16, mut body: &[u8]) -> Option<(u64, Map<String, Value>)> {
     let (t_ns, values) = unpack(channel, &mut body)?;
     let fields = channels().get(usize::from(channel))?.fields;
@@ -555,7 +559,7 @@ fn sample(channel: u16, mut body: &[u8]) -> Option<(u64, Map<String, Value>)> {
     Some((t_ns, names.zip(values).collect()))
 }
 
-/// `NAME=VALUE` as an argument: a number or flag where it reads as one, else a word.
+/// Parses `NAME=VALUE` as an argument: a number or flag if it reads as one, otherwise a word.
 fn argument(text: &str) -> Result<(String, Value), StudyError> {
     let (name, value) = text.split_once('=').ok_or_else(|| {
         StudyError::refused(
@@ -568,7 +572,7 @@ fn argument(text: &str) -> Result<(String, Value), StudyError> {
     Ok((name.to_owned(), parsed.unwrap_or_else(|| json!(value))))
 }
 
-/// What the page's button of this name does, but for the wait for air.
+/// Does what the page's button of this name does, except for waiting for air.
 const READY: &str = "Ready";
 
 fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
@@ -606,7 +610,7 @@ fn take(reach: &Reach, words: &[String]) -> miette::Result<ExitCode> {
     }
 }
 
-/// Tells of the faults whose cause lasts until somebody ends it, where faults could not be cleared.
+/// If faults could not be cleared, names the injected faults, whose cause lasts until somebody ends them.
 fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
     if !matches!(end, Outcome::Refused { .. }) || reach.url().is_exposed() {
         return Ok(());
@@ -626,7 +630,7 @@ fn tell_injected(reach: &Reach, end: &Outcome) -> miette::Result<()> {
 mod tests {
     use super::*;
 
-    /// A stop that meets a robot that holds already is what the head tells, and who has stopped it.
+    /// If the robot is stopped while it already holds, the stop and who caused it are shown.
     #[test]
     fn a_stop_is_told_before_the_hold_that_it_met() {
         let mut state = json!({
@@ -646,7 +650,7 @@ mod tests {
         assert_eq!((mode(&state), why_held(&state)), ("ARMED".to_owned(), None));
     }
 
-    /// Two causes at once are told both; the stop itself is a fault that all boards report.
+    /// Two causes at once are both shown; the stop itself is a fault that all boards report.
     #[test]
     fn a_fault_of_a_board_is_told_beside_another_hold() {
         let told = |hold: &str, stop: bool, number: u8| {
@@ -673,7 +677,7 @@ mod tests {
         assert_eq!(go_on(&state), GO_ON);
     }
 
-    /// Whoever has stopped over HTTP is told by name, if there is one.
+    /// A stop over HTTP is attributed to its program by name, if it has one.
     #[test]
     fn a_stop_over_http_is_told_by_the_name_of_its_program() {
         let state = |name: Value| json!({ "emergency_stop": true, "stopped": { "via": "api", "name": name, "at_us": 1_000_000 } });
@@ -690,7 +694,8 @@ mod tests {
         );
     }
 
-    /// What a person did and what the robot answered is not pushed out by what eight boards tell of it.
+    /// The command of a person and the robot's answer are not pushed out by what eight boards report about
+    /// it.
     #[test]
     fn events_of_a_stop_are_its_command_and_the_hold() {
         let (stop, range) = (Fault::EmergencyStop.code(), Fault::SensorRange.code());

@@ -20,8 +20,8 @@ pub(super) struct DelayArgs {
     /// Built-in robot or path of a robot file; its left vertical cylinder is measured.
     #[arg(long, value_name = "ROBOT", default_value = DEFAULT_ROBOT)]
     robot: String,
-    /// Folder for page, pictures and tables. Results of an earlier run in it
-    /// move to its folder `previous`.
+    /// Folder for page, pictures and tables. Results of an earlier run in it move to its subfolder
+    /// `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/delay")]
     out: PathBuf,
     #[command(flatten)]
@@ -35,7 +35,7 @@ pub(super) struct DelayArgs {
     /// Mass that moves with the rod, kg, 0.1 to 50 (assumed: rod and carriage, lying).
     #[arg(long, value_name = "KG", default_value_t = Options::default().mass_kg, value_parser = mass)]
     mass: f64,
-    /// Force on the rod, N, −100 to 100; positive extends, so it opposes the move from home.
+    /// Force on the rod, N, −100 to 100; a positive force extends, so it opposes the move from home.
     #[arg(long, value_name = "N", default_value_t = Options::default().load_n, value_parser = load, allow_negative_numbers = true)]
     load: f64,
 }
@@ -48,7 +48,7 @@ fn load(text: &str) -> Result<f64, String> {
     within(text, "N", LOAD_N)
 }
 
-/// A number in a range; the message names value, unit and range.
+/// Parses a number in a range; the message names value, unit and range.
 fn within(text: &str, unit: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (min..=max).contains(&value) => Ok(value),

@@ -1,29 +1,29 @@
-//! Exit codes: one table for each command that has its own. Helps are printed from them, and the
-//! page of the reference from the helps.
+//! Exit codes: one table for each command that has its own. The help texts are printed from these tables, and
+//! the page of the reference is made from the help texts.
 
 use std::fmt::Write as _;
 
 use wheeleg_studies::study::Signal;
 
-/// Exit code when `--strict` is given and a required target is not met, or a check fails.
+/// Exit code if `--strict` is given and a required target is not met, or if a check fails.
 pub(super) const TARGETS_MISSED: u8 = 1;
-/// Exit code of what is refused.
+/// Exit code of a refused request.
 pub(super) const REFUSED: u8 = 1;
 /// Exit code of any error (wrong input, unwritable output, failed simulation).
 pub(super) const FAILED: u8 = 2;
-/// Exit code where cases have no row yet.
+/// Exit code if cases have no row yet.
 pub(super) const INCOMPLETE: u8 = 3;
-/// Exit code of a connection that ended, or of a stop that nobody confirms.
+/// Exit code if the connection ended, or a stop is not confirmed.
 pub(super) const LOST: u8 = 3;
-/// Exit code of a campaign that cannot write: that of sysexits.h for input and output.
+/// Exit code of a campaign that cannot write: the code for input and output errors in sysexits.h.
 pub(super) const CANNOT_WRITE: u8 = 74;
-/// Exit code of a process that was asked to stop, and is to be started again.
+/// Exit code of a process that was asked to stop and should be started again.
 pub(super) const TRY_AGAIN: u8 = 75;
 
-/// A code and when it comes.
+/// Exit codes and their meanings.
 type Table = [(u8, &'static str)];
 
-/// Of every command without a table of its own.
+/// Codes of every command without its own table.
 pub(super) const PROGRAM: &Table = &[
     (0, "success (with --strict: all required targets met)"),
     (
@@ -45,7 +45,7 @@ pub(super) const PROGRAM: &Table = &[
     ),
 ];
 
-/// Of `wheeleg campaign`.
+/// Codes of `wheeleg campaign`.
 pub(super) const CAMPAIGN: &Table = &[
     (0, "every case (of this shard) has a row"),
     (
@@ -62,7 +62,7 @@ pub(super) const CAMPAIGN: &Table = &[
     (Signal::Interrupt.exit_code(), "stopped with Ctrl-C"),
 ];
 
-/// Of `wheeleg ctl`.
+/// Codes of `wheeleg ctl`.
 pub(super) const CTL: &Table = &[
     (0, "done"),
     (REFUSED, "refused"),
@@ -85,7 +85,7 @@ pub(super) const CTL: &Table = &[
     ),
 ];
 
-/// Of `wheeleg replay`.
+/// Codes of `wheeleg replay`.
 pub(super) const REPLAY: &Table = &[
     (0, "the replay is bit-identical"),
     (
@@ -117,7 +117,7 @@ mod tests {
         }
     }
 
-    /// The library of campaigns has codes, too: they are those of the table.
+    /// The exit codes in the library of campaigns are those of the table.
     #[test]
     fn errors_of_campaigns_end_with_the_codes_of_their_table() {
         let full = CampaignError::Output {

@@ -1,4 +1,4 @@
-//! `wheeleg export`: robot and logs for other programs.
+//! `wheeleg export`: exports the robot and logs for other programs.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -30,16 +30,15 @@ pub(super) struct ExportArgs {
 enum Format {
     /// URDF: the open tree of bodies with joints, limits, inertias and simple shapes.
     ///
-    /// Driven joints are named as their topics in the log (/joint/1 to /joint/6,
-    /// /wheel/7, /wheel/8); a cylinder's position is its stroke in metres. URDF
-    /// cannot hold the loop of the yaw cylinder: in the robot, `left_crank_end`
-    /// coincides with `left_yaw_carriage`, and so on the right.
+    /// Driven joints are named after their topics in the log (/joint/1 to /joint/6, /wheel/7, /wheel/8); a
+    /// cylinder's position is its stroke in metres. URDF cannot represent the loop of the yaw cylinder: in
+    /// the robot, `left_crank_end` coincides with `left_yaw_carriage`, and likewise on the right.
     Urdf(UrdfArgs),
     /// A layout for Foxglove and Lichtblick: robot, ground, moves, pressures, events.
     Layout(OutArgs),
-    /// Parquet: a file per channel of a log, `t_ns` first, units in the metadata.
+    /// Parquet: one file per channel of a log, `t_ns` first, units in the metadata.
     Parquet(LogArgs),
-    /// A bag of ROS 2 (MCAP, CDR): /joint_states, /tf, /tf_static, /robot_description, /clock.
+    /// A ROS 2 bag (MCAP, CDR): /joint_states, /tf, /tf_static, /robot_description, /clock.
     Ros2(LogArgs),
     /// A Functional Mock-up Unit of a cylinder for Simulink, Dymola, OpenModelica, FMPy, …
     ///
@@ -51,20 +50,20 @@ enum Format {
 struct FmuArgs {
     /// Built-in axis or path of an axis file.
     axis: String,
-    /// What the unit holds: the plant, which is given on-times of valves; or the plant with the
-    /// firmware of its joint board, which is given references.
+    /// What the unit contains: the plant, which takes on-times of valves; or the plant with the firmware of
+    /// its joint board, which takes references.
     #[arg(long, value_enum, default_value = "plant")]
     kind: UnitKind,
-    /// Version of FMI.
+    /// FMI version.
     #[arg(long, value_enum, default_value = "2")]
     fmi: Version,
     /// Control law of a controlled unit.
     #[arg(long, value_name = "LAW", default_value = "predictive", value_parser = controller())]
     law: Law,
-    /// The unit's shared library [default: beside this program].
+    /// Shared library of the unit [default: next to this program].
     #[arg(long, value_name = "FILE")]
     library: Option<PathBuf>,
-    /// File to write [default: NAME-KIND.fmu]. A file of that name moves to `FILE.previous`.
+    /// File to write [default: NAME-KIND.fmu]. An existing file moves to `FILE.previous`.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -94,8 +93,7 @@ struct UrdfArgs {
 
 #[derive(Debug, Args)]
 struct OutArgs {
-    /// File to write [default: standard output]. A file of that name moves to
-    /// `FILE.previous`.
+    /// File to write [default: standard output]. An existing file moves to `FILE.previous`.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -104,7 +102,7 @@ struct OutArgs {
 struct LogArgs {
     /// Folder of a run or of a recording, or its log.
     run: PathBuf,
-    /// Folder to make, which must not exist [default: `parquet` or `ros2` next to the log].
+    /// Folder to create, which must not exist [default: `parquet` or `ros2` next to the log].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -116,7 +114,7 @@ impl LogArgs {
     }
 }
 
-/// Writes the robot, or a log, in the format asked for.
+/// Writes the robot, or a log, in the requested format.
 pub(super) fn command(args: &ExportArgs) -> Result<ExitCode, StudyError> {
     match &args.format {
         Format::Urdf(args) => {
@@ -203,8 +201,8 @@ fn write(text: &str, args: &OutArgs, reads: &[&Path]) -> Result<ExitCode, StudyE
     }
 }
 
-/// Makes an export that can be stopped and says what it holds; false beside that: its log breaks
-/// off.
+/// Makes an export that can be stopped. `make` returns a description of it, and false if the log is
+/// truncated.
 fn exported(
     args: &LogArgs,
     make: impl FnOnce(&Progress) -> Result<Option<(String, bool)>, StudyError>,

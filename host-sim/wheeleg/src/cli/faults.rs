@@ -1,4 +1,4 @@
-//! `wheeleg faults`: what can go wrong, and what the robot does about it.
+//! `wheeleg faults`: what can go wrong, and how the robot responds.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ pub(super) struct FaultsArgs {
 
 #[derive(Debug, Subcommand)]
 enum FaultsCommand {
-    /// List the faults that a run can be given with --fault.
+    /// List the faults that a run accepts with --fault.
     List {
         /// Print JSON.
         #[arg(long)]
@@ -36,19 +36,19 @@ enum FaultsCommand {
 
 #[derive(Debug, Args)]
 struct RunArgs {
-    /// All rows; those that are not implemented are listed and not counted.
+    /// Run all rows; rows that are not implemented are listed but not counted.
     #[arg(long)]
     all: bool,
-    /// One row, as `wheeleg faults rows` names it; may be given several times.
+    /// Run one row, as named by `wheeleg faults rows`; may be given several times.
     #[arg(long, value_name = "ID", conflicts_with = "all")]
     row: Vec<String>,
     /// Seed of all noise, and of the instants.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
-    /// Folder for the results. Results of an earlier run in it move to its folder `previous`.
+    /// Folder for the results. Results of an earlier run in it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/faults")]
     out: PathBuf,
-    /// Print every row of --all; else those that passed are counted alone.
+    /// Print every row with --all; otherwise rows that passed are only counted.
     #[arg(long)]
     verbose: bool,
     /// Print the summary as JSON on stdout.
@@ -66,7 +66,7 @@ pub(super) fn command(args: &FaultsArgs) -> Result<ExitCode, StudyError> {
     }
 }
 
-/// Width of a column that holds the ids of rows.
+/// Width of a column with the ids of rows.
 fn id_width() -> usize {
     let widths = matrix::ROWS.iter().map(|row| row.id.len());
     widths.max().unwrap_or(0)
@@ -100,7 +100,7 @@ fn run(args: &RunArgs) -> Result<ExitCode, StudyError> {
     let rows = matrix::select(&args.row)?;
     let finished = matrix::write(&rows, args.seed, &settings(&args.out, false)?)?;
     let passed = matrix::count(&finished.result, Verdict::Fail) == 0;
-    // Whoever names rows wants to see them.
+    // A user who names rows wants to see them.
     let all = args.verbose || !args.all;
     let text = |f: &Finished<Vec<Outcome>>| verdicts(&f.result, &f.report, all);
     end(finished, args.json, text, passed)

@@ -1,4 +1,4 @@
-//! `wheeleg field`: the walks over terrain, on several seeds, beside what the paper claims.
+//! `wheeleg field`: the walks over terrain, with several seeds, compared with the paper's claims.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -15,17 +15,17 @@ use super::{end, place, settings, whole};
 /// Arguments of `wheeleg field`.
 #[derive(Debug, Args)]
 pub(super) struct FieldArgs {
-    /// Scenarios to try [default: all]
+    /// Scenarios to run [default: all]
     #[arg(value_parser = PossibleValuesParser::new(SCENARIOS), value_name = "SCENARIO")]
     scenarios: Vec<String>,
-    /// All scenarios, as without a name.
+    /// Run all scenarios, as if none were named.
     #[arg(long, conflicts_with = "scenarios")]
     all: bool,
     /// Seeds of each scenario, 1 to 1000: of the noise and, on rocks, of the field.
     #[arg(long, default_value_t = 5, value_parser = whole(1_u32, 1000))]
     seeds: u32,
-    /// Folder for page, pictures and summary. Results of an earlier run in it
-    /// move to its folder `previous`.
+    /// Folder for page, pictures and summary. Results of an earlier run in it move to its subfolder
+    /// `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/field")]
     out: PathBuf,
     /// Write the pictures as PNG as well as SVG, if the program was built with `--features png`.

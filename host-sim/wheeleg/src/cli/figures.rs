@@ -14,8 +14,8 @@ use wheeleg_studies::study::Finished;
 /// Arguments of `wheeleg figures`.
 #[derive(Debug, Args)]
 pub(super) struct FiguresArgs {
-    /// Folder for page, pictures and tables. Results of an earlier run in it
-    /// move to its folder `previous`.
+    /// Folder for page, pictures and tables. Results of an earlier run in it move to its subfolder
+    /// `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/figures")]
     out: PathBuf,
     #[command(flatten)]
@@ -38,7 +38,7 @@ pub(super) fn command(args: &FiguresArgs) -> Result<ExitCode, StudyError> {
 
 fn text(results: &Results) -> String {
     let mut out = String::from("axes of the paper\n");
-    // Three decimals, without the sign of a zero.
+    // Three decimals, with no sign on a zero.
     let shown = |v: f64| if v.abs() < 5e-4 { 0.0 } else { v };
     for c in &results.checks {
         let verdict = if c.fits { "fits" } else { "does not fit" };

@@ -1,9 +1,10 @@
-//! What the program says, on a terminal: it fits its width, and texts of files and of servers stand in it.
+//! Makes the program's output safe and readable on a terminal: it fits the width, and texts from files and
+//! servers in it can do no harm.
 
 use wheeleg_report::plain::acts_in_lines;
 
-/// A text in which colours alone act on a terminal. All else that would, such as moving the cursor,
-/// setting the title or turning the direction of the text, becomes `�`.
+/// Returns the text with only its colours acting on a terminal. Everything else that would, such as moving
+/// the cursor, setting the title or changing the text direction, becomes `�`.
 pub(super) fn harmless(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -19,11 +20,11 @@ pub(super) fn harmless(text: &str) -> String {
     out
 }
 
-/// Part of a terminal's width within which the last column of a table begins, at most.
+/// Largest fraction of a terminal's width at which the last column of a table may begin.
 const FIRST_PART: f64 = 0.7;
 
-/// A text for a terminal of so many columns: a line that is longer goes on below, under its last column where
-/// it has columns, so that a table stays one.
+/// Fits a text to a terminal of this many columns. A longer line continues below, under its last column if it
+/// has columns, so that a table keeps its shape.
 pub(super) fn fit(text: &str, width: usize) -> String {
     let mut out = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
@@ -34,7 +35,7 @@ pub(super) fn fit(text: &str, width: usize) -> String {
         let hang = " ".repeat(last_column(line, (FIRST_PART * width as f64) as usize));
         let options = textwrap::Options::new(width)
             .break_words(false)
-            // Not within a path, nor at a hyphen.
+            // Do not break within a path or at a hyphen.
             .word_separator(textwrap::WordSeparator::AsciiSpace)
             .word_splitter(textwrap::WordSplitter::NoHyphenation)
             .subsequent_indent(&hang);
@@ -47,7 +48,8 @@ pub(super) fn fit(text: &str, width: usize) -> String {
     out
 }
 
-/// Where the last column of a line begins that is not beyond `most`: columns are two or more spaces apart.
+/// Start of the last column of a line that does not begin beyond `most`. Columns are separated by two or more
+/// spaces.
 fn last_column(line: &str, most: usize) -> usize {
     let mut found = 0;
     let mut spaces = 2;
@@ -64,7 +66,7 @@ fn last_column(line: &str, most: usize) -> usize {
     found
 }
 
-/// The same without its colours, which take no room.
+/// The line without its colours, which take no room.
 fn strip(line: &str) -> String {
     let mut out = String::with_capacity(line.len());
     let mut rest = line;
@@ -78,7 +80,8 @@ fn strip(line: &str) -> String {
     out
 }
 
-/// Bytes of the colour with which the text begins: `ESC [`, numbers, `m`. What conceals is none.
+/// Length in bytes of the colour code at the start of the text: `ESC [`, numbers, `m`. A code that conceals
+/// text does not count.
 fn colour(text: &str) -> Option<usize> {
     const CONCEAL: &str = "8";
     let numbers = text.strip_prefix("\u{1b}[")?;
@@ -107,7 +110,7 @@ mod tests {
         let fitted = fit(table, 31);
         assert!(fitted.ends_with('\n'), "{fitted:?}");
         assert_eq!(fitted.lines().collect::<Vec<_>>(), wanted);
-        // Colours take no room, and what has no place to break stays whole.
+        // Colours take no room, and a text without a break point stays whole.
         let coloured = "\u{1b}[32mmet\u{1b}[0m  A1  a long text";
         assert_eq!(
             fit(coloured, 15),

@@ -1,4 +1,4 @@
-//! `wheeleg identify`: a user's cylinder from measurements.
+//! `wheeleg identify`: identifies a user's cylinder from measurements.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,26 +15,25 @@ use wheeleg_studies::study::Settings;
 /// Arguments of `wheeleg identify`.
 #[derive(Debug, Args)]
 pub(super) struct IdentifyArgs {
-    /// Measurement: a CSV file with time_s, position_mm and the valves as on-times
-    /// (fill_a_us, vent_a_us, fill_b_us, vent_b_us) or states (fill_a, …: 0, 1); if
-    /// there are any, pressure_a_bar, pressure_b_bar (absolute) and load_n.
+    /// Measurement: a CSV file with time_s, position_mm and the valves as on-times (fill_a_us, vent_a_us,
+    /// fill_b_us, vent_b_us) or states (fill_a, …: 0, 1); if available, also pressure_a_bar, pressure_b_bar
+    /// (absolute) and load_n.
     lab: PathBuf,
     /// Built-in axis or path of an axis file: the data sheet.
     #[arg(long, value_name = "AXIS")]
     axis: String,
-    /// A column that has another name or unit in the file: NAME=COLUMN, or NAME=COLUMN*FACTOR+OFFSET,
-    /// such as `position_mm=x (m)*1000`; may be given several times. The file's other columns are
-    /// then not read.
+    /// Column with another name or unit in the file: NAME=COLUMN, or NAME=COLUMN*FACTOR+OFFSET, such as
+    /// `position_mm=x (m)*1000`; may be given several times. The other columns of the file are then not read.
     #[arg(long, value_name = "NAME=COLUMN")]
     map: Vec<Mapped>,
     /// Fraction of the measurement, at its end, that is held out from the fit, 0.1 to 0.9.
     #[arg(long, value_name = "SHARE", default_value_t = 0.3, value_parser = share)]
     hold_out: f64,
-    /// Folder for report, figures and axis file [default: runs/identify-<axis>].
-    /// Results of an earlier run in it move to its folder `previous`.
+    /// Folder for report, figures and axis file [default: runs/identify-<axis>]. Results of an earlier run in
+    /// it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seed of the starts of the fit.
+    /// Seed of the fit's starting points.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
     seed: u64,
     #[command(flatten)]
@@ -53,7 +52,7 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Identifies, writes and prints. A measurement that the fit does not explain is a target missed.
+/// Identifies, writes and prints. A measurement that the fit does not explain counts as a missed target.
 pub(super) fn command(args: &IdentifyArgs) -> Result<ExitCode, StudyError> {
     let stop = stop_on_signals()?;
     let default = |axis: &str| PathBuf::from("runs").join(format!("identify-{axis}"));

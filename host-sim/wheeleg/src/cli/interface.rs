@@ -1,4 +1,4 @@
-//! `wheeleg interface`: in what this program's interface definition differs from another.
+//! `wheeleg interface`: how this program's interface definition differs from another.
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -21,7 +21,7 @@ pub(super) struct InterfaceArgs {
     all: bool,
 }
 
-/// Prints the interfaces, or the difference to one.
+/// Prints the interfaces, or the difference from one of them.
 pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, StudyError> {
     let Some(given) = &args.hash else {
         return show(&list());
@@ -50,7 +50,7 @@ pub(super) fn command(args: &InterfaceArgs) -> Result<ExitCode, StudyError> {
     print(&format!("{}\n", first_difference(here, there)))
 }
 
-/// This program's interface, and what it can be compared with.
+/// This program's interface, and those it can be compared with.
 fn list() -> String {
     let mut out = format!(
         "This program: {SCHEMA_HASH:016x} (wheeleg {}, protocol version {VERSION})\n\
@@ -71,7 +71,7 @@ fn list() -> String {
 fn parse(given: &str) -> Result<u64, StudyError> {
     let digits = given.strip_prefix("0x").unwrap_or(given);
     let hash = u64::from_str_radix(digits, 16).ok();
-    // `from_str_radix` takes a sign, too.
+    // `from_str_radix` also accepts a sign.
     let whole = digits.len() == 16 && digits.bytes().all(|b| b.is_ascii_hexdigit());
     hash.filter(|_| whole).ok_or_else(|| {
         refused(format!(
@@ -81,7 +81,7 @@ fn parse(given: &str) -> Result<u64, StudyError> {
     })
 }
 
-/// An error that names what is known.
+/// An error that lists the known hashes.
 fn refused(what: String) -> StudyError {
     let known: Vec<String> = archive::hashes().map(|h| format!("{h:016x}")).collect();
     StudyError::refused(what, format!("known are {}", known.join(", ")))

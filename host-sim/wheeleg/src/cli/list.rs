@@ -22,7 +22,8 @@ pub(super) struct ListArgs {
     channels: bool,
 }
 
-/// What is built in of one kind: key in JSON, heading with the command that takes it, names with descriptions.
+/// Built-in items of one kind: key in JSON, heading with the command that takes them, names with
+/// descriptions.
 struct Section {
     key: &'static str,
     heading: &'static str,
@@ -80,7 +81,7 @@ fn sections() -> Result<[Section; 6], StudyError> {
     ])
 }
 
-/// The question of a plan: the first sentence of the comment that it begins with.
+/// The question that a plan answers: the first sentence of its opening comment.
 fn question(text: &str) -> String {
     let comment = text.lines().map_while(|line| line.strip_prefix('#'));
     let comment: Vec<&str> = comment.map(str::trim).collect();

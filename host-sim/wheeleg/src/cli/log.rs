@@ -1,4 +1,4 @@
-//! `wheeleg log`: work on logs of runs.
+//! `wheeleg log`: works on logs of runs.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -23,15 +23,15 @@ pub(super) struct LogArgs {
 enum Action {
     /// Restore a complete log from a truncated one (the run was killed, or the disk was full).
     Recover {
-        /// The log, or the folder of its run; it stays as it is.
+        /// Log, or the folder of its run; it is not changed.
         log: PathBuf,
-        /// The new file, which must not exist [default: NAME-recovered.mcap next to the log].
+        /// New file, which must not exist [default: NAME-recovered.mcap next to the log].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
 }
 
-/// Recovers a log and says how much of it.
+/// Recovers a log and reports how much of it was recovered.
 pub(super) fn command(args: &LogArgs) -> Result<ExitCode, StudyError> {
     let Action::Recover { log, out } = &args.action;
     let log = &log_of(log);

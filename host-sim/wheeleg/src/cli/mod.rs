@@ -59,7 +59,7 @@ struct Cli {
     options: run::RunOptions,
 }
 
-/// Parses a whole number from `low` to `high`, and says so of any other.
+/// Parses a whole number from `low` to `high`; the error for anything else names this range.
 fn whole<N>(low: N, high: N) -> impl Fn(&str) -> Result<N, String> + Clone + Send + Sync
 where
     N: FromStr + PartialOrd + Display + Copy + Send + Sync,
@@ -81,7 +81,7 @@ enum Command {
     Boards(boards::BoardsArgs),
     /// Watch and drive the robot that `wheeleg serve` runs.
     Ctl(ctl::CtlArgs),
-    /// Repeat a recording of `wheeleg serve`, and compare it with what was recorded.
+    /// Repeat a recording of `wheeleg serve`, and compare the result with the recording.
     Replay(replay::ReplayArgs),
     /// Run a scenario many times: factors, shards, one table, replay.
     Campaign(campaign::CampaignArgs),
@@ -123,7 +123,7 @@ enum Command {
     Interface(interface::InterfaceArgs),
 }
 
-/// Parses the command line, does what it says, and returns the exit code.
+/// Parses the command line, carries it out, and returns the exit code.
 #[must_use]
 pub(crate) fn main() -> ExitCode {
     colourless_if_asked();
@@ -140,7 +140,7 @@ pub(crate) fn main() -> ExitCode {
     })
 }
 
-/// Does what the command line says.
+/// Carries out the command line.
 fn run_command(cli: Cli) -> miette::Result<ExitCode> {
     Ok(match cli.command {
         None => run::scenario(DEFAULT_SCENARIO, &cli.options)?,
@@ -172,22 +172,22 @@ fn run_command(cli: Cli) -> miette::Result<ExitCode> {
     })
 }
 
-/// `NO_COLOR` wins over variables that force colours.
+/// `NO_COLOR` takes precedence over variables that force colours.
 fn colourless_if_asked() {
     if std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty()) {
-        // It fails where there is a hook already, and nobody else sets one.
+        // This fails only if there is already a hook, and nobody else sets one.
         let _ = miette::set_hook(Box::new(|_| {
             Box::new(miette::MietteHandlerOpts::new().color(false).build())
         }));
     }
 }
 
-/// Writes to stdout. A reader that has gone away (`| head`) is no error.
+/// Writes to stdout. A reader that has gone away (`| head`) is not an error.
 fn print(text: &str) -> Result<ExitCode, StudyError> {
     print_on(text).map(|_| ExitCode::SUCCESS)
 }
 
-/// Writes a part of what goes to stdout; whether there is still a reader.
+/// Writes a part of the output to stdout; returns whether there is still a reader.
 fn print_on(text: &str) -> Result<bool, StudyError> {
     match say(text) {
         Ok(()) => Ok(true),
@@ -201,7 +201,7 @@ fn show(text: &str) -> Result<ExitCode, StudyError> {
     print(&fitted(text))
 }
 
-/// A text for a person: on a terminal its lines fit the width.
+/// Formats a text for a person: on a terminal, its lines fit the width.
 fn fitted(text: &str) -> String {
     match terminal_size_of(std::io::stdout()) {
         Some((Width(width), _)) => fit(text, width.into()),
@@ -209,7 +209,7 @@ fn fitted(text: &str) -> String {
     }
 }
 
-/// Writes to stdout: a file or a pipe gets what was meant, a terminal nothing that acts on it.
+/// Writes to stdout: unchanged to a file or a pipe, but without anything that acts on a terminal.
 fn say(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     let shown = out.is_terminal().then(|| harmless(text));
@@ -217,17 +217,17 @@ fn say(text: &str) -> std::io::Result<()> {
     out.flush()
 }
 
-/// Writes a line to standard error. There may be nobody left to read it after a hang-up.
+/// Writes a line to standard error. After a hang-up there may be nobody to read it.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stderr(), "{}", harmless(line));
 }
 
-/// Tells an error in the form that all have: its code, what is wrong, and what can be done.
+/// Prints an error in the common form: its code, what is wrong, and what can be done.
 fn tell_error(error: impl Into<miette::Report>) {
     tell(&format!("{:?}", error.into()));
 }
 
-/// What every study that draws can be asked for.
+/// Options of every study that draws figures.
 #[derive(Debug, Args)]
 struct Drawing {
     /// Write the figures as PNG as well as SVG, if the program was built with `--features png`.
@@ -235,7 +235,7 @@ struct Drawing {
     png: bool,
 }
 
-/// Where a study's results go; from here on signals stop it.
+/// Settings for the results of a study; from here on, signals stop it.
 fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
     if png {
         ensure_png()?;
@@ -247,8 +247,8 @@ fn settings(out: &Path, png: bool) -> Result<Settings, StudyError> {
     })
 }
 
-/// Writes a small file, which is there as a whole or not at all: a signal waits for it. What is no file, such as
-/// a pipe, may have to be waited for without end.
+/// Writes a small file completely or not at all; a signal is held back until this is done. Writing to
+/// something other than a file, such as a pipe, may never finish, so there signals are not held back.
 fn write_file(path: &Path, content: impl AsRef<[u8]>, reads: &[&Path]) -> Result<(), StudyError> {
     if path.is_file() || !path.exists() {
         let _waits = stop_on_signals()?;
@@ -256,7 +256,7 @@ fn write_file(path: &Path, content: impl AsRef<[u8]>, reads: &[&Path]) -> Result
     write_new(path, content, reads)
 }
 
-/// Ctrl-C, TERM and HUP stop a study, which finishes its files.
+/// Ctrl-C, TERM and HUP stop a study, which then finishes its files.
 fn stop_on_signals() -> Result<Stop, StudyError> {
     Stop::on_signals().map_err(|e| no_handler(&e))
 }
@@ -268,8 +268,8 @@ fn no_handler(why: &std::io::Error) -> StudyError {
     )
 }
 
-/// Prints what came of a study and what of it could not be written, and gives its exit code: that
-/// of an error if a file is missing; that of the signal that stopped it; else whether it `passed`.
+/// Prints the result of a study and what could not be written, and returns the exit code: that of an error if
+/// a file is missing; otherwise that of the signal that stopped it; otherwise that of whether it `passed`.
 fn end<T>(
     finished: Finished<T>,
     json: bool,
@@ -283,7 +283,7 @@ fn end<T>(
     };
     let whole = tell_unwritten(finished.unwritten);
     if let Some(stopped) = &finished.stopped {
-        // The files are what counts; a terminal that hung up takes no text.
+        // The files are what matters; a terminal that hung up takes no text.
         tell(&match whole {
             true => format!(
                 "{stopped}; summary and report hold the results up to that point: {}",
@@ -306,8 +306,8 @@ fn end<T>(
     })
 }
 
-/// The line that says where the report is, or, where a full disk has left none, the results; its
-/// first column is `width` wide.
+/// The line that says where the report is or, if a full disk has left none, where the results are. Its first
+/// column is `width` wide.
 fn place(report: &Path, width: usize) -> String {
     match (report.exists(), report.parent()) {
         (false, Some(folder)) => format!("{:width$}{}\n", "results", folder.display()),
@@ -315,10 +315,10 @@ fn place(report: &Path, width: usize) -> String {
     }
 }
 
-/// Tells what a study could not write; whether that is nothing.
+/// Reports what a study could not write; returns whether everything was written.
 fn tell_unwritten(unwritten: Vec<StudyError>) -> bool {
     let whole = unwritten.is_empty();
-    // What a study refuses in its middle is no file.
+    // A refusal in the middle of a study is not a missing file.
     let is_part = |error: &StudyError| matches!(error, StudyError::Refused { .. });
     let (part, file) = (
         unwritten.iter().any(is_part),
@@ -350,7 +350,7 @@ mod tests {
         command.debug_assert();
     }
 
-    /// The first range `A to B` of a text.
+    /// The first range `A to B` in a text.
     fn range(text: &str) -> Option<[f64; 2]> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let number = |word: &str| {
@@ -363,7 +363,7 @@ mod tests {
         })
     }
 
-    /// Whether the command line takes a value; what else is missing in it does not matter.
+    /// Whether the command line accepts a value, regardless of what else is missing from it.
     fn takes(path: &[String], arg: &clap::Arg, value: f64) -> bool {
         use clap::CommandFactory as _;
         use clap::error::ErrorKind::{InvalidValue, ValueValidation};
@@ -377,7 +377,8 @@ mod tests {
         !matches!(kind, Some(InvalidValue | ValueValidation))
     }
 
-    /// What a help text says of a range is what the command line takes: its ends, and nothing beyond.
+    /// A range stated in a help text is the range that the command line accepts: its ends, and nothing
+    /// beyond.
     #[test]
     fn ranges_in_help_texts_are_those_that_are_taken() {
         use clap::CommandFactory as _;
@@ -393,7 +394,7 @@ mod tests {
                     continue;
                 };
                 let name = format!("{} {}", path.join(" "), arg.get_id());
-                // The next value: of whole numbers 1 away, of others a hundredth.
+                // The next value beyond: 1 away for whole numbers, a hundredth for others.
                 let whole = !takes(&path, arg, low + 0.5 * (high - low).min(1.0));
                 let step = if whole { 1.0 } else { 0.01 };
                 for inside in [low, high] {

@@ -1,4 +1,4 @@
-//! `wheeleg plant`: the pneumatic plant of one axis, checked and exported.
+//! `wheeleg plant`: checks and exports the pneumatic plant of one axis.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use wheeleg_studies::axis_sim::export;
 use wheeleg_studies::axis_sim::plant_check::{self, Finding, PlantCheck, Quantity, Verdict};
 use wheeleg_studies::axis_sim::suite::AxisSimError;
 
-/// Exit code of a check beyond its limit.
+/// Exit code if a finding is beyond its limit.
 const BEYOND: u8 = 1;
 
 /// Arguments of `wheeleg plant`.
@@ -24,7 +24,7 @@ pub(super) struct PlantArgs {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Mass and energy balance, order of convergence, continuity of the flow.
+    /// Check mass and energy balance, order of convergence, and continuity of the flow.
     ///
     /// Exit codes: 0 all within their limits, 1 one is not, 2 error.
     Check(CheckArgs),
@@ -47,7 +47,7 @@ struct ExportArgs {
     /// Built-in axis or path of an axis file.
     #[arg(default_value = "bench-vq110u")]
     axis: String,
-    /// File to write. A file of that name moves to `FILE.previous`.
+    /// File to write. An existing file moves to `FILE.previous`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -90,7 +90,7 @@ fn check(args: &CheckArgs) -> Result<ExitCode, StudyError> {
     })
 }
 
-/// The table of a check, and what it comes to.
+/// The table of a check, and its overall result.
 fn check_text(axis: &str, check: &PlantCheck) -> String {
     let open = check
         .findings

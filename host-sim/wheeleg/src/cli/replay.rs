@@ -1,4 +1,4 @@
-//! `wheeleg replay`: a recorded live session, once more.
+//! `wheeleg replay`: repeats a recorded live session.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -29,12 +29,12 @@ pub(super) struct ReplayArgs {
     json: bool,
 }
 
-/// Refuses a log in the folder of the recording: what stands there is what is repeated.
+/// Refuses a log in the folder of the recording, whose contents are what is repeated.
 fn outside(log: &Path, recording: &Path) -> Result<(), StudyError> {
     let folder = log.parent().filter(|folder| !folder.as_os_str().is_empty());
     let place = std::fs::canonicalize(folder.unwrap_or(Path::new(".")));
     let (Ok(place), Ok(recording)) = (place, std::fs::canonicalize(recording)) else {
-        // Whichever is not there is told by who needs it.
+        // If one of them does not exist, the code that needs it reports this.
         return Ok(());
     };
     if place.starts_with(&recording) {
@@ -49,7 +49,7 @@ fn outside(log: &Path, recording: &Path) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Repeats and compares.
+/// Repeats the recording and compares.
 pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
     let stop = stop_on_signals()?;
     let progress = Progress::new("replay", stop.clone());
@@ -57,7 +57,7 @@ pub(super) fn command(args: &ReplayArgs) -> miette::Result<ExitCode> {
         outside(log, &args.folder)?;
     }
     let recorded = recorded(&args.folder)?;
-    // What cannot be repeated costs no earlier log.
+    // Only now, so that a recording that cannot be repeated costs no earlier log.
     if let Some(log) = &args.log {
         make_room(log, &[])?;
     }

@@ -31,8 +31,8 @@ pub(super) struct RunArgs {
 /// Options of `wheeleg run`, and of `wheeleg` without a command.
 #[derive(Debug, Args)]
 pub(super) struct RunOptions {
-    /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an
-    /// earlier run in it move to its folder `previous`.
+    /// Folder for the results [default: runs/<scenario>-seed<N>]. Results of an earlier run in it move to its
+    /// subfolder `previous`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of all noise, instead of the scenario's.
@@ -45,16 +45,16 @@ pub(super) struct RunOptions {
     /// `sliding`, `predictive`.
     #[arg(long, value_name = "NAME")]
     law: Option<LawChoice>,
-    /// Injects a fault, for example `master-silent@3.2s`; may be given several
-    /// times. `wheeleg faults list` prints them all.
+    /// Inject a fault, for example `master-silent@3.2s`; may be given several times. `wheeleg faults list`
+    /// lists them all.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<FaultSpec>,
     /// Where the nodes run: `sil` in this program, `pil` as the firmware images on
     /// emulated boards, `qemu` as the same applications on QEMU.
     #[arg(long, value_name = "KIND", default_value = "sil")]
     nodes: NodeKind,
-    /// Where one node runs, instead: `joint3=pil`, `wheel7=qemu`,
-    /// `joint1=hil:/dev/ttyACM0`; may be given several times.
+    /// Where a single node runs instead: `joint3=pil`, `wheel7=qemu`, `joint1=hil:/dev/ttyACM0`; may be given
+    /// several times.
     #[arg(long = "node", value_name = "NODE=KIND")]
     node: Vec<NodeChoice>,
     /// Run the scenario once more with all nodes in this program; exit with code
@@ -104,7 +104,7 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     let stop = stop_on_signals()?;
     let mut finished = run::run(&options, &stop)?;
     let mut native = None;
-    // A part of a run equals no whole one.
+    // A partial run never equals a complete one.
     if args.compare_sil && finished.result.summary.complete {
         native = compare_sil(&options, &stop, &finished)?;
     }
@@ -132,16 +132,15 @@ pub(super) fn scenario(scenario: &str, args: &RunOptions) -> Result<ExitCode, St
     Ok(native.map_or(code, |stopped| ExitCode::from(stopped.signal.exit_code())))
 }
 
-/// Bits in which boards outside differ from the application here.
+/// Number of bits in which boards outside this program differ from the application here.
 fn differing_bits(summary: &Summary) -> u64 {
     let pil = summary.pil.as_ref();
     pil.map_or(0, |pil| pil.differing_bits)
 }
 
-/// Repeats a run with all nodes here. The logs hold every input, output,
-/// frame and internal at its time, so equal hashes mean equal runs. Boards here are down
-/// when those outside were; that time is the hardware's. What stopped the native run, if
-/// anything did.
+/// Repeats a run with all nodes in this program. The logs hold every input, output, frame and internal value
+/// at its time, so equal hashes mean equal runs. Boards here are down whenever the boards outside were,
+/// because that time depends on the hardware. Returns what stopped the native run, if anything did.
 fn compare_sil(
     options: &Options,
     stop: &Stop,
@@ -180,7 +179,7 @@ fn compare_sil(
     ))
 }
 
-/// Comparison and figures of boards outside of this program.
+/// Comparison and figures of boards outside this program.
 fn pil_text(pil: &PilSummary) -> String {
     let mut out = format!(
         "boards  {} bits of {} ticks and {} frames compared with the native application, {} differ\n",
@@ -191,7 +190,7 @@ fn pil_text(pil: &PilSummary) -> String {
     }
     for board in &pil.boards {
         let _ = write!(out, "        {} on {}:", board.node, board.host);
-        // What nobody measures where the board runs is left out.
+        // Figures that nobody measures where the board runs are left out.
         let ticks = (
             board.tick_instructions_worst,
             board.tick_instructions_median,
@@ -207,7 +206,7 @@ fn pil_text(pil: &PilSummary) -> String {
     out
 }
 
-/// Messages printed; the report has all of them.
+/// Number of messages printed; the report has all of them.
 const MESSAGES: usize = 40;
 
 /// What went wrong, with the remedies.
@@ -222,7 +221,7 @@ fn messages_text(messages: &[String]) -> String {
     out
 }
 
-/// What came of a run; of each verdict at most so many targets.
+/// The result of a run, with at most `most` targets of each verdict.
 fn run_text(finished: &Finished<Run>, most: usize) -> String {
     let s = &finished.result.summary;
     let mut out = String::new();
@@ -230,7 +229,7 @@ fn run_text(finished: &Finished<Run>, most: usize) -> String {
         let word = if i == 0 { "cause" } else { "" };
         let _ = writeln!(out, "{word:<8}{line}");
     }
-    // A part of a run meets or misses nothing.
+    // A partial run meets or misses nothing.
     if s.complete && !s.targets.is_empty() {
         let required = s.targets.iter().filter(|t| t.required);
         let met = required.clone().filter(|t| t.pass).count();
@@ -274,13 +273,13 @@ fn run_text(finished: &Finished<Run>, most: usize) -> String {
     out
 }
 
-/// Injected faults that are listed; of more there is the number.
+/// Number of injected faults listed; any others are only counted.
 const FAULTS_SHOWN: usize = 20;
 
-/// Targets of one verdict that are listed.
+/// Number of targets listed per verdict.
 const TARGETS_SHOWN: usize = 20;
 
-/// The order in which targets are told: what was missed comes first.
+/// Order in which targets are listed: missed ones come first.
 const ORDER: [Judgement; 5] = [
     Judgement::Missed,
     Judgement::Met,
@@ -289,7 +288,7 @@ const ORDER: [Judgement; 5] = [
     Judgement::Value,
 ];
 
-/// The table of the first targets of each verdict, and of how many more there are.
+/// The table of the first targets of each verdict, with the number of any others.
 fn target_table(targets: &[Target], most: usize) -> String {
     let mut shown: Vec<&Target> = Vec::new();
     let mut more: Vec<String> = Vec::new();
@@ -391,7 +390,7 @@ mod tests {
         assert_eq!(missed, TARGETS_SHOWN, "what was missed comes first: {some}");
         let told = "and more: 60 FAIL, 1900 PASS (see report.html, or give --verbose)";
         assert_eq!(first.last(), Some(&told), "{some}");
-        // Few are all listed, and so are all if they are asked for.
+        // A short list is complete, and so is any list on request.
         assert_eq!(text(20, TARGETS_SHOWN).lines().count(), 21);
         assert_eq!(text(2000, usize::MAX).lines().count(), 2001);
     }

@@ -1,4 +1,4 @@
-//! `wheeleg serve`: one robot, live, for the operator's console: simulated, or real boards.
+//! `wheeleg serve`: runs one robot live for the operator's console, either simulated or with real boards.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
@@ -14,7 +14,7 @@ use wheeleg_console::{ADDRESS, FOLDER, Files, Live, Options, Port, Prepared, Pro
 
 use super::{print, stop_on_signals, tell};
 
-/// Scenario without a name: a level floor, on the robot that walks.
+/// Default scenario: a level floor, with the walking robot.
 const SCENARIO: &str = "stand";
 
 /// Arguments of `wheeleg serve`.
@@ -42,7 +42,7 @@ pub(super) struct ServeArgs {
     /// Certificate for TLS, PEM.
     #[arg(long, value_name = "FILE", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
-    /// Its private key, PEM; only its owner may read it.
+    /// Private key of the certificate, PEM; only its owner may be able to read it.
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
     /// Serve other computers without TLS: clients may watch and stop, but not drive.
@@ -107,7 +107,7 @@ fn parse_speed(text: &str) -> Result<Speed, String> {
     speed.ok_or_else(|| format!("allowed are numbers from {min} to {max}, and max"))
 }
 
-/// Serves until it is told to stop.
+/// Serves until told to stop.
 pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     let stop = stop_on_signals()?;
     let live = Live::load(&args.scenario, args.robot.as_deref())?;
@@ -148,9 +148,9 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
         viewer_pages: args.allow_origin.clone(),
         viewers_write: args.foxglove_write,
     };
-    // Until here a signal ends the program at once: a file that is given may be a pipe.
+    // Until here, a signal ends the program at once, because a given file may be a pipe.
     let prepared = Prepared::new(options)?;
-    // Only now: a server that does not start takes no key from the one that runs.
+    // Only now, so that a server that does not start invalidates no key of a running server.
     if let Some(keys) = new_keys {
         keys.replace(&folder)?;
     }
@@ -163,7 +163,7 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
             "NOT PROTECTED: anyone on the network can read and alter the traffic. Clients may only watch and stop.\n",
         );
     }
-    // The key is for who sits here; no pipe and no log gets it.
+    // The key is only for the user at this terminal; no pipe and no log gets it.
     if std::io::stdout().is_terminal() && !server.is_look_only() {
         let _ = writeln!(text, "open     {url}/#k={control}");
         let _ = writeln!(text, "watch    {url}/#v={view}");
@@ -233,7 +233,7 @@ pub(super) fn command(args: &ServeArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::from(signal.exit_code()))
 }
 
-/// Tells once of a recording that a full disk has ended.
+/// Reports once that a full disk has ended a recording.
 fn tell_cut_short(failure: Option<String>, told: &mut Option<String>) {
     if let Some(why) = failure.as_ref().filter(|_| failure != *told) {
         tell(&format!("the recording is cut short: {why}"));

@@ -1,4 +1,4 @@
-//! `wheeleg tune`: one cylinder with a user's own parameters.
+//! `wheeleg tune`: tunes one cylinder with a user's own parameters.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ use wheeleg_studies::tune::{self, Section, Tuned};
 pub(super) struct TuneArgs {
     /// Built-in axis or path of an axis file.
     axis: String,
-    /// Folder for report, figures and parameters [default: runs/tune-<axis>]. Results
-    /// of an earlier run in it move to its folder `previous`.
+    /// Folder for report, figures and parameters [default: runs/tune-<axis>]. Results of an earlier run in it
+    /// move to its subfolder `previous`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Seed of the ADC noise.
@@ -37,7 +37,7 @@ pub(super) struct TuneArgs {
     json: bool,
 }
 
-/// Reads a section by its name.
+/// Parses the name of a section.
 fn sections() -> impl TypedValueParser<Value = Section> {
     let values = Section::ALL.map(|section| PossibleValue::new(section.name()).help(section.doc()));
     PossibleValuesParser::new(values).map(|name| {

@@ -1,19 +1,18 @@
-//! What is said of a command line that cannot be read.
+//! Error messages for a command line that cannot be parsed.
 
 use std::ffi::{OsStr, OsString};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Parser};
 
-/// An option of more commands than these is known to the reader.
+/// An option of more commands than these is assumed to be familiar.
 const COMMANDS: usize = 3;
 
-/// Reads a command line. An option that the command does not have is answered with the
-/// commands that have it; the parser's own tip, to pass it as a value, would lead to a
-/// scenario or an axis of that name.
+/// Parses a command line. If a command does not have an option, the error names the commands that have it;
+/// the parser's own tip, to pass it as a value, would lead to a scenario or an axis of that name.
 ///
 /// # Errors
-/// As [`Parser::try_parse_from`]; also if a word is longer than any path.
+/// As for [`Parser::try_parse_from`]; also if a word is longer than any path.
 pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C, clap::Error> {
     let line: Vec<OsString> = line.collect();
     let too_long = line.iter().find(|word| word.len() > LONGEST);
@@ -49,13 +48,13 @@ pub(super) fn parse<C: Parser>(line: impl Iterator<Item = OsString>) -> Result<C
     })
 }
 
-/// Where the commands of the robot are.
+/// Where to find the commands of the robot.
 const TAKE: &str = "commands of the robot go through `take`, as `wheeleg ctl take -- Walk`; `wheeleg commands` lists them";
 
-/// Longest word of a command line, bytes: no path, and no name, is longer.
+/// Longest accepted word of a command line, bytes: no path or name is longer.
 const LONGEST: usize = 4096;
 
-/// What is said of a longer one.
+/// Message for a longer word.
 fn refusal(word: &OsStr) -> String {
     format!(
         "an argument has {} bytes: allowed are {LONGEST}. It begins with `{}`",
@@ -64,11 +63,10 @@ fn refusal(word: &OsStr) -> String {
     )
 }
 
-/// Longest line of a refusal, characters.
+/// Longest line of an error message, characters.
 const LINE: usize = 800;
 
-/// Says what is wrong with a command line and ends the program; whatever was given is told no longer
-/// than anybody reads it.
+/// Prints what is wrong with a command line and ends the program; long input is cut to a readable length.
 pub(super) fn refuse(wrong: &clap::Error) -> ! {
     let whole = wrong.render().to_string();
     let text = shortened(&whole);
@@ -79,7 +77,7 @@ pub(super) fn refuse(wrong: &clap::Error) -> ! {
     std::process::exit(wrong.exit_code());
 }
 
-/// The same with long words, and long lines of short ones, cut.
+/// The text with long words, and long lines of short words, cut.
 fn shortened(text: &str) -> String {
     let line = |line: &str| {
         let words = line.split_inclusive(char::is_whitespace);
@@ -97,7 +95,7 @@ fn shortened(text: &str) -> String {
     text.split_inclusive('\n').map(line).collect()
 }
 
-/// Adds the commands that have an option, as one writes them.
+/// Collects the commands that have an option, as typed by the user.
 fn find(command: &Command, option: &str, having: &mut Vec<String>) {
     let name = |arg: &clap::Arg| arg.get_long().map(|long| format!("--{long}"));
     if command
@@ -174,7 +172,7 @@ mod tests {
                 lengths.push(whole.len());
             }
         }
-        // Some parsers tell it in short themselves; most do not.
+        // Some parsers already shorten it themselves; most do not.
         let long = lengths.iter().filter(|length| **length > 50_000).count();
         assert!(2 * long > lengths.len(), "{lengths:?}");
         let short = said(&["wheeleg", "run", "stand", "--law", "pdi"]);

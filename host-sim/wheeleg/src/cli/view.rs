@@ -1,4 +1,4 @@
-//! `wheeleg view`: a log, or two, as one page.
+//! `wheeleg view`: one log, or two, as a single page.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -27,7 +27,7 @@ pub(super) struct ViewArgs {
         value_parser = seconds
     )]
     from: f64,
-    /// Its end [default: that of the log].
+    /// End of the part to show [default: end of the log].
     #[arg(
         long,
         value_name = "S",
@@ -42,18 +42,18 @@ pub(super) struct ViewArgs {
     /// Robot whose dimensions the drawing uses (built in, or path of a TOML file), instead of the log's.
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
-    /// The page [default: log.html next to the first log].
+    /// Page to write [default: log.html next to the first log].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// A time of a log.
+/// Parses a time of a log.
 fn seconds(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|s| s.is_finite());
     number.ok_or_else(|| "allowed are seconds with a decimal point, such as 0.1".to_owned())
 }
 
-/// The log of what is given, which may be a folder.
+/// The log at a given path, which may be a folder.
 fn log_in(given: &Path) -> Result<PathBuf, StudyError> {
     let log = log_of(given);
     if given.is_dir() && !log.exists() {
@@ -76,7 +76,7 @@ fn log_in(given: &Path) -> Result<PathBuf, StudyError> {
     Ok(log)
 }
 
-/// Makes the page and says where it is.
+/// Makes the page and prints where it is.
 pub(super) fn command(args: &ViewArgs) -> Result<ExitCode, StudyError> {
     let logs = args.logs.iter().map(|log| log_in(log));
     let logs = logs.collect::<Result<Vec<PathBuf>, _>>()?;

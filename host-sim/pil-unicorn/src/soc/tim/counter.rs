@@ -1,13 +1,13 @@
-//! The counter: up at the divided clock, or both ways in encoder mode.
+//! The counter: counts up at the divided clock, or in both directions in encoder mode.
 
 use super::Tim;
 
 impl Tim {
-    /// Counter at a cycle.
+    /// Value of the counter at a cycle.
     pub(crate) fn count(&self, cycle: u64) -> u32 {
         if self.encoder_mode() {
-            // Both edges of both signals; an inverted A turns the direction:
-            // A leads B counts up, and forward is B before A.
+            // Both edges of both signals count. Inverting A reverses the direction: A leading B counts up,
+            // and forward is B before A.
             let moved = self.edges.wrapping_sub(self.edges_base);
             let up = if self.ccer & 2 != 0 {
                 moved
@@ -27,18 +27,18 @@ impl Tim {
         self.smcr & 7 == 3
     }
 
-    /// A counter that is reset with the wheel where `old` has seen it.
+    /// After a reset of the counter, keeps the wheel where `old` last saw it.
     pub(crate) fn keep_wheel(&mut self, old: &Self) {
         self.edges = old.edges;
         self.edges_base = old.edges;
     }
 
-    /// The wheel turned: edges since power-up.
+    /// Sets the wheel's position, in edges since power-up.
     pub(crate) fn turn(&mut self, edges: i32) {
         self.edges = edges;
     }
 
-    /// The counter was started where the wheel stood at `edges`.
+    /// Starts counting with the wheel at `edges`.
     pub(crate) fn count_from(&mut self, edges: i32) {
         self.edges_base = edges;
     }
@@ -61,7 +61,7 @@ impl Tim {
         }
         let reaches =
             |end: u32| self.since + (u64::from(end) + 1 - u64::from(self.base)) * self.divider();
-        // Beyond its end a counter goes on to the end of its bits.
+        // Beyond its reload value, a counter continues to the end of its bits.
         if self.base <= self.arr_now {
             let at = reaches(self.arr_now);
             if at > self.seen {

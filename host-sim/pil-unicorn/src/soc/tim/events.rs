@@ -1,4 +1,4 @@
-//! Updates, matches and captures: what a timer does to others, and others to it.
+//! Updates, matches and captures: how a timer acts on others, and others on it.
 
 use super::{AOE, Event, MOE, Tim};
 
@@ -24,7 +24,7 @@ impl Tim {
         if at > self.seen {
             return Some(at);
         }
-        // A free-running counter comes by again after its whole range.
+        // A free-running counter reaches the value again after its whole range.
         (self.arr_now == self.top()).then(|| at + (u64::from(self.top()) + 1) * self.divider())
     }
 
@@ -39,7 +39,7 @@ impl Tim {
             if self.listens_to_update() {
                 next = overflow.map(|at| (at, Event::Update));
             }
-            // A match beyond the overflow of a counter that reloads comes after it.
+            // If the counter reloads, a match beyond the overflow comes only after it.
             if self.arr_now != self.top() {
                 end = overflow.unwrap_or(u64::MAX);
             }
@@ -70,7 +70,7 @@ impl Tim {
         }
     }
 
-    /// Reload of all preloaded registers.
+    /// Loads all preloaded registers.
     pub(super) fn update(&mut self) {
         self.psc_now = self.psc;
         self.arr_now = self.arr;
@@ -81,17 +81,17 @@ impl Tim {
         }
     }
 
-    /// Whether an update is a trigger for others.
+    /// Whether an update triggers others.
     pub(crate) fn triggers_on_update(&self) -> bool {
         self.cr2 >> 4 & 7 == 2
     }
 
-    /// Whether a match of channel 1 is a trigger for others.
+    /// Whether a match of channel 1 triggers others.
     pub(crate) fn triggers_on_match(&self) -> bool {
         self.cr2 >> 4 & 7 == 3
     }
 
-    /// A trigger on internal input `itr`: capture, or start of a one-shot.
+    /// Handles a trigger on internal input `itr`: captures, or starts a one-shot.
     pub(crate) fn trigger(&mut self, itr: u32, cycle: u64) {
         if self.smcr >> 4 & 7 != itr || self.smcr & (3 << 20) != 0 {
             return;
@@ -111,7 +111,7 @@ impl Tim {
         }
     }
 
-    /// One-pulse timer waiting for its trigger `itr`.
+    /// Whether this is a one-pulse timer waiting for trigger `itr`.
     pub(crate) fn waits_for(&self, itr: u32) -> bool {
         self.smcr & 7 == 6 && self.smcr >> 4 & 7 == itr && !self.runs()
     }
@@ -121,7 +121,7 @@ impl Tim {
         self.sr & self.dier & 0x1F != 0
     }
 
-    /// Takes the DMA request of a channel, if there is one.
+    /// Whether the DMA request of a channel is enabled.
     pub(crate) fn dma_request(&self, channel: usize) -> bool {
         self.dier >> (9 + channel) & 1 != 0
     }

@@ -1,9 +1,8 @@
 //! Timers: TIM1, TIM2, TIM3, TIM8, TIM15.
 //!
-//! A counter is not stepped: its value follows from the cycle at which it had
-//! a known one. Only what has a consequence is an event: an update that
-//! triggers, interrupts, reloads or stops something, and a match or capture
-//! that somebody listens to.
+//! A counter is not stepped: its value follows from the cycle at which it had a known value. Only what has a
+//! consequence is an event: an update that triggers, interrupts, reloads or stops something, and a match or
+//! capture that something listens to.
 
 mod counter;
 mod events;
@@ -12,7 +11,7 @@ mod registers;
 #[cfg(test)]
 mod tests;
 
-/// Which timer, with what it can do.
+/// Kind of a timer, by its abilities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// TIM1, TIM8: complementary outputs and break.
@@ -58,7 +57,7 @@ pub(crate) struct Tim {
     ccr_now: [u32; 4],
     bdtr: u32,
     af1: u32,
-    /// The counter had `base` at `since`.
+    /// The counter had the value `base` at cycle `since`.
     base: u32,
     since: u64,
     /// Events up to this cycle have been handled.
@@ -66,7 +65,7 @@ pub(crate) struct Tim {
     /// Quadrature edges since power-up, as the plant counts them (encoder mode).
     edges: i32,
     edges_base: i32,
-    /// The counter as the program read it last.
+    /// The counter value that the program read last.
     pub(crate) counted: u32,
 }
 
@@ -108,7 +107,7 @@ impl Tim {
         }
     }
 
-    /// The counter runs.
+    /// Whether the counter runs.
     pub(crate) fn runs(&self) -> bool {
         self.cr1 & 1 != 0
     }

@@ -23,7 +23,7 @@ pub(super) const AF1: usize = 0x60;
 
 /// AF1: the break pin is a source of the break.
 const BKINE: u32 = 1;
-/// SR: a break has come by a pin, or from within the system.
+/// SR: a break has come from a pin, or from within the system.
 const BIF: u32 = 1 << 7;
 pub(super) const SBIF: u32 = 1 << 13;
 
@@ -51,7 +51,7 @@ impl Tim {
             CCR1..=CCR4 if offset.is_multiple_of(4) => {
                 let channel = (offset - CCR1) / 4;
                 if self.ccmr_of(channel) & 3 != 0 {
-                    // Reading a capture takes its flag away.
+                    // Reading a capture clears its flag.
                     self.sr &= !(2 << channel);
                 }
                 self.ccr[channel]
@@ -79,7 +79,7 @@ impl Tim {
                     self.seen = cycle;
                 }
             }
-            // Idle states other than low would be an output that is on without MOE.
+            // An idle state other than low would be an output that is on without MOE.
             CR2 => {
                 only(0x70)?;
                 if !matches!(value >> 4 & 7, 0 | 2 | 3) {
@@ -97,7 +97,7 @@ impl Tim {
                 if !known {
                     return Err(Refusal::Bits(value));
                 }
-                // A counter of the clock goes on as it was, and a one-shot with it.
+                // A counter of the clock keeps its value, and so does a one-shot.
                 if self.encoder_mode() || value & 7 == 3 {
                     let count = self.count(cycle);
                     self.set_count(count, cycle);
@@ -125,7 +125,7 @@ impl Tim {
             CCMR1 => self.set_modes(0, value)?,
             CCMR2 if self.kind != Kind::Small => self.set_modes(1, value)?,
             CCER => {
-                // In encoder mode the first signal's polarity alone turns the direction.
+                // In encoder mode, only the first signal's polarity may reverse the direction.
                 let inverted = if self.encoder_mode() {
                     SECOND_INVERTED
                 } else {
@@ -157,12 +157,12 @@ impl Tim {
                 let channel = (offset - CCR1) / 4;
                 self.ccr[channel] = value & self.top();
                 let preload = self.ccmr_of(channel) & 8 != 0;
-                // Updates that nobody listens to are no events here; they come
-                // within one period, 50 µs on the motor's bridge.
+                // Updates that nothing listens to are not events here; they come within one period, 50 µs on
+                // the motor's bridge.
                 if !preload || !self.listens_to_update() {
                     self.ccr_now[channel] = self.ccr[channel];
                 }
-                // What lies behind is not reached again before the next round.
+                // A value already passed is not reached again before the next round.
                 self.seen = self.seen.max(cycle);
             }
             BDTR if matches!(self.kind, Kind::Advanced | Kind::Small) => {
@@ -182,7 +182,8 @@ impl Tim {
         Ok(())
     }
 
-    /// Modes of two channels. An output has one of those that [`Self::high_counts`] knows.
+    /// Sets the modes of two channels. An output must have one of the modes that [`Self::high_counts`]
+    /// supports.
     fn set_modes(&mut self, half: usize, value: u32) -> Result<(), Refusal> {
         self.ccmr[half] = value;
         for channel in [2 * half, 2 * half + 1] {

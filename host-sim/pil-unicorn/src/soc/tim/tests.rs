@@ -1,4 +1,4 @@
-//! Timers as the images set them up.
+//! Timers as the images configure them.
 
 use super::registers::{ARR, BDTR, CCER, CCMR1, CCR1, CCR4, CNT, CR1, CR2, DIER, EGR, PSC, SMCR};
 use super::*;
@@ -88,7 +88,7 @@ fn a_one_shot_ends_itself() {
     tim.trigger(1, 1000);
     let pulse = Some((1170, 1000 + 14 * 170));
     assert_eq!(tim.pulse(tim.started_at()), pulse);
-    // The next trigger is not wanted: that of this one stays as it is.
+    // The next trigger is disabled; the current pulse stays as it is.
     tim.write(SMCR, 0, 1000 + 5 * 170 + 7).expect("modelled");
     assert_eq!(tim.pulse(tim.started_at()), pulse);
     assert_eq!(tim.next(), Some((1000 + 14 * 170, Event::Update)));
@@ -103,7 +103,7 @@ fn settings_that_are_not_modelled_are_refused() {
     assert!(tim.write(CCMR1, 0x30, 0).is_err());
     assert!(tim.write(CCMR1, 1 << 24 | 0x6000, 0).is_err());
     tim.write(CCMR1, 0x7060, 0).expect("modelled");
-    // An inverted second signal would turn the direction of an encoder.
+    // An inverted second signal would reverse the direction of an encoder.
     let mut encoder = Tim::new(Kind::General);
     encoder.write(SMCR, 3, 0).expect("modelled");
     assert!(encoder.write(CCER, 0x20, 0).is_err());

@@ -1,4 +1,4 @@
-//! What `wheeleg campaign` prints.
+//! Output of `wheeleg campaign`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use wheeleg_report::number::p_equals;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::schema;
 
-/// Prints cases: place, identity, seed, and the value of each factor.
+/// Prints cases: index, identity, seed, and the value of each factor.
 pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError> {
     let plan = cases.plan();
     let names = plan
@@ -36,7 +36,7 @@ pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError>
             let _ = write!(line, "\t{value}");
         }
         line.push('\n');
-        // Each line takes a case to work out: nobody waits for the others.
+        // Each case takes time to build, so print each line at once.
         if !super::super::print_on(&line)? {
             break;
         }
@@ -44,16 +44,16 @@ pub(super) fn list(cases: &Cases<'_>, most: u64) -> Result<ExitCode, StudyError>
     Ok(ExitCode::SUCCESS)
 }
 
-/// How long a pilot took.
+/// Duration of a pilot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Took {
-    /// From its begin to its end.
+    /// From start to end.
     pub(super) took: Duration,
-    /// Cases that ran beside each other.
+    /// Number of cases that ran in parallel.
     pub(super) threads: usize,
 }
 
-/// What a process did, and what comes next.
+/// What a process did, and what to do next.
 pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -> String {
     let mut out = format!("cases   {} of {}", ran.found + ran.computed, ran.of);
     if shard != Shard::ALL {
@@ -110,7 +110,7 @@ fn causes(causes: &Causes) -> String {
     out
 }
 
-/// A table that was made.
+/// A merged table.
 pub(super) fn merged(merged: &Merged, table: &Path) -> String {
     let mut out = format!("rows    {}\n", merged.rows);
     if merged.missing > 0 {
@@ -121,12 +121,12 @@ pub(super) fn merged(merged: &Merged, table: &Path) -> String {
     out
 }
 
-/// The same as JSON.
+/// The merged table as JSON.
 pub(super) fn merged_json(merged: &Merged, table: &Path) -> String {
     schema::indented(&MergeForm::of(merged, table))
 }
 
-/// What would be given to Slurm.
+/// What would be submitted to Slurm.
 pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
     let array = submission.slurm_arguments(further).join(" ");
     let merge = submission.merge_arguments("ARRAY", further);
@@ -138,7 +138,7 @@ pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
     )
 }
 
-/// How far a campaign is.
+/// Progress of a campaign.
 pub(super) fn state(state: &State, store: &Store) -> String {
     let mut out = format!("cases   {} of {} have a result\n", state.rows, state.cases);
     if state.partial > 0 {
@@ -181,7 +181,7 @@ pub(super) fn state(state: &State, store: &Store) -> String {
     out + &bad_parts(&state.bad)
 }
 
-/// Parts that cannot be read.
+/// Unreadable or foreign parts.
 fn bad_parts(bad: &[(PathBuf, String)]) -> String {
     let lines = bad
         .iter()
@@ -189,12 +189,12 @@ fn bad_parts(bad: &[(PathBuf, String)]) -> String {
     listed(lines, "bad     and", "more: --json has them all")
 }
 
-/// The same as a line of JSON.
+/// Progress of a campaign, as a line of JSON.
 pub(super) fn state_json(state: &State) -> String {
     schema::line(&StatusForm::of(state))
 }
 
-/// A case that was run again.
+/// A replayed case.
 pub(super) fn replayed(replayed: &Replayed) -> String {
     let row = &replayed.row;
     let mut out = format!("case    {}, place {}\n", row.case, row.index);
@@ -234,7 +234,7 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
     out
 }
 
-/// Columns that are named where a row differs.
+/// Number of differing columns that are named.
 const COLUMNS: usize = 8;
 
 /// The first columns of a list, and how many more there are.
@@ -247,7 +247,7 @@ fn in_short(columns: &[String]) -> String {
     out
 }
 
-/// What a table says, in a few lines.
+/// The findings of a table, in a few lines.
 pub(super) fn findings(
     table: &Path,
     findings: &Findings,
@@ -307,10 +307,10 @@ pub(super) fn findings(
     out
 }
 
-/// Lines of a list that are printed.
+/// Number of lines of a list that are printed.
 const LISTED: usize = 20;
 
-/// The first lines of a list; of more there is a line with their number between two texts.
+/// The first lines of a list. If there are more, a final line has their number between the two texts.
 fn listed(lines: impl ExactSizeIterator<Item = String>, before: &str, after: &str) -> String {
     let more = lines.len().saturating_sub(LISTED);
     let mut out: String = lines.take(LISTED).map(|line| line + "\n").collect();
@@ -331,7 +331,7 @@ fn pair(p: &Paired) -> String {
     )
 }
 
-/// The same as JSON.
+/// The findings as JSON.
 pub(super) fn findings_json(findings: &Findings, against: Option<&Pairs>) -> String {
     schema::indented(&ReportForm { findings, against })
 }
@@ -341,7 +341,7 @@ mod tests {
     use super::*;
     use wheeleg_campaign::report::Rate;
 
-    /// Lines that begin with a word, and the last of them.
+    /// Number of lines that begin with a word, and the last of them.
     fn lines(text: &str, word: &str) -> (usize, String) {
         let own = text.lines().filter(|line| line.starts_with(word));
         let own: Vec<&str> = own.collect();

@@ -1,4 +1,4 @@
-//! `wheeleg ctl param`: parameters of the boards. Each command asks the board, under the control.
+//! `wheeleg ctl param`: parameters of the boards. Each command takes control and asks the board.
 
 use std::process::ExitCode;
 
@@ -25,16 +25,16 @@ pub(super) enum ParamCommand {
     Get {
         #[arg(value_parser = whole(1, BOARDS), help = board())]
         board: u8,
-        /// Parameter by its name, such as error_scale.
+        /// Name of the parameter, such as error_scale.
         parameter: String,
     },
     /// Write a parameter of a board, and read it back. Unless it is saved, it lasts until power-off.
     Set {
         #[arg(value_parser = whole(1, BOARDS), help = board())]
         board: u8,
-        /// Parameter by its name, such as error_scale.
+        /// Name of the parameter, such as error_scale.
         parameter: String,
-        /// Value in the parameter's unit; true or false of a flag.
+        /// Value in the parameter's unit; true or false for a flag.
         #[arg(allow_negative_numbers = true, value_parser = value)]
         value: Value,
     },
@@ -51,7 +51,7 @@ fn value(text: &str) -> Result<Value, String> {
     read.ok_or_else(|| "allowed are numbers, such as 21 or 0.03, true and false".to_owned())
 }
 
-/// Does what is asked of a board.
+/// Carries out a command on a board.
 pub(super) fn command(reach: &Reach, command: &ParamCommand) -> miette::Result<ExitCode> {
     let read = |board: u8, parameter: &str| {
         let arguments = json!({ "board": board, "parameter": parameter });
@@ -101,7 +101,7 @@ pub(super) fn command(reach: &Reach, command: &ParamCommand) -> miette::Result<E
     })?)
 }
 
-/// Value and unit of a parameter that its board has told, in the answer of `/api/v1/parameters`.
+/// Value and unit of a parameter that its board has reported, in the answer of `/api/v1/parameters`.
 fn reported<'a>(all: &'a Value, board: u8, parameter: &str) -> Option<(&'a Value, &'a str)> {
     let mut boards = all["boards"].as_array()?.iter();
     let board = boards.find(|of| of["address"] == board)?;

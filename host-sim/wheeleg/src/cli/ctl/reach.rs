@@ -1,4 +1,4 @@
-//! How a server is reached, and the control of its robot for the length of a command.
+//! Reaches a server, and takes control of its robot for the duration of a command.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,27 +22,27 @@ use wheeleg_telemetry::event::reject_name;
 use super::super::exit::{LOST, REFUSED};
 use super::super::{print, tell, tell_error};
 
-/// Status of HTTP for a key that is none of the server's.
+/// HTTP status for a key that is not one of the server's.
 const WRONG_KEY: u16 = 401;
-/// What is said where the control could not be given back.
+/// Message if control could not be released.
 const NOT_RELEASED: &str = "the control is not released: the robot will hold";
-/// Longest time that a walk needs to put both feet down.
+/// Longest time that a walk takes to put both feet down.
 const COMES_TO_REST: Duration = Duration::from_secs(20);
-/// Between two attempts to release the control, each of which is an event.
+/// Interval between two attempts to release control, each of which is an event.
 const BETWEEN: Duration = Duration::from_millis(500);
-/// How long a command of this program may be under way, ms.
+/// Longest time that a command of this program may be in transit, ms.
 const VALID_MS: u32 = 1_000;
 
-/// Which server, and how its answers are printed.
+/// Selects the server, and how its answers are printed.
 #[derive(Debug, Args)]
 pub(super) struct Reach {
     /// Address of the server.
     #[arg(long, global = true, value_name = "URL", default_value = ADDRESS, value_parser = Url::parse)]
     url: Url,
-    /// SHA-256 of the certificate of a server with TLS, as it prints it.
+    /// SHA-256 fingerprint of the certificate of a TLS server, as the server prints it.
     #[arg(long, global = true, value_name = "HEX", value_parser = Fingerprint::parse)]
     fingerprint: Option<Fingerprint>,
-    /// File of the key [default: the one that `wheeleg serve` has made].
+    /// Key file [default: the one made by `wheeleg serve`].
     #[arg(long, global = true, value_name = "FILE")]
     key: Option<PathBuf>,
     /// Print JSON.
@@ -51,7 +51,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// The server that is meant.
+    /// URL of the server, with its certificate.
     pub(super) fn url(&self) -> Url {
         let url = self.url.clone();
         match self.fingerprint {
@@ -60,7 +60,7 @@ impl Reach {
         }
     }
 
-    /// The key that is given, or that of `file`.
+    /// The given key, or that in `file`.
     pub(super) fn key(&self, file: &str) -> miette::Result<Key> {
         Ok(keys::read(&self.key_path(file)?)?)
     }
@@ -72,7 +72,7 @@ impl Reach {
         })
     }
 
-    /// Tells what a server refuses over HTTP to who has the key of `file`; the exit code.
+    /// Prints why a server refused an HTTP request made with the key in `file`; returns the exit code.
     pub(super) fn not_answered(&self, problem: &Value, file: &str) -> miette::Result<ExitCode> {
         if problem["status"] == WRONG_KEY {
             let path = self.key_path(file)?;
@@ -82,7 +82,7 @@ impl Reach {
             );
             return Ok(ExitCode::from(REFUSED));
         }
-        // A false server may have written it.
+        // A false server may have written this.
         let text = |name: &str| plain(problem[name].as_str().unwrap_or_default());
         let remedy = match text("remedy") {
             remedy if remedy.is_empty() => ANSWERS.to_owned(),
@@ -92,21 +92,21 @@ impl Reach {
         Ok(ExitCode::from(REFUSED))
     }
 
-    /// A session that may drive.
+    /// Opens a session that may drive.
     pub(super) fn control(&self) -> miette::Result<Client> {
         let key = self.key(CONTROL_FILE)?;
         Ok(Client::connect(&self.url(), "control", PROGRAM, &key)?)
     }
 
-    /// Takes the control, gives commands up to the first that is not done, and releases the control;
-    /// how the last one ended.
+    /// Takes control, sends commands until one is not done, and releases control; returns how the last one
+    /// ended.
     pub(super) fn in_control(&self, commands: &[(&str, Value)]) -> miette::Result<Outcome> {
         let ended = self.in_control_unless(commands, &Stop::default())?;
         Ok(ended.unwrap_or(Outcome::Unknown))
     }
 
-    /// The same until a signal: what moves is then brought to rest before the control is released.
-    /// `None` after a signal.
+    /// As [`Self::in_control`], but only until a signal: moving parts are then brought to rest before control
+    /// is released. Returns `None` after a signal.
     pub(super) fn in_control_unless(
         &self,
         commands: &[(&str, Value)],
@@ -122,7 +122,7 @@ impl Reach {
         if end != Outcome::Done {
             return Ok(Some(end));
         }
-        // From here on a signal has to leave the robot at rest.
+        // From here on, a signal must leave the robot at rest.
         stop.begin();
         for (name, arguments) in commands {
             let n = client.give(name, arguments, VALID_MS)?;
@@ -146,14 +146,14 @@ impl Reach {
         Ok(Some(end))
     }
 
-    /// Gives a command to the simulation; how it ended.
+    /// Sends a command to the simulation; returns how it ended.
     pub(super) fn give(&self, name: &str, arguments: &Value) -> miette::Result<Outcome> {
         ensure_fits(name, arguments)?;
         let mut client = self.control()?;
         Ok(client.carry_out(name, arguments, VALID_MS)?)
     }
 
-    /// Prints how a request ended; its exit code.
+    /// Prints how a request ended; returns its exit code.
     pub(super) fn print_outcome(&self, end: &Outcome) -> miette::Result<ExitCode> {
         let (status, code, reason, text) = match end {
             Outcome::Done => ("done", 0, "", ""),
@@ -173,15 +173,15 @@ impl Reach {
                 Outcome::Refused { reason, .. } => help(reason),
                 _ => ANSWERS,
             };
-            // It may quote what was given.
+            // The text may quote the input.
             tell_server(plain(&format!("{status}: {text}")), help);
         }
         Ok(ExitCode::from(code))
     }
 }
 
-/// Ends what the command `name` has begun, and releases the control: a walk with both feet down,
-/// anything else where it is.
+/// Ends what the command `name` has begun, and releases control: a walk ends with both feet down, anything
+/// else where it is.
 fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
     let is_gait = matches!(
         CommandCode::of_name(name),
@@ -189,13 +189,13 @@ fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
     );
     let give = |client: &mut Client, name: &str| client.carry_out(name, &json!({}), VALID_MS);
     if !is_gait || give(client, "StopGait")? != Outcome::Done {
-        // Refused where nothing is armed: then nothing moves.
+        // Refused if the robot is not armed; then nothing moves.
         give(client, "Hold")?;
     }
     let end_of_wait = Instant::now() + COMES_TO_REST;
     keep_until(client, end_of_wait, |state| state["stepping"] != true);
     let mut end = give(client, "ReleaseControl")?;
-    // Refused as long as the robot moves.
+    // Refused while the robot moves.
     while matches!(end, Outcome::Refused { .. }) && Instant::now() <= end_of_wait {
         keep_until(client, Instant::now() + BETWEEN, |_| false);
         end = give(client, "ReleaseControl")?;
@@ -206,7 +206,7 @@ fn bring_to_rest(client: &mut Client, name: &str) -> miette::Result<()> {
     Ok(())
 }
 
-/// Keeps the control until then, or until the state is as wanted, or the connection has ended.
+/// Keeps control until `end`, until the state is as wanted, or until the connection ends.
 fn keep_until(client: &mut Client, end: Instant, wanted: impl Fn(&Value) -> bool) {
     while Instant::now() < end {
         match client.read() {
@@ -217,7 +217,7 @@ fn keep_until(client: &mut Client, end: Instant, wanted: impl Fn(&Value) -> bool
     }
 }
 
-/// What helps whoever was refused for this reason.
+/// Advice for a refusal with this reason.
 fn help(reason: &str) -> &'static str {
     if reason == reject_name(&Reject::Refused(Refusal::NoAir)) {
         return "`wheeleg ctl watch /supply` prints the pressure in the reservoir";
@@ -232,25 +232,25 @@ fn help(reason: &str) -> &'static str {
     }
 }
 
-/// What helps where nobody answers.
+/// Advice if nobody answers.
 const ANSWERS: &str = "`wheeleg ctl status` tells whether the server answers";
 
-/// Tells that the connection has ended; the exit code.
+/// Reports that the connection has ended; returns the exit code.
 pub(super) fn ended() -> ExitCode {
     tell_server("the connection has ended".to_owned(), ANSWERS);
     ExitCode::from(LOST)
 }
 
-/// Tells what a server has refused or left unanswered, as every error is told.
+/// Reports what a server has refused or left unanswered, in the form of every error.
 fn tell_server(what: String, help: impl Into<String>) {
     let help = help.into();
     tell_error(ConsoleError::Other { what, help });
 }
 
-/// Bytes of a frame beside the command in it.
+/// Bytes of a frame apart from its command.
 const AROUND: usize = 256;
 
-/// Refuses what the server would not read: it ends the connection at a frame that is too long.
+/// Refuses a command that the server would not read: it closes the connection at a frame that is too long.
 fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
     let bytes = name.len() + arguments.to_string().len();
     let most = FRAME_MAX - AROUND;
@@ -267,7 +267,8 @@ fn ensure_fits(name: &str, arguments: &Value) -> Result<(), StudyError> {
 mod tests {
     use super::*;
 
-    /// What is misspelt is looked up in a list; what the robot cannot do now is asked of the robot.
+    /// A misspelt word is looked up in a list; for what the robot cannot do now, the advice is to ask the
+    /// robot.
     #[test]
     fn the_help_fits_the_reason() {
         for (reason, part) in [

@@ -1,5 +1,5 @@
-//! A terminal that a program draws on as a whole, and reads key by key. However the program ends, by
-//! itself, by a panic or by a signal that it waits for, the terminal is as it was before.
+//! A terminal on which the program draws full-screen and from which it reads single keys. However the program
+//! ends, normally, by a panic or by a handled signal, the terminal is restored.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -8,7 +8,7 @@ use super::super::fit;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcgetwinsize, tcsetattr};
 
-/// Another screen than the one with what was said before; no cursor; lines are cut, not wrapped.
+/// Switches to the alternate screen, hides the cursor, and truncates lines instead of wrapping them.
 const ENTER: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[?7l";
 const LEAVE: &str = "\u{1b}[?7h\u{1b}[?25h\u{1b}[?1049l";
 const HOME: &str = "\u{1b}[H";
@@ -17,20 +17,20 @@ const TO_SCREEN_END: &str = "\u{1b}[J";
 const INVERSE: &str = "\u{1b}[7m";
 const PLAIN: &str = "\u{1b}[0m";
 
-/// Columns and rows of a terminal that does not tell.
+/// Assumed columns and rows of a terminal that does not report them.
 const USUAL: (usize, usize) = (80, 24);
 
-/// How the terminal was, while it is ours.
+/// The terminal's previous settings, while it is in use.
 static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
-/// A key that means something here.
+/// A key with a meaning here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Key {
-    /// Esc by itself, not as the first of an arrow key's bytes.
+    /// Esc alone, not as the first byte of an arrow key.
     Escape,
-    /// Ctrl-C, which is a key while the terminal is ours.
+    /// Ctrl-C, which is a key while the terminal is in use.
     Interrupt,
-    /// Ctrl-Z, which is a key as well.
+    /// Ctrl-Z, which is also a key.
     Suspend,
     /// A letter.
     Letter(char),
@@ -40,20 +40,20 @@ pub(super) enum Key {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Line {
     pub(super) text: String,
-    /// Dark on light, or light on dark: what must be seen.
+    /// Shown in inverse colours, for what must be seen.
     pub(super) stands_out: bool,
 }
 
-/// The terminal, until it is dropped.
+/// The terminal, in use until this is dropped.
 pub(super) struct Terminal {
-    /// How it was.
+    /// Previous settings.
     before: Termios,
-    /// How it is while it is ours.
+    /// Settings while in use.
     raw: Termios,
 }
 
 impl Terminal {
-    /// Takes the terminal; `None`: there is none that can be drawn on.
+    /// Takes the terminal; `None` if there is none that can be drawn on.
     pub(super) fn take() -> Option<Self> {
         let (input, output) = (std::io::stdin(), std::io::stdout());
         let dumb = std::env::var("TERM").is_ok_and(|term| term == "dumb");
@@ -68,7 +68,7 @@ impl Terminal {
         }
         let then = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            // What it says must not go with our screen.
+            // The message must not vanish with our screen.
             give_back();
             then(panic);
         }));
@@ -77,19 +77,19 @@ impl Terminal {
         Some(terminal)
     }
 
-    /// It is ours.
+    /// Switches to our settings and screen.
     ///
     /// # Errors
-    /// What the operating system says: the terminal is gone.
+    /// The operating system's error: the terminal is gone.
     fn enter(&self) -> std::io::Result<()> {
         tcsetattr(std::io::stdin(), OptionalActions::Now, &self.raw)?;
         write(ENTER)
     }
 
-    /// It is as it was before while `suspended` lasts, then ours again.
+    /// Restores the terminal while `suspended` runs, then takes it again.
     ///
     /// # Errors
-    /// What the operating system says: the terminal is gone, or the program cannot be suspended.
+    /// The operating system's error: the terminal is gone, or the program cannot be suspended.
     pub(super) fn lend(
         &self,
         suspended: impl FnOnce() -> std::io::Result<()>,
@@ -99,17 +99,17 @@ impl Terminal {
         self.enter()
     }
 
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub(super) fn size(&self) -> (usize, usize) {
         let size = tcgetwinsize(std::io::stdout()).ok();
         let size = size.map(|size| (size.ws_col.into(), size.ws_row.into()));
         size.filter(|size| *size > (0, 0)).unwrap_or(USUAL)
     }
 
-    /// Draws the lines over those of before.
+    /// Draws the lines over the previous ones.
     ///
     /// # Errors
-    /// What the operating system says: the terminal is gone.
+    /// The operating system's error: the terminal is gone.
     pub(super) fn draw(&self, lines: &[Line]) -> std::io::Result<()> {
         let (columns, rows) = self.size();
         let mut out = HOME.to_owned();
@@ -128,14 +128,14 @@ impl Terminal {
         write(&out)
     }
 
-    /// Keys that were pressed since the last look.
+    /// Keys pressed since the last call.
     pub(super) fn keys(&self) -> Vec<Key> {
         let input = std::io::stdin();
         let mut bytes = [0; 64];
         let mut fds = [PollFd::new(&input, PollFlags::IN)];
         let there = poll(&mut fds, Some(&Timespec::default())).unwrap_or(0) > 0;
         let count = match there {
-            // Past the buffer of the standard library, which would wait for more.
+            // Bypasses the standard library's buffer, which would wait for more.
             true => rustix::io::read(&input, &mut bytes).unwrap_or(0),
             false => 0,
         };
@@ -157,7 +157,7 @@ fn give_back() {
     leave(&before);
 }
 
-/// The terminal is as it was. One that is gone needs nothing.
+/// Restores the terminal. If it is gone, nothing needs to be done.
 fn leave(before: &Termios) {
     let _ = write(LEAVE);
     let _ = tcsetattr(std::io::stdin(), OptionalActions::Now, before);
@@ -169,7 +169,7 @@ fn write(text: &str) -> std::io::Result<()> {
     out.flush()
 }
 
-/// Lines for a terminal of so many columns: a remedy goes on below.
+/// Fits lines to a terminal with this many columns; a long line continues below.
 fn within(lines: &[Line], columns: usize) -> impl Iterator<Item = Line> {
     lines.iter().flat_map(move |Line { text, stands_out }| {
         let fitted = fit(text, columns);
@@ -181,8 +181,8 @@ fn within(lines: &[Line], columns: usize) -> impl Iterator<Item = Line> {
     })
 }
 
-/// Keys of what a terminal sends. An Esc with more behind it is an arrow key or the like, but for
-/// another Esc: whoever presses it more than once means it.
+/// Decodes the bytes that a terminal sends. An Esc with more after it is an arrow key or the like, unless
+/// another Esc follows: somebody who presses it more than once means it.
 fn keys(bytes: &[u8]) -> Vec<Key> {
     const ESCAPE: u8 = 0x1b;
     const INTERRUPT: u8 = 0x03;
@@ -193,7 +193,7 @@ fn keys(bytes: &[u8]) -> Vec<Key> {
         rest = tail;
         match *first {
             ESCAPE if matches!(tail.first(), Some(b'[' | b'O')) => {
-                // Up to the letter or `~` that ends it.
+                // Up to the letter or `~` that ends the sequence.
                 let end = tail[1..].iter().position(|b| (0x40..=0x7e).contains(b));
                 rest = end.map_or(&[], |end| &tail[end + 2..]);
             }

@@ -1,4 +1,4 @@
-//! `wheeleg ctl top`: the page for terminals. It looks and may stop, and drives nothing.
+//! `wheeleg ctl top`: the page for terminals. It shows the robot and may stop it, but drives nothing.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::process::ExitCode;
@@ -20,42 +20,42 @@ use super::reach::{Reach, ended};
 use super::sample;
 use super::terminal::{Key, Line, Terminal};
 
-/// As it calls itself to others.
+/// Name that it gives to servers.
 const TOP: &str = "wheeleg ctl top";
-/// Samples a second of each channel.
+/// Samples per second of each channel.
 const HZ: u32 = 10;
-/// How often the screen is drawn anew.
+/// Interval at which the screen is redrawn.
 const DRAWN: Duration = Duration::from_millis(100);
-/// What is older does not look as if it were now.
+/// Age from which data must not look current.
 const STALE: Duration = Duration::from_millis(300);
-/// A stop that is not answered for so long is not confirmed.
+/// A stop not answered within this time is not confirmed.
 const UNCONFIRMED: Duration = Duration::from_millis(200);
-/// Events that are kept.
+/// Number of events kept.
 const EVENTS: usize = 200;
 
 const WHEELS: [(&str, &str); 2] = [("/wheel/7", "left wheel"), ("/wheel/8", "right wheel")];
 const FEET: [(&str, &str); 2] = [("/foot/left", "left foot"), ("/foot/right", "right foot")];
 
-/// What has come.
+/// Everything received.
 #[derive(Default)]
 struct Seen {
     state: Value,
     /// Newest sample of each channel.
     samples: BTreeMap<&'static str, Map<String, Value>>,
-    /// The newest last.
+    /// Newest event last.
     events: VecDeque<String>,
-    /// A stop that was asked for and is not confirmed: number of its first request, and when.
+    /// A requested stop that is not confirmed yet: number and time of its first request.
     stopping: Option<(u64, Instant)>,
-    /// The last answer was a refusal.
+    /// Whether the last answer was a refusal.
     unconfirmed: bool,
 }
 
-/// Draws until somebody leaves, or the connection ends.
+/// Draws until the user leaves or the connection ends.
 pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
     let mut client = connect(reach, key)?;
     let stop = stop_on_signals()?;
     let suspend = Suspend::on_signals().map_err(|e| no_handler(&e))?;
-    // From here on a signal ends the loop, which gives the terminal back.
+    // From here on, a signal ends the loop, which gives the terminal back.
     stop.begin();
     let Some(terminal) = Terminal::take() else {
         return Err(StudyError::refused(
@@ -78,7 +78,7 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
         let (mut leaves, mut suspends) = (false, suspend.is_asked());
         for key in terminal.keys() {
             match key {
-                // Of a connection that has ended, nothing is confirmed.
+                // If the connection has ended, nothing will be confirmed.
                 Key::Escape => seen.stop(client.send(json!({ "op": "stop" })).unwrap_or_default()),
                 Key::Interrupt | Key::Letter('q') => leaves = true,
                 Key::Suspend => suspends = true,
@@ -93,8 +93,8 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
             if terminal.lend(stop).is_err() {
                 break Err(());
             }
-            // The server may have given up a client that read nothing; what it sent before is old.
-            // One at a time: a server has room for few.
+            // The server may have dropped a client that read nothing; what it sent before is old. Connect
+            // only once at a time, because a server has room for few clients.
             drop(client);
             client = connect(reach, key)?;
             seen = Seen {
@@ -111,7 +111,7 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
             }
         }
     };
-    // Whoever stops and leaves at once is told what came of it.
+    // A user who stops the robot and leaves at once is told the result.
     while seen.stopping.is_some() && !seen.is_unconfirmed() {
         match client.read() {
             Some(Incoming::Closed { .. }) => break,
@@ -130,7 +130,7 @@ pub(super) fn top(reach: &Reach, key: &AccessKey) -> miette::Result<ExitCode> {
     }
 }
 
-/// A client that looks at what is drawn.
+/// Connects a client that receives what is drawn.
 fn connect(reach: &Reach, key: &AccessKey) -> miette::Result<Client> {
     let mut client = Client::connect(&reach.url(), "view", TOP, key)?;
     let topics = (1..=6).map(|n| format!("/joint/{n}"));
@@ -159,7 +159,7 @@ impl Seen {
                         .push_back(format!("{t_s:10.2} s  {}", plain(text)));
                 }
                 Some("answer") => {
-                    // Nothing but stops is asked for after the first of them.
+                    // After the first stop, only stops are requested.
                     let n = message["n"].as_u64();
                     if self.stopping.is_some_and(|(first, _)| n >= Some(first)) {
                         self.unconfirmed = message["status"] != "done";
@@ -179,19 +179,19 @@ impl Seen {
         }
     }
 
-    /// A stop is asked for. One after another, the first that is not answered counts.
+    /// Records a requested stop. Of several, the first unanswered one counts.
     fn stop(&mut self, n: u64) {
         self.stopping.get_or_insert((n, Instant::now()));
     }
 
-    /// Nobody has confirmed a stop, in the time that it has.
+    /// Whether a stop is not confirmed within its time.
     fn is_unconfirmed(&self) -> bool {
         let waits = self.stopping.map(|(_, since)| since.elapsed());
         self.unconfirmed || waits.is_some_and(|waits| waits > UNCONFIRMED)
     }
 
-    /// A value of the newest sample of a channel; none: no sample has come, or no real board measures
-    /// it: what is sent in its place is no value.
+    /// A value of the newest sample of a channel. `None` if no sample has arrived, or no real board measures
+    /// it: the number sent in its place is not a value.
     fn value(&self, topic: &str, field: &str) -> Option<f64> {
         if self.state["simulated"] != true {
             let def = channels().iter().find(|def| def.topic == topic)?;
@@ -203,13 +203,13 @@ impl Seen {
         self.samples.get(topic)?.get(field)?.as_f64()
     }
 
-    /// The same as a text; `-`: none.
+    /// The same value as text; `-` for `None`.
     fn number(&self, topic: &str, field: &str, decimals: usize) -> String {
         let value = self.value(topic, field);
         value.map_or_else(|| "-".to_owned(), |value| rounded(value, decimals))
     }
 
-    /// Closed switches of a foot, by their names.
+    /// Names of a foot's closed switches.
     fn switches(&self, topic: &str) -> String {
         let Some(bits) = self.value(topic, "switches").map(|bits| bits as u8) else {
             return "-".to_owned();
@@ -225,7 +225,7 @@ impl Seen {
         }
     }
 
-    /// What is shown when the newest message came so long ago, in so many lines.
+    /// The screen if the newest message has this age, on this many rows.
     fn screen(&self, age: Duration, rows: usize) -> Vec<Line> {
         let mut lines = Vec::new();
         let mut put = |stands_out: bool, text: String| lines.push(Line { text, stands_out });
@@ -415,13 +415,13 @@ mod tests {
             ] {
                 assert!(text.contains(part), "{part}: {text}");
             }
-            // Eight alike are one line.
+            // Eight identical faults share one line.
             assert_eq!(text.matches("The sensor. Look.").count(), 1, "{text}");
             assert!(text.contains(" joints 1–6, wheels 7–8: "), "{text}");
             assert!(text.contains("event 299"), "{text}");
             assert!(!text.contains("event 0\n"), "{text}");
             assert!(!text.contains("nothing new"), "{text}");
-            // What stops the robot is not cut off on a terminal of 80 columns.
+            // The hint on how to stop the robot is not cut off on a terminal of 80 columns.
             let head = &lines[0].text;
             assert!(
                 head.chars()
@@ -433,12 +433,12 @@ mod tests {
         }
         let old = text(&seen.screen(Duration::from_secs(2), 24));
         assert!(old.contains("nothing new for 2.0 s"), "{old}");
-        // Before anything has come, nothing is made up.
+        // Before anything has arrived, nothing is made up.
         let empty = text(&Seen::default().screen(Duration::ZERO, 24));
         assert!(!empty.contains("0.0 "), "{empty}");
     }
 
-    /// Whoever looks at it reads who has stopped the robot, and what to do.
+    /// The screen shows who has stopped the robot, and what to do.
     #[test]
     fn the_screen_has_the_way_on_and_names_of_switches() {
         let mut seen = seen();
@@ -461,7 +461,7 @@ mod tests {
         );
     }
 
-    /// Of real boards nobody knows the valves: in their place 0 is sent, which would be "shut".
+    /// Real boards do not report their valves: 0 is sent in their place, which would mean "shut".
     #[test]
     fn what_no_board_measures_is_shown_as_unknown() {
         let joint = |simulated: bool| {
@@ -499,7 +499,7 @@ mod tests {
         seen.stopping = Some((9, Instant::now()));
         seen.take(answer(9, "done"));
         assert!(!seen.is_unconfirmed());
-        // Esc that is held does not put off what is due to the first.
+        // Holding Esc does not postpone the time limit of the first request.
         seen.stopping = Instant::now()
             .checked_sub(2 * UNCONFIRMED)
             .map(|since| (10, since));
