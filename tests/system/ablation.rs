@@ -54,13 +54,6 @@ feed-forward, pause, half the acceleration"
     }
 }
 
-/// What came of a combination.
-struct Outcome {
-    keeps: bool,
-    /// Until within 1 mm for good, s; infinite if never.
-    settle_s: f64,
-}
-
 /// What is played with a law and without one of its parts.
 enum Tried {
     /// A step of an axis, with one combination of what varies.
