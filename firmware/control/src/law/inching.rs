@@ -161,7 +161,7 @@ fn on_times(model: &AxisModel, openings: [i32; 4]) -> [i32; 4] {
     })
 }
 
-/// Stiffness of the air in both chambers, mN/mm: 5 % too high, like n/L.
+/// Stiffness of the air in both chambers, mN/mm; 5 % too high, by the factor of [`AxisModel::exponent_per_length`].
 fn stiffness(model: &AxisModel, observer: &Observer) -> i32 {
     let (now, stroke) = (observer.expected(), observer.motion.stroke);
     let of = |pressure: i32, force: i32, length: i32| {
