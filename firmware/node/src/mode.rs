@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     /// Every pair, written down a second time: modes by initial (Boot, Idle, Armed, Tracking, Hold, Exhaust, Fault),
-    /// refusals by symbol.
+    /// refusals by symbol: `-` not applicable, `!` latched, `r` not ready, `d` not disarmed.
     const EXPECTED: [(Event, &str); 16] = [
         (Event::SelfTestPassed, "I------"),
         (Event::SelfTestFailed, "F------"),
