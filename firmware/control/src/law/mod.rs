@@ -70,13 +70,12 @@
 //! | friction that is not as specified | it appears as load. Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
 //! Tests are at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
-//! `preload` are in `tests.rs` here and in `tests/preload.rs`. What each part is worth in the closed loop:
-//! `tests/system/control_bars.rs`.
+//! `preload` are in `tests.rs` here and in `tests/preload.rs`. `tests/system/control_bars.rs` shows what all of it is
+//! worth in the closed loop.
 //!
 //! Three values of friction are used on purpose. The observer and the predictor use 0.92 of Coulomb friction, because
 //! more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward. `standstill` relies on
 //! 0.85 of it where friction has to stop the piston.
-//! has to stop the piston.
 
 mod allocation;
 mod dead_time_predictor;

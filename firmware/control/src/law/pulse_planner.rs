@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(Ready::Shut.on_time(2400, Ready::On(0), &TIMES), 0);
     }
 
-    /// Where nothing flows any more, 50 Pa demand a pulse of a millisecond.
+    /// Where nothing flows any more, the rate is taken as 50 Pa per millisecond.
     #[test]
     fn a_chamber_at_its_end_asks_for_a_pulse_that_ends() {
         let ms = opening(0, 1000 << 8, 1 << 20);

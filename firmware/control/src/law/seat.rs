@@ -10,8 +10,8 @@
 //! end of the stroke. That is outside every rest band of a position law, which then pulses for ever. Pressed against
 //! its stop, the piston may rest. Its chambers then make three break-away forces beyond balance, by `allocation` as
 //! everywhere: only where F_in limits them is one full or the other empty. The observer follows the air from the
-//! pulses; it is not told that this is a stop. An axis without precharge has no seat: its air would make a start
-//! without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
+//! pulses; it is not told that this is a stop. An axis without precharge has no seat: with its air a start
+//! without notice would come 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
 //!
 //! A piston that rests here is pressed again only once it is 1.5 mm off its target; what has become of its force does
 //! not matter. **The seat ends** as soon as its condition above no longer holds: a target 0.5 mm or more before the

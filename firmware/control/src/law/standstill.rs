@@ -32,12 +32,10 @@
 //! * **Release.** REST ends
 //!   - at once, when the reference moves (faster than 1 mm/s), with patience as in the third case;
 //!   - at once, when the reference has moved more than one band from the target of this rest, if the measured stroke is
-//!     also
-//!     outside the band of release of the new target. If it is not outside, the new target does not end the rest but becomes
-//!     its target;
+//!     also outside the band of release of the new target. If it is not outside, the new target does not end the rest
+//!     but becomes its target;
 //!   - without a new target, in the fifth consecutive period outside the band of release. Patience then continues from
-//!     at
-//!     least 100 periods.
+//!     at least 100 periods.
 //!
 //!   The band of release is the present band plus one band of the axis data, but at most 0.45 mm or, where that is
 //!   more, the present band plus half a band of the axis data. If the axis data's own release is larger, it applies

@@ -93,9 +93,9 @@ pub enum Spoilt {
 /// Watch over the line.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Bytes since the last sound frame.
+    /// Bytes since the last valid frame.
     open: u32,
-    /// Bytes of this cycle that belong to no sound frame.
+    /// Bytes of this cycle that belong to no valid frame.
     rubbish: u32,
     /// The same per slot.
     slots: [u32; NODES],

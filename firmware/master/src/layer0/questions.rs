@@ -136,7 +136,7 @@ impl Questions {
         errors: u32,
         alive: impl Fn(usize) -> bool,
     ) -> Option<(Address, Message)> {
-        // A difference of half the counter's range or more means that it is due.
+        // A next cycle more than half the counter's range ahead is in the past: it is due.
         if self.next_cycle.wrapping_sub(cycle) as i32 > 0 {
             return None;
         }

@@ -11,7 +11,6 @@
 //! * a foot rises only when the other has been loaded for 100 ms;
 //! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the standing foot has room
 //!   for it.
-//!   standing foot has room for it.
 
 mod geometry;
 mod leg;

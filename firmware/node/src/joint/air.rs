@@ -85,7 +85,7 @@ fn clipped(value: i64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)
 }
 
-/// Time to move `length` at `flow`, µs.
+/// Time that a chamber of `length` takes at the speed `flow`, µs.
 #[inline(never)]
 fn time(length: i32, flow: i32) -> i64 {
     if flow == 0 {

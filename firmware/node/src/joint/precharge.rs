@@ -20,7 +20,6 @@
 //! filling is unbalanced, and the travel of the piston limits it. Nor does a board have a pressure sensor for the
 //! supply: without supply it counts air that does not arrive, but for no longer than with supply, and the lack of
 //! motion is found under control.
-//! under control.
 
 use super::no_motion_detector::MotionWatch;
 use super::settings::TickSettings;
