@@ -175,8 +175,8 @@ impl Master {
         self.layer0.start_cycle(now_us, newest)
     }
 
-    /// A layer 1 that was given up answers nothing. Of its commands only a hold can be carried out: at once, by layer
-    /// 0.
+    /// A layer 1 that was given up answers nothing. Of its commands only a hold can be carried out: layer 0 does so
+    /// at once.
     fn answer_for_layer_one(&mut self, now_us: u64) {
         for _ in 0..self.commands1.capacity() {
             let Some(Accepted {

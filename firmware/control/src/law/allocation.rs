@@ -6,8 +6,8 @@
 //! ```
 //!
 //! F, N; p, Pa absolute; AA, AB: areas of bore and annulus, m². The valves can make 1.03 p_a to 0.985 p_s, and F is
-//! limited beforehand to what these pressures make. Within the limits each chamber makes half of a change of F: AA dpA
-//! = dF/2, AB dpB = −dF/2.
+//! limited beforehand to what these pressures make. Within the limits each chamber makes half of a change of F:
+//! AA dpA = dF/2, AB dpB = −dF/2.
 //!
 //! Two actuators make one force, so the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
 //! Goldfarb 2007). About the mean of supply and atmosphere, A can rise as far as it can fall, and B nearly so behind a

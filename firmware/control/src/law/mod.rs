@@ -28,8 +28,7 @@
 //! period of [`PERIOD_TICKS`] (4) ticks, entirely in its last tick, and plan the pulses of the next period to the
 //! microsecond. The steps, in the order of the code:
 //!
-//! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, in the others only
-//!    10.
+//! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, otherwise only 10.
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
 //!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`).
 //! 3. `plan_period`: if the target is new, patience starts afresh (`standstill`) and the ramp is forgotten.

@@ -20,8 +20,7 @@ use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Set
 use crate::telemetry::Record;
 
 impl Layer0 {
-    /// Ends the running cycle at `now_us`: supervision, odometry, feet. Returns its record and the feedback for layer
-    /// 1.
+    /// Ends the running cycle at `now_us`: supervision, odometry, feet. Returns its record and layer 1's feedback.
     pub fn finish_cycle(&mut self, now_us: u64, events: &mut Events) -> (Record, Feedback) {
         self.supervise(now_us, events);
         self.sense_feet(now_us, events);
