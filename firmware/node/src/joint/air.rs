@@ -69,7 +69,7 @@ impl Chamber {
     /// From a dead length in raw mm, a flow in raw mm/s and a force in mN per 1/256 Pa × 2^32.
     #[inline(never)]
     fn new(axis: &AxisModel, lead: i32, flow: i32, force: i32) -> Self {
-        // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6; the 2^8 is in the exponent.
+        // Raw mm/s to mm × 2^24 per µs: × 2^8 / 10^6; `EXPONENT` provides the 2^8.
         let flow = i64::from(flow).wrapping_mul(i64::from(EXPONENT));
         let flow = divide_signed(flow, 1_000_000);
         Self {
