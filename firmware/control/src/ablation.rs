@@ -1,34 +1,34 @@
-//! What each part of observer and law is worth: a study takes out one at a time
-//! (`cargo xtask deep ablation`, table in `docs/guide/on-off-valves.md`).
+//! What each part of observer and law is worth: a study removes one at a time (`cargo xtask deep ablation`, table in
+//! `docs/guide/on-off-valves.md`).
 //!
-//! Only with the feature `ablation`, which no image and no program is built with. Without it [`is_without`] is a
-//! constant, and the compiler leaves nothing of it.
+//! This needs the feature `ablation`, with which no image and no program is built. Without it [`is_without`] is a
+//! constant, and the compiler removes it entirely.
 
-/// A part that can be taken out.
+/// A part that can be removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Part {
     /// The load stays zero.
     LoadObserver = 1,
-    /// The mass stays as specified; pressures are not identified either.
+    /// The mass stays as specified; pressures are not identified, either.
     MassEstimator,
-    /// The mass comes from three instants of the move alone, and the pressures stay as they are.
+    /// The mass comes only from three instants of the move, and the pressures stay as they are.
     AirIdentification,
-    /// The law acts by the motion of the moment.
+    /// The law acts on the motion at the moment.
     DeadTimePredictor,
-    /// Instead of the parabola the straight line goes on, up to top speed.
+    /// The straight line replaces the parabola, up to top speed.
     Parabola,
     /// No friction is fed forward.
     FrictionFeedForward,
-    /// A piston that sticks is pushed with no more force than at first.
+    /// The force on a stuck piston does not grow.
     BreakawayRamp,
-    /// The valves do not shut for friction to stop the piston in the band.
+    /// The valves do not shut early to let friction stop the piston in the band.
     StoppingDistance,
-    /// Patience with a target is never over.
+    /// Patience with a target never ends.
     Patience,
-    /// Where patience is over the whole acceleration is asked for.
+    /// The full acceleration is demanded even when patience is over.
     EasedGain,
-    /// On coarse valves the position servo acts up to the target.
+    /// On coarse valves the position servo acts all the way to the target.
     Inching,
 }
 
@@ -54,15 +54,15 @@ mod switch {
     use super::Part;
     use core::sync::atomic::{AtomicU8, Ordering};
 
-    /// Number of the part that is out; none has 0.
+    /// Number of the part that is removed; 0 for none.
     static OUT: AtomicU8 = AtomicU8::new(0);
 
-    /// Takes a part out of every law of this process, or puts the last one back.
+    /// Removes a part from every law of this process, or restores the last one.
     pub fn take_out(part: Option<Part>) {
         OUT.store(part.map_or(0, |part| part as u8), Ordering::Relaxed);
     }
 
-    /// Whether this part is out.
+    /// Whether this part is removed.
     pub(crate) fn is_without(part: Part) -> bool {
         OUT.load(Ordering::Relaxed) == part as u8
     }
@@ -73,7 +73,7 @@ pub(crate) use switch::is_without;
 #[cfg(feature = "ablation")]
 pub use switch::take_out;
 
-/// Whether this part is out: never, without the feature.
+/// Whether this part is removed: never, without the feature.
 #[cfg(not(feature = "ablation"))]
 pub(crate) const fn is_without(_: Part) -> bool {
     false

@@ -1,9 +1,9 @@
-//! Products, quotients and roots of fixed-point numbers, each with the bits that it keeps. Products and shifts round down;
-//! each function states its range.
+//! Products, quotients and roots of fixed-point numbers; each function states its precision and range. Products and
+//! shifts round down.
 
-/// `a × b / 2^shift`, rounded down, with a shift of 1…31; what does not fit becomes one of
-/// the 2^(32 − shift) largest or smallest numbers. It is the upper word of the product
-/// that is limited, in one instruction: a limit of all of it takes six.
+/// `a × b / 2^shift`, rounded down, with a shift of 1…31; a result that does not fit becomes one of the 2^(32 − shift)
+/// largest or smallest numbers. Only the upper word of the product is limited, in one instruction: limiting all of it
+/// would take six.
 #[inline]
 pub(crate) fn mul_shr_sat(a: i32, b: i32, shift: u32) -> i32 {
     let product = i64::from(a).wrapping_mul(i64::from(b));
@@ -14,7 +14,7 @@ pub(crate) fn mul_shr_sat(a: i32, b: i32, shift: u32) -> i32 {
     high.wrapping_shl(left) | low as i32
 }
 
-/// `a × b / 2^shift`, rounded down, of a quotient that is known to fit. Builds of the host check that; images do not.
+/// `a × b / 2^shift`, rounded down, for a result that is known to fit. Host builds check this; images do not.
 #[inline]
 pub(crate) const fn mul_shr(a: i32, b: i32, shift: u32) -> i32 {
     let quotient = (a as i64).wrapping_mul(b as i64).wrapping_shr(shift);
@@ -25,8 +25,8 @@ pub(crate) const fn mul_shr(a: i32, b: i32, shift: u32) -> i32 {
     quotient as i32
 }
 
-/// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 for a `b` of 0. Two
-/// divisions of 32 bits instead of one of 64, which takes ten times as long.
+/// `a × 2^shift / b` to 16 significant bits of `b`, saturating; 0 if `b` is 0. It uses two 32-bit divisions instead of
+/// one of 64 bits, which takes ten times as long.
 #[inline(never)]
 pub(crate) fn quotient(a: u64, b: u32, shift: u32) -> i32 {
     let bits = 32_u32.wrapping_sub(b.leading_zeros());
@@ -49,9 +49,8 @@ pub(crate) fn quotient(a: u64, b: u32, shift: u32) -> i32 {
     first.wrapping_shl(16).wrapping_add(second) as i32
 }
 
-/// `value` limited to a number of `BITS` bits with its sign: one instruction of the
-/// processor, where a limit by comparison takes four, and one of a product of 64
-/// bits six.
+/// `value` limited to a signed number of `BITS` bits. This is one instruction of the processor, while limiting by
+/// comparison takes four, and limiting a 64-bit product six.
 #[inline]
 pub(crate) fn clip<const BITS: u32>(value: i32) -> i32 {
     let bound = const { i32::MAX >> (32 - BITS) };
@@ -64,10 +63,10 @@ pub(crate) fn within(value: i32, bound: i32) -> i32 {
     value.max(bound.wrapping_neg()).min(bound)
 }
 
-/// Square root, good to 1/2000 of it and to one.
+/// Square root, accurate to 1/2000 of it and to one.
 ///
-/// A straight line through the root of a number that is brought into 1…4 × 2^30 by an
-/// even shift is within 4.5 % of it; a step of Newton's method squares that.
+/// A straight line approximates the root of a number that an even shift has brought into 1…4 × 2^30 to within 4.5 %;
+/// one step of Newton's method squares that error.
 #[inline]
 pub(crate) fn square_root(value: u32) -> u32 {
     let zeros = value.leading_zeros() & !1;
@@ -79,16 +78,16 @@ pub(crate) fn square_root(value: u32) -> u32 {
         .wrapping_add(near.wrapping_shr(21))
         .wrapping_add(23_200);
     let step = near.checked_div(line).unwrap_or(0);
-    // The mean is never below the root: half of the largest excess is taken off.
+    // The mean is never below the root: subtract half of the largest excess.
     let root = line.wrapping_add(step).wrapping_sub(32);
-    // Of nothing, a shift by the whole width: twice the root is below 2^17.
+    // For zero this shifts by the whole width: twice the root is below 2^17.
     root.wrapping_shr(zeros.wrapping_shr(1).wrapping_add(1))
 }
 
 /// Cube root, × 2^16, of a share × 2^30 of at most one.
 ///
-/// Newton's method on a share that is brought into 1/8…1 by shifts of three bits: the
-/// chord is within a ninth of the root there, and a step squares that.
+/// Newton's method on a share that shifts of three bits have brought into 1/8…1: there the chord is within a ninth of
+/// the root, and each step squares that error.
 pub(crate) fn cube_root(share: u32) -> i32 {
     if share >= 1 << 30 {
         return 1 << 16;

@@ -1,37 +1,33 @@
 //! Valve PWM, sliced into control ticks.
 //!
-//! A hardware timer runs with a period of one control tick (1000 µs), and its
-//! compare values take effect at the next tick edge. The pulse of the slower
-//! valve period (10…20 ms, more for slow valves) is spread over ticks here: 7350 µs are seven full
-//! ticks and one of 350 µs, always starting at the tick edge.
+//! A hardware timer runs with a period of one control tick (1000 µs), and its compare values take effect at the next
+//! tick edge. Here the pulse of the slower valve period (10…20 ms, more for slow valves) is spread over ticks: 7350 µs
+//! become seven full ticks and one of 350 µs, always starting at the tick edge.
 //!
-//! **Switching delays.** A valve opens t_on after its coil is energised and shuts
-//! t_off after it is released. For an opening `d` the coil is energised for `p`:
+//! **Switching delays.** A valve opens t_on after its coil is energised and shuts t_off after it is released. For an
+//! opening `d` the coil is energised for `p`:
 //!
 //! ```text
 //! d = p − t_on + t_off          p = d + t_on − t_off
 //! ```
 //!
-//! except that
+//! except that:
 //!
 //! * a pulse below `t_on + margin` may not open the valve at all: it is not sent;
 //! * a gap below `t_off + margin` may not shut it: the pulse becomes full.
 //!
-//! So the openings that can be had are 0, at least `t_off + margin`, up to
-//! about `period − t_on − margin`, and the whole period. The law bridges the first gap with
-//! [`crate::joint::JointGains::dead_zone_duty`].
+//! So the possible openings are 0, `t_off + margin` to about `period − t_on − margin`, and the whole period. The law
+//! bridges the first gap with [`crate::joint::JointGains::dead_zone_duty`].
 //!
-//! **Phase.** There is no free-running period. The period of a valve starts with
-//! its pulse, so a command to an idle valve acts at the next tick edge. While a
-//! pulse lasts, its length follows the command (natural sampling): it may grow, or
-//! end early, though a command that can act does not cut it below the shortest
-//! that acts. A command of zero ends it at the next tick edge, however short. Once
-//! ended, it does not begin again within the period. A valve switches at most
-//! twice per period, and a valve with nothing to do not at all.
+//! **Phase.** There is no free-running period. The period of a valve starts with its pulse, so a command to an idle
+//! valve takes effect at the next tick edge. While a pulse lasts, its length follows the command (natural sampling): it
+//! may grow or end early, but a command that can open the valve does not cut it below the shortest effective pulse. A
+//! command of zero ends it at the next tick edge, however short it is. Once ended, it does not start again within the
+//! period. A valve switches at most twice per period, and a valve with nothing to do not at all.
 //!
 //! Source: pulse-width modulation of on/off valves in ticks, DERIVED (docs/decisions/0003-valve-timing.md).
 //!
-//! Assumes: delays that stay within the margin of those specified, the same for every pulse.
+//! Assumes: delays that stay within the margin of the specified ones and are the same for every pulse.
 
 use crate::valve::{VALVE_COUNT, ValveOpenings};
 use core::hash::{Hash, Hasher};
@@ -54,7 +50,7 @@ pub enum PwmError {
     Delay,
 }
 
-/// Timing of the valves: what it takes to turn an opening into a pulse.
+/// Timing of the valves: what is needed to turn an opening into a pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PwmTiming {
     period: u32,
@@ -107,8 +103,8 @@ impl PwmTiming {
         Micros(self.period)
     }
 
-    /// Shortest opening that a pulse can give, t_off + margin or one microsecond:
-    /// the least non-zero argument for which [`PwmTiming::pulse`] is not zero.
+    /// Shortest opening that a pulse can produce, t_off + margin or one microsecond: the smallest non-zero argument for
+    /// which [`PwmTiming::pulse`] is not zero.
     #[must_use]
     pub const fn shortest_opening(&self) -> Micros {
         let opening = self
@@ -118,14 +114,14 @@ impl PwmTiming {
         Micros(if opening == 0 { 1 } else { opening })
     }
 
-    /// Time for which the coil is energised to get `opening`: 0 when it can not
-    /// act, the period when the valve could not shut in between.
+    /// Time for which the coil is energised to get `opening`: 0 if that could not open the valve, the period if the
+    /// valve could not shut in between.
     #[must_use]
     pub const fn pulse(&self, opening: Micros) -> Micros {
         if opening.get() >= self.period {
             return Micros(self.period);
         }
-        // Below 10^6 + 10^6 and saturating at zero; a gap is at most half the period.
+        // The sum is below 10^6 + 10^6, the difference saturates at zero; a gap is at most half the period.
         let wanted = opening
             .get()
             .wrapping_add(self.on_delay)
@@ -143,15 +139,15 @@ impl PwmTiming {
 /// One valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Channel {
-    /// Time since the pulse began, at the next tick edge; 0 if there was none.
+    /// Time since the pulse began, at the next tick edge; 0 without a pulse.
     elapsed: u32,
-    /// Length of the pulse that ended; 0 before it ends. [`DIRECT`]: no pulse is the PWM's.
+    /// Length of the pulse that has ended; 0 before it ends. [`DIRECT`]: the PWM makes no pulses.
     ended_at: u32,
     /// Pulses begun since power-on, wrapping.
     pulses: u32,
 }
 
-/// No length of a pulse, and no single bit away from one.
+/// Not the length of any pulse, nor a single bit away from one.
 const DIRECT: u32 = u32::MAX;
 
 impl Channel {
@@ -161,11 +157,11 @@ impl Channel {
         pulses: 0,
     };
 
-    /// On-time of the next tick for a pulse of [`PwmTiming::pulse`].
+    /// On-time of the next tick for a pulse of length `pulse` ([`PwmTiming::pulse`]).
     #[inline]
     fn tick(&mut self, timing: &PwmTiming, pulse: u32) -> u16 {
         if self.ended_at != 0 {
-            // A new pulse may begin once the valve has had the time to shut.
+            // A new pulse may begin once the valve has had time to shut.
             let off = self.elapsed.wrapping_sub(self.ended_at);
             if self.elapsed < timing.period || off < timing.shortest_gap {
                 self.elapsed = self.elapsed.wrapping_add(timing.tick);
@@ -180,13 +176,13 @@ impl Channel {
             }
             self.pulses = self.pulses.wrapping_add(1);
         } else if self.elapsed >= timing.period && pulse > 0 {
-            // A full pulse goes on: the next period follows without a gap.
+            // A full pulse continues: the next period follows without a gap.
             self.elapsed = 0;
         }
-        // Below twice the period of at most a second.
+        // Below twice the period, which is at most a second.
         let on = pulse.saturating_sub(self.elapsed).min(timing.tick);
         if on < timing.tick {
-            // Not zero: a pulse that begins has some length.
+            // Not zero: a pulse that has begun has some length.
             self.ended_at = self.elapsed.wrapping_add(on);
         }
         self.elapsed = self.elapsed.wrapping_add(timing.tick);
@@ -194,7 +190,7 @@ impl Channel {
         on as u16
     }
 
-    /// As it was, without what it was doing.
+    /// The same channel without the pulse under way.
     const fn freed(self) -> Self {
         Self {
             pulses: self.pulses,
@@ -206,8 +202,7 @@ impl Channel {
 impl Hash for Channel {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. The count shapes no
-        // output.
+        // Destructured, so that a new field cannot be forgotten here. The pulse count affects no output.
         let Self {
             elapsed,
             ended_at,
@@ -223,7 +218,7 @@ impl Hash for Channel {
 pub struct ValvePwm {
     timing: PwmTiming,
     channels: [Channel; VALVE_COUNT],
-    /// Valves that were on in the last tick of [`ValvePwm::direct`], a bit each: 15, 31, 14, 30.
+    /// Valves that were on in the last tick of [`ValvePwm::direct`], one bit each: 15, 31, 14, 30.
     given: u32,
 }
 
@@ -244,27 +239,27 @@ impl ValvePwm {
         &self.timing
     }
 
-    /// What a tick changes: all but the timing, to be sealed apart from it.
+    /// What a tick changes: everything but the timing, to be sealed separately from it.
     #[inline]
     #[must_use]
     pub const fn state(&self) -> State<'_> {
         State(self)
     }
 
-    /// Changes the timing; running periods end by the new one.
+    /// Changes the timing; periods under way end by the new one.
     pub const fn set_timing(&mut self, timing: PwmTiming) {
         self.timing = timing;
     }
 
-    /// On-times of the next tick for the wanted openings per period. Openings
-    /// of a whole period or more keep a valve open without a gap. Never panics.
+    /// On-times of the next tick for the wanted openings per period. An opening of a whole period or more keeps a valve
+    /// open without a gap. Never panics.
     #[must_use]
     pub fn tick(&mut self, openings: &ValveOpenings) -> OnTimes {
         if self.is_direct() {
             self.channels = self.channels.map(Channel::freed);
         }
         let mut on = [0; VALVE_COUNT];
-        // Pulse of the last opening: two valves mostly open alike.
+        // Pulse of the last opening: usually two valves open for the same time.
         let (mut last, mut pulse) = (Micros::ZERO, 0);
         for ((on, channel), &opening) in on.iter_mut().zip(&mut self.channels).zip(&openings.0) {
             let pulse = if opening == Micros::ZERO {
@@ -280,15 +275,15 @@ impl ValvePwm {
         on
     }
 
-    /// All valves shut at the next tick edge: hold, brake, fault. The same as
-    /// [`ValvePwm::tick`] with [`ValveOpenings::SHUT`].
+    /// Shuts all valves at the next tick edge: hold, brake, fault. The same as [`ValvePwm::tick`] with
+    /// [`ValveOpenings::SHUT`].
     #[must_use]
     pub fn shut(&mut self) -> OnTimes {
         self.tick(&ValveOpenings::SHUT)
     }
 
-    /// On-times that a law chose itself, at most a tick each: passed through and
-    /// counted. Afterwards the PWM begins with idle valves.
+    /// On-times that a law has chosen itself, at most a tick each: passed through and counted. Afterwards the PWM
+    /// starts with idle valves.
     #[must_use]
     pub fn direct(&mut self, on: OnTimes) -> OnTimes {
         if !self.is_direct() {
@@ -297,7 +292,7 @@ impl ValvePwm {
             first.ended_at = DIRECT;
             self.given = 0;
         }
-        // Two on-times a word; each, below 2^15, carries into its sixteenth bit unless it is 0.
+        // Two on-times per word; each is below 2^15 and carries into its sixteenth bit unless it is 0.
         let given = |low: u16, high: u16| {
             let both = u32::from(low) | u32::from(high).wrapping_shl(16);
             both.wrapping_add(0x7FFF_7FFF) & 0x8000_8000
@@ -322,8 +317,8 @@ impl ValvePwm {
         first.ended_at == DIRECT
     }
 
-    /// Pulses begun per valve since power-on, wrapping: the switching count.
-    /// Periods that follow one another without a gap count as one pulse.
+    /// Pulses begun per valve since power-on, wrapping: the switching count. Consecutive periods without a gap count as
+    /// one pulse.
     #[must_use]
     pub fn pulses(&self) -> [u32; VALVE_COUNT] {
         self.channels.map(|channel| channel.pulses)
@@ -337,11 +332,11 @@ pub struct State<'a>(&'a ValvePwm);
 impl Hash for State<'_> {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+        // Destructured, so that a new field cannot be forgotten here.
         let ValvePwm {
             timing: _,
             channels: [first, rest @ ..],
-            // It shapes no output.
+            // Affects no output.
             given: _,
         } = self.0;
         first.hash(state);

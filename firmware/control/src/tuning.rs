@@ -1,31 +1,32 @@
 //! All gains and thresholds of the predictive law and its observer, in one table.
 //!
-//! A row has value, unit, the reason or source of the value, and the test that fails if it is changed by what
-//! matters: its file in `firmware/control`, and its name. `tests/suite/tuning.rs` holds that each of these tests stands
-//! there. What differs from axis to axis is no tuning: it is axis data ([`crate::axis::AxisData`]).
+//! A row has the value, its unit, the reason or source of the value, and the test that fails if it is changed
+//! significantly: the file in `firmware/control` and the name. `tests/suite/tuning.rs` checks that each of these tests
+//! exists. What differs from axis to axis is not tuning but axis data ([`crate::axis::AxisData`]).
 //!
-//! Beside the table stand only numbers that cannot be tuned, in the same suite's list: constants of nature and of
+//! Outside the table there are only numbers that cannot be tuned, listed in the same suite: constants of nature and of
 //! units, the four ticks of a period, what follows from rows of this table, and bounds of a format.
 //!
-//! "Searched": on the bench axis (bore 20 × 180 mm, VQ110U-class valves), three other and some 200 random cylinders,
-//! all with loads, masses, friction and valve times off their data: of sets that meet the bars of
-//! `tests/system/control_bars.rs` one that misses few of the others. It was done by hand, row by row, and its runs were
-//! not kept; programs of it are in the history of the repository (`git show 0ff02ebe:host-sim/examples/search.rs`). So
-//! a searched value is good, not best. What the whole set is worth is measured again and again: `docs/records/deep.md`
-//! (combinations, cylinders), and `docs/guide/on-off-valves.md` for each part taken out.
+//! "Searched" means: on the bench axis (bore 20 × 180 mm, VQ110U-class valves), three other and some 200 random
+//! cylinders, all with loads, masses, friction and valve times that differ from their data, among the sets that meet
+//! the bars of `tests/system/control_bars.rs` one that misses few of the others. The search was done by hand, row by
+//! row, and its runs were not kept; programs of it are in the history of the repository (`git show
+//! 0ff02ebe:host-sim/examples/search.rs`). So a searched value is good, but not optimal. The whole set is measured
+//! again and again: `docs/records/deep.md` (combinations, cylinders), and `docs/guide/on-off-valves.md` with each part
+//! removed in turn.
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
     /// Name of the constant.
     pub name: &'static str,
-    /// Its value as it stands in the code.
+    /// Its value as in the code.
     pub value: i64,
-    /// Its unit and what it is in that.
+    /// Its unit, with the value in it.
     pub unit: &'static str,
-    /// Where the value is from.
+    /// Where the value comes from.
     pub reason: &'static str,
-    /// The test that guards it: file below `firmware/control`, `::`, name.
+    /// The test that guards it: file below `firmware/control`, then `::`, then name.
     pub test: &'static str,
 }
 

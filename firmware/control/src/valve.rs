@@ -1,13 +1,10 @@
 //! Valve combinations, and the allocation of a signed duty to four valves.
 //!
-//! Each cylinder has four on/off valves, in the order
-//! `[fill A, vent A, fill B, vent B]` (PAPER §8: two inlet, two outlet).
-//! Chamber A extends. Of the 16 combinations, seven are useful for motion: each
-//! chamber may be filled, vented or shut, without filling both or venting both
-//! at once (the topology and the count of Hodgson, Le, Tavakoli and Pham,
-//! Mechatronics 22, 2012; the enumeration is DERIVED). Two more serve as
-//! commands: exhaust, and the literal blow-through.
-//!
+//! Each cylinder has four on/off valves, in the order `[fill A, vent A, fill B, vent B]` (PAPER §8: two inlet, two
+//! outlet). Chamber A extends. Of the 16 combinations, seven are useful for motion: each chamber may be filled, vented
+//! or shut, without filling both or venting both at once (the topology and the count of Hodgson, Le, Tavakoli and Pham,
+//! Mechatronics 22, 2012; the enumeration is DERIVED). Two more serve as commands: exhaust, and the literal
+//! blow-through.
 //! ```text
 //! u > 0: fill A and vent B open for |u| · period      u < 0: fill B and vent A open for |u| · period
 //! ```
@@ -73,8 +70,7 @@ impl ValveMode {
         }
     }
 
-    /// The same opening time for every open valve of this combination, zero
-    /// for the others.
+    /// The same opening time for every open valve of this combination, zero for the others.
     #[must_use]
     pub const fn openings(self, opening: Micros) -> ValveOpenings {
         let [fill_a, vent_a, fill_b, vent_b] = self.open();
@@ -89,9 +85,8 @@ impl ValveMode {
 
 /// Wanted effective opening per valve and PWM period, in microseconds.
 ///
-/// Order `[fill A, vent A, fill B, vent B]`. This is the time for which the
-/// valve is to be *open*, not the time for which its coil is energised: the
-/// switching delays are compensated by [`crate::pwm::ValvePwm`].
+/// In the order `[fill A, vent A, fill B, vent B]`. This is how long the valve is to be *open*, not how long its coil
+/// is energised: [`crate::pwm::ValvePwm`] compensates the switching delays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ValveOpenings(pub [Micros; VALVE_COUNT]);
 

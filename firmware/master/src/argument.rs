@@ -1,13 +1,13 @@
 //! Arguments of the user's commands: name, kind, unit and range of each.
 //!
-//! This is the one place of these ranges. The table of commands lists them, the layers check them, scenario
-//! and robot files are read with them, and `docs/reference/commands.md` is generated from them.
+//! This is the only place of these ranges. The table of commands lists them, the layers check them, scenario and robot
+//! files are read with them, and `docs/reference/commands.md` is generated from them.
 
 use core::fmt;
 
 use fixed::types::I16F16;
 
-/// Smallest and largest allowed value; both are allowed.
+/// Smallest and largest allowed value, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits<T> {
     /// Smallest.
@@ -42,15 +42,15 @@ pub enum ArgumentKind {
     Choice(&'static [&'static str]),
     /// Yes or no.
     Flag,
-    /// A parameter of the board that the command names: its number, for people its name.
+    /// A parameter of the board that the command names: its number or, for people, its name.
     Parameter,
-    /// A value of that parameter: inside the master as the raw number of its format, for people in
-    /// the unit of the parameter. The board checks it.
+    /// A value of that parameter: inside the master the raw number in its format, for people in the unit of the
+    /// parameter. The board checks it.
     Raw,
 }
 
 impl ArgumentKind {
-    /// Unit for people, `1` without a unit.
+    /// Unit for people; `1` if there is none.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -111,7 +111,7 @@ pub enum Value {
     Fixed(I16F16),
     /// Time, µs.
     Micros(u32),
-    /// Place in the list of words, from 0.
+    /// Index in the list of words, from 0.
     Choice(u8),
     /// Yes or no.
     Flag(bool),
@@ -199,7 +199,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// A unit behind a number; empty if there is none.
+/// A unit after a number; empty if there is none.
 struct Suffix(ArgumentKind);
 
 impl fmt::Display for Suffix {
@@ -245,7 +245,7 @@ impl fmt::Display for Seconds {
     }
 }
 
-/// Highest speed and acceleration of a wheel, of its own moves and of a push of the gait.
+/// Highest speed and acceleration of a wheel, for its own moves and for a push of the gait.
 const RIM_SPEED: ArgumentKind = ArgumentKind::Velocity(Limits {
     min: I16F16::lit("1"),
     max: I16F16::lit("400"),

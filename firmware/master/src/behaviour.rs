@@ -6,7 +6,7 @@ use crate::contact::Side;
 
 macro_rules! behaviours {
     ($($(#[doc = $doc:literal])* $name:ident = $number:literal, $key:literal;)*) => {
-        /// A behaviour, by its place in the order of priority.
+        /// A behaviour, numbered by priority.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum Behaviour {
@@ -14,7 +14,7 @@ macro_rules! behaviours {
         }
 
         impl Behaviour {
-            /// All of them, the first in priority first.
+            /// All of them, highest priority first.
             pub const ALL: [Self; BEHAVIOURS] = [$(Self::$name,)*];
 
             /// Name in files.
@@ -61,7 +61,7 @@ behaviours! {
 }
 
 impl Behaviour {
-    /// Place in arrays of behaviours.
+    /// Index in arrays of behaviours.
     #[must_use]
     pub const fn index(self) -> usize {
         (self as usize).saturating_sub(1)
@@ -71,14 +71,14 @@ impl Behaviour {
         1 << (self as u16).saturating_sub(1)
     }
 
-    /// The behaviour of this name.
+    /// The behaviour with this name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|one| one.name() == name)
     }
 }
 
-/// A set of behaviours: bit 0 is the first in priority.
+/// A set of behaviours; bit 0 has the highest priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Behaviours(u16);
 
@@ -100,13 +100,13 @@ impl Behaviours {
         self.0
     }
 
-    /// Whether one is in the set.
+    /// Whether a behaviour is in the set.
     #[must_use]
     pub const fn contains(self, one: Behaviour) -> bool {
         self.0 & one.bit() != 0
     }
 
-    /// The set without one.
+    /// The set without this behaviour.
     #[must_use]
     pub const fn without(self, one: Behaviour) -> Self {
         Self(self.0 & !one.bit())
@@ -131,13 +131,13 @@ impl Tally {
         }
     }
 
-    /// How often it has acted.
+    /// How often this behaviour has acted.
     #[must_use]
     pub fn of(&self, one: Behaviour) -> u32 {
         self.0.get(one.index()).copied().unwrap_or(0)
     }
 
-    /// Both together: the layers count each for itself.
+    /// The sum of both: each layer keeps its own counts.
     #[must_use]
     pub fn with(mut self, other: &Self) -> Self {
         for (mine, theirs) in self.0.iter_mut().zip(other.0) {
@@ -147,15 +147,15 @@ impl Tally {
     }
 }
 
-/// Report of a behaviour that acts.
+/// Report that a behaviour acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
-    /// An axis pulls at its limit and does not move: it holds.
+    /// An axis works at its limit and does not move: it holds.
     Overload {
         /// Bus address of its board.
         node: u8,
     },
-    /// No foot carries: the wheels slow down, so that the robot does not fall on its tail.
+    /// No foot carries load: the wheels slow down, so that the robot does not fall on its tail.
     TipGuard,
     /// A foot has met the ground far above the expected height.
     EarlyGround(
@@ -167,7 +167,7 @@ pub enum Act {
         /// Its leg.
         Side,
     ),
-    /// A leg at its full length finds no ground: the nose goes down, then the foot is set nearer.
+    /// A leg at full length finds no ground: the nose goes down, then the foot is set nearer.
     NoGround(
         /// The leg.
         Side,
@@ -177,7 +177,7 @@ pub enum Act {
         /// Its leg.
         Side,
     ),
-    /// A standing foot has lost the ground: it follows it.
+    /// A standing foot has lost the ground and follows it.
     LostGround(
         /// Its leg.
         Side,
@@ -188,7 +188,7 @@ pub enum Act {
     BackOff,
     /// No progress after several tries: the robot stands.
     Stuck,
-    /// One leg carries more than the other: they are brought to share.
+    /// One leg carries more than the other: they are made to share the load.
     LoadShare,
     /// A standing foot is at the end of its reach: the wheels wait.
     Governor,
@@ -212,7 +212,7 @@ impl Act {
         }
     }
 
-    /// Leg that it is about, if about one.
+    /// The leg concerned, if there is one.
     #[must_use]
     pub const fn side(self) -> Option<Side> {
         match self {

@@ -1,8 +1,6 @@
-//! User commands and their codes. The high byte of a code names the layer that
-//! carries the command out: 0x01xx layer 0 (physical level), 0x02xx layer 1
-//! (gait level). [`TABLE`] is the one list of commands; the ranges of their
-//! arguments are in [`crate::argument`]. `docs/reference/commands.md` is written
-//! from both.
+//! User commands and their codes. The high byte of a code names the layer that carries the command out: 0x01xx layer 0
+//! (physical level), 0x02xx layer 1 (gait level). [`TABLE`] is the only list of commands; the ranges of their arguments
+//! are in [`crate::argument`]. `docs/reference/commands.md` is generated from both.
 
 mod build;
 mod reference;
@@ -37,7 +35,7 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// Layer named by the range of a command code; `None` outside the ranges.
+    /// Layer for the range of a command code; `None` outside the ranges.
     #[must_use]
     pub const fn of_code(code: u16) -> Option<Self> {
         match code {
@@ -70,7 +68,7 @@ pub enum Command {
         /// Stroke, mm ([`crate::argument::STROKE`]).
         stroke_mm: PositionMm,
     },
-    /// Ask one joint's board for its position, acknowledged with the value in an event.
+    /// Ask one joint's board for its position; the value is reported in an event.
     TransmitPosition {
         /// 1..=6.
         joint: JointNumber,
@@ -97,12 +95,11 @@ pub enum Command {
         /// Which correction.
         correction: CorrectionKind,
     },
-    /// Drive both wheels by a distance from the last reference sent to them, or
-    /// from where they are if there was none since the last stop.
+    /// Drive both wheels by a distance from the last reference sent to them, or from where they are if there has been
+    /// none since the last stop.
     WheelReference {
-        /// Distance, mm, positive forward ([`crate::argument::TRAVEL`]), and at most
-        /// 2^22 − 1 encoder counts from where the wheels are: the 24-bit
-        /// counter tells no more apart.
+        /// Distance, mm, positive forward ([`crate::argument::TRAVEL`]), and at most 2^22 − 1 encoder counts from where
+        /// the wheels are: the 24-bit counter cannot distinguish more.
         travel_mm: PositionMm,
     },
     /// Highest speed of a wheel move.
@@ -130,7 +127,7 @@ pub enum Command {
         /// Gain.
         k: u8,
     },
-    /// Take the boards as they are for the commissioned ones.
+    /// Accept the present boards as the commissioned ones.
     Commission,
     /// Ask a board for one of its parameters.
     ReadParameter {
@@ -161,9 +158,9 @@ pub enum Command {
     ClearFault,
     /// HOLD everywhere and supply dump, in the next SYNC.
     EmergencyStop,
-    /// Take the control, which lasts while the operator is known to see the robot.
+    /// Take control, which lasts while the operator is known to see the robot.
     TakeControl,
-    /// Give the control back.
+    /// Give control back.
     ReleaseControl,
     /// Choose the behaviours of a walk that may act.
     SetBehaviours(
@@ -176,7 +173,7 @@ pub enum Command {
     Hold,
     /// Start the gait from the start pose; the gait clock starts now.
     StartGait,
-    /// End the gait with the present step.
+    /// End the gait after the present step.
     StopGait,
     /// Walk, or change the order of the walk under way.
     Walk(
@@ -248,7 +245,7 @@ pub struct CommandInfo {
 }
 
 impl CommandInfo {
-    /// Its argument of this name.
+    /// Its argument with this name.
     #[must_use]
     pub fn argument(&self, name: &str) -> Option<&'static Argument> {
         self.arguments.iter().find(|argument| argument.name == name)
@@ -319,7 +316,7 @@ impl CommandCode {
         self.info().name
     }
 
-    /// The command of this name.
+    /// The command with this name.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         let row = TABLE.iter().find(|row| row.name == name);
@@ -327,7 +324,7 @@ impl CommandCode {
     }
 }
 
-// Every code lies in a range that names a layer, and no code appears twice.
+// Every code is in a range that names a layer, and no code appears twice.
 const _: () = {
     let mut table = TABLE;
     let mut last = 0;

@@ -1,18 +1,16 @@
-//! Which side of a foot touches: bearing of the contact from the four optical
-//! switches of the foot.
+//! Which side of a foot touches: bearing of the contact from the four optical switches of the foot.
 //!
-//! This is the only use of `micromath` in the project. Its arctangent is off by
-//! at most [`BEARING_ERROR_RAD`] (tested two-sided against `f64::atan2` over the
-//! whole circle and over all 16 switch patterns). The bearing selects a reflex
-//! sector of 45 degrees (0.785 rad) and is logged; an error of 0.003 rad cannot
-//! move a bearing from the middle of one sector into another.
+//! This is the only use of `micromath` in the project. The error of its arctangent is at most [`BEARING_ERROR_RAD`]
+//! (tested on both sides against `f64::atan2` over the whole circle and over all 16 switch patterns). The bearing
+//! selects a reflex sector of 45 degrees (0.785 rad) and is logged; an error of 0.003 rad cannot move a bearing from
+//! the middle of one sector into another.
 
 use micromath::F32Ext;
 
 /// Largest error of [`bearing_of`] in rad, any direction.
 pub const BEARING_ERROR_RAD: f32 = 0.003;
 
-/// Side of the robot a leg or wheel is on.
+/// Side of the robot that a leg or wheel is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Left: joints 1–3, wheel 7.
@@ -26,7 +24,7 @@ pub enum Side {
 /// rear, bit 3 inner.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FootSwitches(
-    /// Raw bits, only the lower four count.
+    /// Raw bits; only the lower four count.
     pub u8,
 );
 
@@ -52,8 +50,7 @@ impl FootSwitches {
         self.0 & 0x0F == 0x0F
     }
 
-    /// Sum of the directions of the closed switches, (forward, outward), each
-    /// in −1..=1.
+    /// Sum of the directions of the closed switches, (forward, outward), each in −1..=1.
     #[must_use]
     pub fn direction(self) -> (i8, i8) {
         let has = |bit: u8| i8::from(self.0 & bit != 0);
@@ -66,7 +63,7 @@ impl FootSwitches {
     /// Bearing of the touching side in the robot's frame, rad in (−π, π]:
     /// 0 ahead, +π/2 left, π behind, −π/2 right.
     ///
-    /// `None` if no switch is closed or if the closed ones cancel (opposite pairs, all four): then no side is
+    /// `None` if no switch is closed, or if the closed ones cancel (opposite pairs, all four): then no side is
     /// indicated. The right leg's frame is mirrored in Y, so its outer side is the robot's right.
     #[must_use]
     pub fn bearing_rad(self, side: Side) -> Option<f32> {
@@ -88,12 +85,12 @@ impl FootSwitches {
     }
 }
 
-/// Bearing in rad of the direction (`left`, `forward`), within
-/// [`BEARING_ERROR_RAD`] of the exact arctangent. (0, 0) gives 0.
+/// Bearing in rad of the direction (`left`, `forward`), within [`BEARING_ERROR_RAD`] of the exact arctangent. (0, 0)
+/// gives 0.
 #[must_use]
 pub fn bearing_of(left: f32, forward: f32) -> f32 {
-    // By its full name: if `std` is linked, `left.atan2(forward)` would be another function, and host and
-    // target would differ.
+    // Called by its full name: if `std` is linked, `left.atan2(forward)` would be another function, and host and target
+    // would differ.
     F32Ext::atan2(left, forward)
 }
 
@@ -119,7 +116,7 @@ pub enum Sector {
 }
 
 impl Sector {
-    /// Its name inside a sentence.
+    /// Its name within a sentence.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

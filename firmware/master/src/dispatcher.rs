@@ -1,19 +1,18 @@
-//! Dispatcher: admits user commands, finds their layer by code, and answers
-//! each with a ticket (ack) or a reason (nack).
+//! Dispatcher: admits user commands, finds their layer by code, and answers each with a ticket (ack) or a reason
+//! (nack).
 //!
-//! A command carries a deadline: one that is late is refused, at the door and
-//! again when its layer takes it from the queue, so that nothing queued before
-//! a stall or a reconnection runs in a burst afterwards. A client numbers its
-//! commands upwards; a repeated or older number is refused.
+//! A command carries a deadline. A late command is refused, on arrival and again when its layer takes it from the
+//! queue, so that nothing queued before a stall or a reconnection runs in a burst afterwards. A client numbers its
+//! commands in increasing order; a repeated or older number is refused.
 
 use heapless::spsc::Producer;
 
 use crate::command::{Command, CommandCode, Layer};
 use crate::layer1::params::ParamError;
 
-/// Clients that may send commands.
+/// Number of clients that may send commands.
 pub const CLIENTS: usize = 4;
-/// Farthest deadline accepted, µs: a command is about now.
+/// Latest deadline that is accepted, µs from now: a command is for the present.
 pub const DEADLINE_MAX_US: u64 = 10_000_000;
 
 /// A command with its sender's number and its deadline.
@@ -40,7 +39,7 @@ pub struct Ticket {
     pub code: CommandCode,
 }
 
-/// Why a command is refused at the door.
+/// Why a command is refused on arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reject {
     /// The deadline has passed.
@@ -48,7 +47,7 @@ pub enum Reject {
         /// By how much, µs.
         late_us: u64,
     },
-    /// The deadline lies more than [`DEADLINE_MAX_US`] ahead.
+    /// The deadline is more than [`DEADLINE_MAX_US`] ahead.
     DeadlineTooFar,
     /// The client has sent this number before.
     Duplicate,
@@ -76,11 +75,11 @@ pub enum Reject {
 pub enum Refusal {
     /// Taken from the queue after its deadline.
     Expired,
-    /// Needs the control, which this client does not hold.
+    /// The command needs control, which this client does not have.
     NotInControl,
-    /// Needs armed axes.
+    /// The command needs armed axes.
     NotArmed,
-    /// Needs disarmed axes.
+    /// The command needs disarmed axes.
     NotDisarmed,
     /// Layer 1 is moving the robot.
     Moving,
@@ -90,15 +89,15 @@ pub enum Refusal {
     NotAtStart,
     /// An E-stop or HOLD is latched: clear it first.
     Latched,
-    /// The supply pressure switch is open: wait until there is pressure (after an E-stop, until the reservoir
-    /// is filled again), then ask again.
+    /// The supply-pressure switch is open: wait until there is pressure (after an E-stop, until the reservoir is filled
+    /// again), then try again.
     NoAir,
     /// A node has not been heard.
     NodeMissing {
         /// Bus address.
         node: u8,
     },
-    /// A node speaks another version of the interface.
+    /// A node uses another version of the interface.
     SchemaMismatch {
         /// Bus address.
         node: u8,
@@ -107,7 +106,7 @@ pub enum Refusal {
         /// The node's schema hash.
         theirs: u64,
     },
-    /// A node sits at an address strapped for another role.
+    /// A node is at an address strapped for another role.
     WrongRole {
         /// Bus address.
         node: u8,
@@ -135,12 +134,12 @@ pub enum Refusal {
         /// Active fault bits.
         faults: u16,
     },
-    /// A node was reset during this: nobody knows whether it is done.
+    /// A node was reset meanwhile: it is unknown whether the command was carried out.
     NodeReset {
         /// Bus address.
         node: u8,
     },
-    /// A node answered no.
+    /// A node refused.
     NodeRefused {
         /// Bus address.
         node: u8,
@@ -164,17 +163,16 @@ pub enum Refusal {
         /// Number given.
         joint: u8,
     },
-    /// A parameter is wrong.
+    /// A parameter is invalid.
     Parameter(
         /// Which, and its limits.
         ParamError,
     ),
-    /// A walk needs wheels that follow the master's references; those of this robot make profiles
-    /// of their own.
+    /// A walk needs wheels that follow the master's references; those of this robot make profiles of their own.
     WheelsNotStreamed,
     /// Another command of this kind is still being carried out.
     Busy,
-    /// An E-stop or HOLD came between.
+    /// An E-stop or HOLD intervened.
     Interrupted,
     /// The start pose was not reached in time.
     NotSettled {
@@ -209,7 +207,7 @@ pub struct Dispatcher {
 }
 
 impl Dispatcher {
-    /// No client has spoken yet.
+    /// No client has sent anything yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -224,11 +222,10 @@ impl Dispatcher {
         }
     }
 
-    /// Checks number and deadline, and uses the number up.
+    /// Checks number and deadline, and consumes the number.
     ///
-    /// A number is used up even if the command is refused later: a client that
-    /// tries again sends a new command with a new number. An E-stop of a known
-    /// client is never refused.
+    /// A number is consumed even if the command is refused later: a client that tries again sends a new command with a
+    /// new number. An E-stop of a known client is never refused.
     ///
     /// # Errors
     /// See [`Reject`].
@@ -247,8 +244,8 @@ impl Dispatcher {
             command: request.command,
         };
         if matches!(request.command, Command::EmergencyStop) {
-            // A stop is obeyed however old, repeated or overtaken it is; a number
-            // behind the last one does not turn the count back.
+            // A stop is obeyed however old, repeated or overtaken it is; a number behind the last one does not set the
+            // count back.
             let ahead = last.is_none_or(|seen| request.id.wrapping_sub(seen) <= u32::MAX >> 1_u32);
             if ahead {
                 *last = Some(request.id);
@@ -276,7 +273,7 @@ impl Dispatcher {
         Ok(accepted)
     }
 
-    /// Hands an admitted command to the queue of its layer.
+    /// Passes an admitted command to the queue of its layer.
     ///
     /// # Errors
     /// [`Reject::QueueFull`] with the layer.

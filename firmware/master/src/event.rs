@@ -13,7 +13,7 @@ use crate::finding::Finding;
 /// Why all axes hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HoldReason {
-    /// A node missed three cycles in a row.
+    /// A node missed three consecutive cycles.
     NodeLost(
         /// Bus address.
         u8,
@@ -25,7 +25,7 @@ pub enum HoldReason {
         /// Active fault bits, protocol's table of faults.
         faults: u16,
     },
-    /// A node that was armed no longer is, although nobody asked for it: it has restarted.
+    /// A node that was armed no longer is, although this was not requested: it has restarted.
     NodeDisarmed(
         /// Bus address.
         u8,
@@ -34,7 +34,7 @@ pub enum HoldReason {
     SupplyLost,
     /// Layer 1 produced nothing for 100 ms.
     LayerOneStalled,
-    /// Layer 1 has not come back: the behaviours of its walk have ended, no leg moves any more.
+    /// Layer 1 has not come back: the behaviours of its walk have ended, and no leg moves any more.
     LayerOneGone,
     /// The operator in control has seen nothing new for too long.
     OperatorLost,
@@ -73,7 +73,7 @@ pub enum Event {
         /// The node's firmware version: major, minor, patch.
         firmware: [u8; 3],
     },
-    /// A node is not the kind of board that belongs to its address.
+    /// A node is not the kind of board that belongs at its address.
     WrongRole(
         /// Bus address.
         u8,
@@ -119,7 +119,7 @@ pub enum Event {
         /// Time since its first fault, µs, modulo 2^32. A fault may be older than this master.
         ago_us: u32,
     },
-    /// A board has reported what it has heard; boards are asked in turn.
+    /// A board has reported what it has received; boards are asked in turn.
     Link {
         /// Bus address.
         node: u8,
@@ -133,14 +133,14 @@ pub enum Event {
         /// The record; its time is the board's.
         entry: LogEntry,
     },
-    /// Records that a board's log had no room for.
+    /// Number of records for which a board's log had no room.
     LogLost {
         /// Bus address.
         node: u8,
         /// How many.
         records: u16,
     },
-    /// Value of a board's parameter, read or now in force.
+    /// Value of a board's parameter, read or newly in force.
     Parameter {
         /// Bus address.
         node: u8,
@@ -149,7 +149,7 @@ pub enum Event {
         /// Raw value.
         raw: i32,
     },
-    /// A node missed three cycles in a row.
+    /// A node missed three consecutive cycles.
     NodeLost(
         /// Bus address.
         u8,
@@ -191,7 +191,7 @@ pub enum Event {
     TouchDown {
         /// Which foot.
         side: Side,
-        /// Side of the foot that touches, in the robot's frame; `None` when flat.
+        /// Side of the foot that touches, in the robot's frame; `None` if flat.
         sector: Option<Sector>,
     },
     /// All of a foot's switches opened.
@@ -217,19 +217,19 @@ pub enum Event {
     },
 }
 
-/// Events kept for the user.
+/// Capacity for events kept for the user.
 pub const EVENT_DEPTH: usize = 32;
 
-/// How long an event stays in a full queue, the least first.
+/// How long an event stays in a full queue; the lowest weight goes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Weight {
-    /// It comes again, or is reported elsewhere.
+    /// It will be repeated, or is reported elsewhere.
     Routine,
     /// It happened once.
     Told,
-    /// A person must know why the robot stopped or does not start, and which board is to blame.
+    /// A person must know why the robot has stopped or does not start, and which board is to blame.
     Cause,
-    /// It ends a command of the user, or answers one: its sender waits for it.
+    /// It ends a command of the user, or answers one: the sender is waiting for it.
     Outcome,
 }
 
@@ -255,8 +255,8 @@ impl Event {
     }
 }
 
-/// Bounded queue of events. When it is full, the oldest event of the least weight is dropped, which may be
-/// the newcomer: an outcome of a command stays as long as anything else is there.
+/// Bounded queue of events. When it is full, the oldest event of the lowest weight is dropped, which may be the new
+/// one: the outcome of a command stays as long as there is anything else to drop.
 #[derive(Debug, Default)]
 pub struct Events {
     queue: Deque<(u64, Event), EVENT_DEPTH>,
@@ -278,11 +278,11 @@ impl Events {
         if self.queue.is_full() && !self.made_room(&event) {
             return;
         }
-        // Cannot fail: a place was just made.
+        // Cannot fail: a place has just been freed.
         let _stored = self.queue.push_back((time_us, event));
     }
 
-    /// Turns the queue once around and leaves one event out; false if that is the newcomer.
+    /// Rotates the queue once and leaves one event out; returns false if the new event is to be dropped.
     #[cold]
     fn made_room(&mut self, newcomer: &Event) -> bool {
         self.lost = self.lost.wrapping_add(1);
@@ -307,7 +307,7 @@ impl Events {
         self.queue.pop_front()
     }
 
-    /// Events lost to a full queue since start-up (wraps).
+    /// Number of events lost to a full queue since start-up (wraps).
     #[must_use]
     pub const fn lost(&self) -> u32 {
         self.lost

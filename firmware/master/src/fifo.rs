@@ -1,9 +1,8 @@
-//! RT-FIFOs between the layers: `heapless` single-producer single-consumer
-//! queues, each with a defined answer to "full".
+//! RT-FIFOs between the layers: `heapless` single-producer single-consumer queues, each with a defined behaviour when
+//! full.
 //!
-//! Every queue is bounded at compile time; the two ends can be split and given
-//! to two contexts (interrupt and thread, or two threads of a Linux board).
-//! The answers are data ([`POLICIES`]) so that documentation and tests agree.
+//! Every queue is bounded at compile time; the two ends can be split and given to two contexts (interrupt and thread,
+//! or two threads of a Linux board). The behaviours are data ([`POLICIES`]), so that documentation and tests agree.
 
 use heapless::spsc::Queue;
 
@@ -34,7 +33,7 @@ pub type FeedbackFifo = Queue<Feedback, FEEDBACK_STORAGE>;
 /// Layer 0 to layer 2: one record per bus cycle.
 pub type TelemetryFifo = Queue<Record, TELEMETRY_STORAGE>;
 
-/// Handling of an item that finds its queue full.
+/// What happens to an item that finds its queue full.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WhenFull {
     /// The new item is refused, and its sender gets the reason.
@@ -52,13 +51,13 @@ pub struct FifoPolicy {
     pub name: &'static str,
     /// Items it can hold.
     pub depth: usize,
-    /// Answer to "full".
+    /// Behaviour when full.
     pub when_full: WhenFull,
-    /// Why this answer and no other.
+    /// Why this behaviour and no other.
     pub why: &'static str,
 }
 
-/// All queues of the master, with their answer to "full".
+/// All queues of the master, with their behaviour when full.
 pub const POLICIES: [FifoPolicy; 5] = [
     FifoPolicy {
         name: "dispatcher -> layer 0",
@@ -101,16 +100,16 @@ pub struct FifoLosses {
     pub telemetry: u32,
 }
 
-/// Stores `item`; when the queue is full the oldest item goes.
+/// Stores `item`; if the queue is full, drops the oldest item.
 ///
-/// Returns how many items were lost (0 or 1). Needs the whole queue: a split
-/// producer cannot remove items, and would drop the new one instead.
+/// Returns how many items were lost (0 or 1). It needs the whole queue: a split producer cannot remove items, and would
+/// drop the new one instead.
 pub fn push_drop_oldest<T, const N: usize>(queue: &mut Queue<T, N>, item: T) -> u32 {
     match queue.enqueue(item) {
         Ok(()) => 0,
         Err(item) => {
             let _oldest = queue.dequeue();
-            // Cannot fail: a place was just made. A queue of depth 0 loses the item.
+            // Cannot fail: a place has just been freed. A queue of depth 0 loses the item.
             let _stored = queue.enqueue(item);
             1
         }

@@ -1,9 +1,9 @@
-//! Findings: problems of the boards and the line that the master detects by itself, with the sentence and the
-//! remedy of each. (Faults that a board latches have theirs in the protocol's table.)
+//! Findings: problems of the boards and the line that the master detects by itself, with the sentence and the remedy of
+//! each. (Those of faults that a board latches are in the protocol's table.)
 
 macro_rules! findings {
     ($( $name:ident: $sentence:literal, $remedy:literal; )*) => {
-        /// A problem that a person must know and can mend.
+        /// A problem that a person must know of and can fix.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Finding { $( #[doc = $sentence] $name, )* }
 
@@ -11,7 +11,7 @@ macro_rules! findings {
             /// All rows.
             pub const ALL: &'static [Self] = &[ $( Self::$name ),* ];
 
-            /// What was found, for a person.
+            /// What was found, in a sentence for people.
             #[must_use]
             pub const fn sentence(self) -> &'static str {
                 match self { $( Self::$name => $sentence ),* }

@@ -1,4 +1,4 @@
-//! The whole master: dispatcher, layers and FIFOs composed for one thread.
+//! The whole master: dispatcher, layers and FIFOs combined for one thread.
 
 use heapless::Vec;
 use wheeleg_protocol::MAX_ENCODED;
@@ -22,7 +22,7 @@ pub type TxBytes = Vec<u8, MAX_ENCODED>;
 
 /// Client number of [`Master::submit`].
 pub const LOCAL_CLIENT: u8 = 0;
-/// Deadline that [`Master::submit`] gives a command, µs from now.
+/// Deadline of a command from [`Master::submit`], µs from now.
 pub const LOCAL_DEADLINE_US: u64 = 1_000_000;
 
 /// The master.
@@ -45,8 +45,8 @@ pub struct Master {
     next_id: u32,
 }
 
-// Memory is bounded at compile time; most of it is the telemetry queue. The
-// limit leaves the master room on a small microcontroller.
+// Memory is bounded at compile time; most of it is the telemetry queue. The limit leaves the master room on a small
+// microcontroller.
 const _: () = assert!(core::mem::size_of::<Master>() <= 48 * 1024);
 
 impl Master {
@@ -76,8 +76,8 @@ impl Master {
         })
     }
 
-    /// Submits a command of the local user ([`LOCAL_CLIENT`]) with the next
-    /// number and a deadline of [`LOCAL_DEADLINE_US`].
+    /// Submits a command of the local user ([`LOCAL_CLIENT`]) with the next number and a deadline of
+    /// [`LOCAL_DEADLINE_US`].
     ///
     /// # Errors
     /// See [`Reject`].
@@ -100,8 +100,8 @@ impl Master {
     pub fn submit_request(&mut self, request: Request, now_us: u64) -> Result<Ticket, Reject> {
         let accepted = self.dispatcher.admit(&request, now_us)?;
         if matches!(request.command, Command::EmergencyStop) {
-            // A stop neither queues nor expires, and commands queued before it must not undo it: a clear
-            // would take it back in the next cycle.
+            // A stop neither queues nor expires, and commands queued before it must not undo it: a clear would cancel
+            // it in the next cycle.
             drop_waiting(&mut self.commands0, now_us, &mut self.events);
             self.layer0.emergency_stop(now_us, &mut self.events);
             self.events.push(now_us, Event::Done(accepted.ticket));
@@ -120,15 +120,14 @@ impl Master {
         self.dispatcher.open_session(client);
     }
 
-    /// The operator in control has seen the robot's state of `seen_us`; see
+    /// The operator in control has seen the robot's state of time `seen_us`; see
     /// [`Lease::beat`](crate::layer0::operator::Lease::beat).
     pub fn beat(&mut self, seen_us: u64, now_us: u64) {
         self.layer0.beat(seen_us, now_us);
     }
 
-    /// Runs one bus cycle (every 10 ms): ends the last one (supervision,
-    /// odometry, telemetry, feedback), carries out commands, runs layer 1, and
-    /// returns the SYNC to send now.
+    /// Runs one bus cycle (every 10 ms): ends the last one (supervision, odometry, telemetry, feedback), carries out
+    /// commands, runs layer 1, and returns the SYNC to send now.
     pub fn cycle(&mut self, now_us: u64) -> TxBytes {
         if self.layer0.watch_operator(now_us, &mut self.events) {
             drop_waiting(&mut self.commands0, now_us, &mut self.events);
@@ -176,8 +175,8 @@ impl Master {
         self.layer0.start_cycle(now_us, newest)
     }
 
-    /// A layer 1 that was given up answers nothing. Of its commands only a hold can be carried out: at once,
-    /// by layer 0.
+    /// A layer 1 that was given up answers nothing. Of its commands only a hold can be carried out: layer 0 does so
+    /// at once.
     fn answer_for_layer_one(&mut self, now_us: u64) {
         for _ in 0..self.commands1.capacity() {
             let Some(Accepted {
@@ -224,32 +223,32 @@ impl Master {
         self.layer1_enabled = enabled;
     }
 
-    /// All axes are armed and no stop is latched.
+    /// Whether all axes are armed and no stop is latched.
     #[must_use]
     pub fn is_armed(&self) -> bool {
         self.layer0.is_armed()
     }
 
-    /// Every node is identified, compatible, present and free of faults.
+    /// Whether every node is identified, compatible, present and free of faults.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         self.layer0.is_ready()
     }
 
-    /// Layer 0, to look at.
+    /// Layer 0, read-only.
     #[must_use]
     pub const fn layer0(&self) -> &Layer0 {
         &self.layer0
     }
 
-    /// Layer 1, to look at.
+    /// Layer 1, read-only.
     #[must_use]
     pub const fn layer1(&self) -> &Layer1 {
         &self.layer1
     }
 }
 
-/// Empties a queue of commands; each is answered.
+/// Empties a queue of commands, and answers each of them.
 fn drop_waiting(queue: &mut CommandFifo, now_us: u64, events: &mut Events) {
     for _ in 0..queue.capacity() {
         let Some(earlier) = queue.dequeue() else {

@@ -1,21 +1,19 @@
 //! The one place where left and right differ.
 //!
-//! Both legs have the same model; the right one lives in a frame mirrored in Y
-//! (MODEL.md §1). Foot positions in the robot's axes (X forward, Y left, Z up,
-//! from the leg's yaw axis O4) change the sign of Y on their way into and out
-//! of the right leg's frame; strokes are equal on both sides.
+//! Both legs have the same model; the right one uses a frame mirrored in Y (MODEL.md §1). Foot positions in the robot's
+//! axes (X forward, Y left, Z up, from the leg's yaw axis O4) change the sign of Y on their way into and out of the
+//! right leg's frame; strokes are equal on both sides.
 
 use nalgebra::Vector3;
 use wheeleg_kinematics::{FootState, LegGeometry, LegParameters};
 
 use crate::contact::Side;
 
-/// Largest excess over the stroke that still counts as inside, m: rounding of
-/// `f32` at the ends of the stroke, well below the 15 µm of the potentiometer's
-/// converter.
+/// Largest excess over the stroke that still counts as inside, m: rounding of `f32` at the ends of the stroke, well
+/// below the 15 µm of the potentiometer's converter.
 const ROUNDING_M: f32 = 5.0e-6;
 
-/// Y of the robot's axes to Y of the leg's own frame, and back.
+/// Converts Y from the robot's axes to the leg's own frame, and back.
 #[must_use]
 pub fn leg_y(side: Side, y: f32) -> f32 {
     match side {
@@ -24,16 +22,16 @@ pub fn leg_y(side: Side, y: f32) -> f32 {
     }
 }
 
-/// The leg in `f32`. The foot may be as close to the yaw axis as the
-/// drawn-back horizontal cylinder puts it, less rounding.
+/// The leg in `f32`. The foot may be as close to the yaw axis as the drawn-back horizontal cylinder puts it, less
+/// rounding.
 fn geometry(leg: &LegParameters<f32>) -> Option<LegGeometry<f32>> {
     let mut parameters = *leg;
     parameters.min_foot_radius_m -= ROUNDING_M;
     LegGeometry::new(parameters).ok()
 }
 
-/// Foot from strokes (s2, s5, s6) in m: position in the robot's axes from O4, m.
-/// `None` if the loop of the yaw cylinder does not close.
+/// Position of the foot in the robot's axes from O4, m, from strokes (s2, s5, s6) in m. `None` if the loop of the yaw
+/// cylinder does not close.
 #[must_use]
 pub fn foot_of_strokes(
     leg: &LegParameters<f32>,
@@ -48,9 +46,8 @@ pub fn foot_of_strokes(
     Some([foot.x, leg_y(side, foot.y), foot.z])
 }
 
-/// Strokes (m) and their rates (m/s) for a foot at `position` (m) moving with
-/// `velocity` (m/s), both in the robot's axes from O4. `None` if a stroke is out
-/// of its range or the foot on the yaw axis.
+/// Strokes (m) and their rates (m/s) for a foot at `position` (m) moving with `velocity` (m/s), both in the robot's
+/// axes from O4. `None` if a stroke is out of its range or the foot is on the yaw axis.
 #[must_use]
 pub fn strokes_of_foot(
     leg: &LegParameters<f32>,

@@ -58,7 +58,7 @@ impl Side {
     }
 }
 
-/// Where the robot is in its motion; logged, and the reason for the link-loss action.
+/// State of the robot's motion; it is logged, and determines the link-loss action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
@@ -77,7 +77,7 @@ pub enum Phase {
     Reach = 5,
     /// Step: foot goes down.
     Lower = 6,
-    /// Step: wheels push, b5 of the standing leg gives way.
+    /// Step: wheels push, b5 of the standing leg follows.
     Push = 7,
     /// Step: push over, waiting for the next step.
     Rest = 8,
@@ -108,19 +108,19 @@ impl Phase {
 /// Coming change of a reference, for control ahead of a known move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NextReference {
-    /// Reference the next move leads to, mm.
+    /// Reference to which the next move leads, mm.
     pub reference_mm: PositionMm,
     /// Bus cycles until that move begins, 1..=254.
     pub cycles: u8,
 }
 
-/// A node's reaction when the bus falls silent in this phase, `docs/decisions/0010-safe-states.md`.
+/// A node's reaction if the bus falls silent in this phase, `docs/decisions/0010-safe-states.md`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLinkLoss {
     /// Valves shut, air trapped: a loaded leg must not collapse.
     #[default]
     Hold,
-    /// HOLD first, then exhaust at limited speed: the leg carries nothing.
+    /// HOLD first, then exhaust at limited speed: the leg carries no load.
     HoldThenExhaust,
 }
 
@@ -130,8 +130,8 @@ pub enum Reflex {
     /// The reference goes out unchanged.
     #[default]
     None,
-    /// The reference goes out minus the measured wheel travel since layer 1
-    /// asked for this reflex: a standing foot stays where it is on the ground.
+    /// The reference is sent minus the wheel travel measured since layer 1 requested this reflex: a standing foot stays
+    /// where it is on the ground.
     FollowTravel,
     /// The reference becomes the measured stroke once the foot's switches close.
     StopOnTouch,
@@ -168,8 +168,7 @@ pub struct WheelTravel {
 pub struct TravelSetpoint {
     /// Left and right.
     pub wheels: [WheelTravel; WHEELS],
-    /// Changes whenever a new motion begins: layer 0 then takes the wheels'
-    /// present references as the new origins.
+    /// Changes whenever a new motion begins: layer 0 then takes the wheels' present references as the new origins.
     pub segment: u16,
 }
 
@@ -184,12 +183,12 @@ impl TravelSetpoint {
     }
 }
 
-/// A foot goes down fast to this height above the expected ground, then slowly.
+/// A foot is lowered fast to this height above the expected ground, then slowly.
 pub const APPROACH_MM: PositionMm = PositionMm::from_int(10);
-/// A stance presses on by this much beyond where its foot has touched: it takes its share of the load (4 mm
+/// A stance presses on by this much beyond where its foot has touched, so that it takes its share of the load (4 mm
 /// against the stiffness of the air, about 2.7 N/mm).
 pub const PRESS_MM: PositionMm = PositionMm::from_int(4);
-/// Cycles at full length, without ground, before it is reported and the nose goes down (200 ms).
+/// Cycles at full length, without ground, after which this is reported and the nose goes down (200 ms).
 pub const NO_GROUND: u16 = 20;
 
 /// Task of a leg in a walk, as shown by its vertical cylinder.
@@ -202,7 +201,7 @@ pub enum LegPlan {
     Lift,
     /// Foot on its way to the foothold.
     Reach,
-    /// Foot goes down: fast to this stroke, [`APPROACH_MM`] above the expected ground, then slowly.
+    /// Foot being lowered: fast to this stroke, [`APPROACH_MM`] above the expected ground, then slowly.
     Lower(
         /// mm.
         PositionMm,
@@ -226,10 +225,10 @@ impl WalkPlan {
     }
 }
 
-/// How far a foot that goes down has come.
+/// Progress of a foot being lowered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Landing {
-    /// It does not go down, or is still on its way.
+    /// It is not being lowered, or is still on its way.
     #[default]
     Waiting,
     /// It stands, b6 at this stroke, mm.
@@ -237,7 +236,7 @@ pub enum Landing {
         /// mm.
         PositionMm,
     ),
-    /// The leg has been at its full length for this many cycles, and has found no ground.
+    /// The leg has been at full length for this many cycles and has found no ground.
     Nothing(
         /// Cycles.
         u16,
@@ -249,23 +248,24 @@ pub enum Landing {
 pub struct Acts {
     /// Those that may act.
     pub enabled: Behaviours,
-    /// How far the feet have come that go down.
+    /// Progress of the feet being lowered.
     pub landing: [Landing; WHEELS],
     /// A standing foot has lost the ground and follows it.
     pub lost: [bool; WHEELS],
-    /// It has followed as far as it may: the ground below is a separate foothold.
+    /// It has followed as far as it may: the ground below counts as a separate foothold.
     pub deep: [bool; WHEELS],
-    /// Distance of a standing leg's b6 beyond its reference, mm.
+    /// How far a standing leg's b6 is extended beyond its reference, mm.
     pub beyond_mm: [PositionMm; WHEELS],
-    /// Axes that pull at their limit, do not move, and are held in place.
+    /// Axes that work at their limit, do not move, and are held in place.
     pub overload: [bool; JOINTS],
-    /// How often a swinging foot has run against something (wraps): layer 1 may miss a cycle.
+    /// How often a swinging foot has run against something (wraps); a count, because layer 1 may miss a cycle.
     pub bumps: [u8; WHEELS],
-    /// How often the robot has made no progress for long (wraps).
+    /// How often the robot has made no progress for a long time (wraps).
     pub stuck: u8,
-    /// Share of the walk's speed at which the wheels go, 0 to 1.
+    /// Share of the walk's speed at which the wheels move, 0 to 1.
     pub pace: I16F16,
-    /// Distance by which the wheels are led back in a cycle, mm: they give way to a nose that they hold up.
+    /// Distance by which the wheels are moved back in a cycle, mm: they give way because their torque holds the nose
+    /// up.
     pub back_mm: PositionMm,
 }
 
@@ -308,8 +308,8 @@ pub struct Setpoints {
     pub push: Option<PushProfile>,
     /// How often the user has frozen all axes (wraps): each time also ends directly commanded motions.
     pub holds: u8,
-    /// Number of the permission to move ([`Feedback::permit`]) for which they were computed; those of
-    /// another count as none.
+    /// Number of the permission to move ([`Feedback::permit`]) for which they were computed; set-points with another
+    /// number are ignored.
     pub permit: u16,
 }
 
@@ -344,7 +344,7 @@ impl Setpoints {
 /// One cycle's measurements, layer 0 to layer 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Feedback {
-    /// Start of the cycle the replies belong to, µs.
+    /// Start of the cycle to which the replies belong, µs.
     pub time_us: u64,
     /// Measured strokes, mm; `None` if the node did not answer in this cycle.
     pub strokes_mm: [Option<PositionMm>; JOINTS],
@@ -358,7 +358,7 @@ pub struct Feedback {
     pub acts: Acts,
     /// All nodes armed, alive and free of faults: motion may continue.
     pub motion_allowed: bool,
-    /// Number of the permission to move (wraps): a stop, a clear or an arming ends one, and with it every
-    /// motion, also of a layer 1 that has not noticed it.
+    /// Number of the permission to move (wraps). A stop, a clear or an arming ends a permission and with it every
+    /// motion, even that of a layer 1 that has not noticed.
     pub permit: u16,
 }

@@ -12,17 +12,17 @@ use crate::setpoint::{Acts, Phase, WHEELS, WalkPlan};
 pub struct Counters {
     /// Cycles in which each node did not answer.
     pub missed: [u32; NODES],
-    /// Replies to another cycle than the running one.
+    /// Replies to a cycle other than the running one.
     pub stale_replies: u32,
-    /// Sound frames that fit nothing the master waits for.
+    /// Valid frames that do not match anything the master waits for.
     pub unexpected: u32,
     /// Acyclic requests sent, repeats included.
     pub requests: u32,
     /// Acyclic requests that were never answered.
     pub unanswered: u32,
-    /// Set-point sets lost between layers 1 and 0.
+    /// Sets of set-points lost between layers 1 and 0.
     pub lost_setpoints: u32,
-    /// Feedback sets lost between layers 0 and 1.
+    /// Sets of feedback lost between layers 0 and 1.
     pub lost_feedback: u32,
     /// Telemetry records lost before this one.
     pub lost_records: u32,
@@ -47,25 +47,24 @@ pub struct Record {
     pub step: u16,
     /// Whether all axes are armed.
     pub armed: bool,
-    /// Whether the E-stop is latched at the end of the cycle: from the next SYNC on its bit goes to
-    /// all boards, until `ClearFault`.
+    /// Whether the E-stop is latched at the end of the cycle: from the next SYNC on its bit is sent to all boards,
+    /// until `ClearFault`.
     pub emergency_stop: bool,
     /// Why all axes hold, if they do.
     pub hold: Option<HoldReason>,
     /// Set-points sent in this cycle, raw as on the wire.
     pub slots: SyncSlots,
-    /// Reply of each node in this cycle; `None` if it did not come.
+    /// Reply of each node in this cycle; `None` if there was none.
     pub replies: [Option<SlotReply>; NODES],
     /// Switches of the left and right foot, in each leg's frame.
     pub feet: [Option<FootSwitches>; WHEELS],
-    /// Bearing of the touching side of each foot in the robot's frame, rad
-    /// (see [`crate::contact`]).
+    /// Bearing of the touching side of each foot in the robot's frame, rad (see [`crate::contact`]).
     pub bearing_rad: [Option<f32>; WHEELS],
     /// Mean wheel travel since start-up, µm.
     pub travel_um: i64,
     /// Plan of the walk in this cycle, if one is under way.
     pub walk: Option<WalkPlan>,
-    /// State of the behaviours after it.
+    /// State of the behaviours at the end of the cycle.
     pub acts: Acts,
     /// Counters at the end of the cycle.
     pub counters: Counters,

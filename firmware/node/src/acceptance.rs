@@ -1,4 +1,4 @@
-//! Which parameter sets a board takes, for programs that write them.
+//! Which parameter sets a board accepts, for programs that write them.
 
 use wheeleg_protocol::{Address, WheelControlMode};
 
@@ -6,9 +6,9 @@ use crate::joint::JointSettings;
 use crate::parameters::{JointParameters, WheelParameters};
 use crate::wheel::WheelSettings;
 
-/// Whether the board at an address takes stored values (number, raw value): each is one of its
-/// parameters and within its limits, and together they do not contradict each other. A board
-/// that does not take them starts with its defaults and a latched fault.
+/// Whether the board at an address accepts stored values (number, raw value): each is one of its parameters and within
+/// its limits, and together they do not contradict each other. A board that does not accept them starts with its
+/// defaults and a latched fault.
 #[must_use]
 pub fn accepts(address: Address, stored: &[(u16, i32)]) -> bool {
     if address.is_joint() {

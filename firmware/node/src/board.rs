@@ -38,7 +38,7 @@ pub(crate) struct BoardCore {
     pub(crate) port: BusPort,
     pub(crate) supervisor: Supervisor,
     pub(crate) times: SupervisionTimes,
-    /// Counter of the newest fresh SYNC, and when its last delimiter ended.
+    /// Counter of the newest fresh SYNC, and the time at which its last delimiter ended.
     pub(crate) cycle: u16,
     pub(crate) cycle_at: Micros,
     kind: BoardKind,
@@ -48,14 +48,14 @@ pub(crate) struct BoardCore {
     save: Save,
 }
 
-/// Where a save of the parameters is.
+/// State of a request to save the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Save {
-    /// Nobody asked.
+    /// No request.
     Idle,
     /// To be done between two ticks.
     Asked,
-    /// Done with the parameters in force; whether it went well is not told yet.
+    /// Done with the parameters in force; whether it succeeded has not been reported yet.
     Done(bool),
 }
 
@@ -64,23 +64,22 @@ pub(crate) trait Application {
     /// The shared part.
     fn core(&mut self) -> &mut BoardCore;
 
-    /// Whether what could have latched a fault is gone, so that it may be
-    /// cleared, and the board may arm.
+    /// Whether every possible cause of a latched fault is gone, so that faults may be cleared and the board may arm.
     fn is_healthy(&self) -> bool;
 
-    /// Called once when the board has armed: reference := actual.
+    /// Called once when the board has armed: sets the reference to the actual position.
     fn armed(&mut self);
 
     /// A fresh SYNC was latched.
     fn sync(&mut self, sync: &Sync, at: Micros);
 
-    /// Reply for the own slot, from the state of the last tick.
+    /// Reply for the board's own slot, from the state of the last tick.
     fn slot_reply(&self) -> SlotReply;
 
     /// A request that is not common to all boards.
     fn request(&mut self, request: &Message, at: Micros) -> Result<Message, NackReason>;
 
-    /// Limits that shape the output now.
+    /// Limits that shape the output at present.
     fn limits(&self) -> LimitBits;
 
     /// Sum of the parameters in force.
@@ -104,7 +103,7 @@ impl BoardCore {
         }
     }
 
-    /// The processor was started by `cause`.
+    /// The processor was started because of `cause`.
     pub(crate) fn started_by(&mut self, cause: ResetCause) {
         self.reset_cause = cause;
         if cause.is_fault() {
@@ -112,13 +111,13 @@ impl BoardCore {
         }
     }
 
-    /// A fault that holds the axis.
+    /// Latches a fault that puts the axis in Hold.
     #[inline(never)]
     pub(crate) fn axis_fault(&mut self, fault: Fault, at: Micros) {
         self.supervisor.fault(fault, Event::AxisFault, at);
     }
 
-    /// The next frame to send. Without one there is time for what a tick left over.
+    /// The next frame to send. If there is none, this is the time for work that a tick has deferred.
     pub(crate) fn take_transmission(&mut self) -> Option<Transmission> {
         let transmission = self.port.take();
         if transmission.is_none() {
@@ -127,13 +126,13 @@ impl BoardCore {
         transmission
     }
 
-    /// Whether parameters wait to be stored.
+    /// Whether parameters are waiting to be stored.
     pub(crate) fn save_is_due(&self) -> bool {
         self.save == Save::Asked
     }
 
-    /// Stores parameters, unless the board has been armed since it was asked. The
-    /// processor may stand still meanwhile: the next tick is measured again.
+    /// Stores parameters, unless the board has been armed since the request. The processor may stand still meanwhile,
+    /// so timing is measured afresh from the next tick.
     pub(crate) fn save(
         &mut self,
         records: impl Iterator<Item = (u16, i32)>,
@@ -142,7 +141,7 @@ impl BoardCore {
     ) {
         let disarmed = self.mode().is_disarmed();
         if !disarmed {
-            // What was not tried did not fail either: who asks again has it done.
+            // What was not tried has not failed, either: a repeated request will be carried out.
             self.save = Save::Idle;
             return;
         }
@@ -153,12 +152,12 @@ impl BoardCore {
         self.supervisor.restart_timing();
     }
 
-    /// Other parameters are in force: what was stored, or is to be, is no longer them.
+    /// Other parameters are in force: they are not those that were, or were to be, stored.
     pub(crate) fn parameters_changed(&mut self) {
         self.save = Save::Idle;
     }
 
-    /// Answer to a request to save: Busy until it is done, then how it went, once.
+    /// Answers a request to save: Busy until it is done, then the result, once.
     fn ask_save(&mut self) -> Result<(), NackReason> {
         if !self.mode().is_disarmed() {
             return Err(NackReason::Armed);
@@ -199,7 +198,7 @@ impl BoardCore {
         self.supervisor.mode()
     }
 
-    /// Whether a command that ends with bus cycle `deadline` may still act.
+    /// Whether a command that ends with bus cycle `deadline` may still take effect.
     pub(crate) fn in_time(&self, deadline: u16) -> bool {
         self.supervisor.link_alive() && deadline_is_live(deadline, self.cycle)
     }
@@ -241,7 +240,7 @@ impl BoardCore {
 pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: Micros) {
     let mut rest = bytes;
     while let Some(incoming) = application.core().port.receive(&mut rest) {
-        // The bytes behind the frame came later: any chunking gives the same time.
+        // Bytes behind the frame came later; the time is the same however the bytes are chunked.
         let behind = u32::try_from(rest.len()).unwrap_or(u32::MAX);
         let later = BYTE_US.wrapping_mul(behind);
         let at = Micros(t_end.get().wrapping_sub(later));
@@ -255,12 +254,12 @@ pub(crate) fn receive<A: Application>(application: &mut A, bytes: &[u8], t_end: 
     }
 }
 
-/// Latches a SYNC and queues the reply for the own slot. A stale SYNC is
-/// answered too, so that the master sees who still listens.
+/// Latches a SYNC and queues the reply for the board's own slot. A stale SYNC is answered, too, so that the master sees
+/// who is still listening.
 fn take_sync<A: Application>(application: &mut A, sync: &Sync, at: Micros) {
     let core = application.core();
-    // Kept twice: a damaged counter would make the next ones stale, a damaged address
-    // would take the set-points of another board.
+    // Both are kept twice: a damaged counter would make the next SYNCs stale, and with a damaged address the board
+    // would take another board's set-points.
     if !core.supervisor.agrees(core.cycle) || core.port.address() != core.identity.address {
         core.axis_fault(Fault::StateCorrupt, at);
     }
@@ -279,15 +278,15 @@ fn take_sync<A: Application>(application: &mut A, sync: &Sync, at: Micros) {
         ..application.slot_reply()
     };
     let core = application.core();
-    // The address is a node's (checked when the board was made): it has a slot.
+    // The address is that of a node (checked when the board was constructed), so it has a slot.
     if let Some(offset) = SlotTiming::DEFAULT.slot_start_us(core.identity.address) {
         let start_at = Micros(at.get().wrapping_add(offset));
         core.port.queue_slot_reply(&reply.into(), start_at);
     }
 }
 
-/// Answers a frame addressed to this board, once: a repeated request gets the
-/// same answer again without being carried out again.
+/// Answers a frame addressed to this board, once: a repeated request gets the same answer again without being carried
+/// out again.
 fn take_request<A: Application>(
     application: &mut A,
     envelope: Envelope,
@@ -305,7 +304,7 @@ fn take_request<A: Application>(
     let at_us = application.core().supervisor.time_us(at);
     let answer = match message {
         Err(error) => nack(error.nack_reason()),
-        // The parser refuses these before; told to the compiler, it saves 168 bytes of flash.
+        // The parser refuses these already; stating it here saves 168 bytes of flash.
         Ok(request) if request.message_type().answer().is_none() => {
             nack(NackReason::UnknownMessage)
         }
@@ -335,7 +334,7 @@ fn take_request<A: Application>(
     core.port.queue_answer(&answer, envelope, start_at);
 }
 
-/// Requests that every board answers in the same way; the rest goes on.
+/// Requests that every board answers in the same way; others are passed on.
 fn common_request<A: Application>(
     application: &mut A,
     request: &Message,

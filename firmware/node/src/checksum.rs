@@ -1,16 +1,14 @@
 //! A checksum over state that must not change between two ticks.
 //!
-//! The state is sealed when a tick has finished with it and checked when the
-//! next begins. Any single flipped bit is detected, because each step of the
-//! sum is a bijection of the running value and of the word. Two flips cancel in
-//! less than one of 300 pairs (a test counts them): only flips of the same bit of
-//! two words can. The fault campaign counts what is missed. It guards memory,
-//! not a faulty computation.
+//! The state is sealed when a tick has finished with it and checked when the next one begins. Any single flipped bit is
+//! detected, because each step of the sum is a bijection of the running value and of the word. Two flips cancel in less
+//! than one of 300 pairs (a test counts them): only flips of the same bit in two words can. The fault campaign counts
+//! what is missed. The checksum guards memory, not against a faulty computation.
 
 use core::hash::{Hash, Hasher};
 
-/// Word-wise sum used as a [`Hasher`], so that a derived `Hash` says what is
-/// covered. One instruction of mixing per word: multiply and accumulate.
+/// Word-wise sum used as a [`Hasher`], so that a derived `Hash` defines what is covered. Mixing takes one instruction
+/// per word: multiply and accumulate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WordSum(u32);
 
@@ -25,8 +23,7 @@ impl WordSum {
 impl Hasher for WordSum {
     #[inline(always)]
     fn write(&mut self, bytes: &[u8]) {
-        // Arrays of integers come as their bytes: a word at a time, four words
-        // between two jumps.
+        // Arrays of integers arrive as their bytes: take a word at a time, and four words per loop iteration.
         let (words, rest) = bytes.as_chunks::<4>();
         let (fours, words) = words.as_chunks::<4>();
         for [a, b, c, d] in fours {
@@ -60,7 +57,7 @@ impl Hasher for WordSum {
 
     #[inline(always)]
     fn write_u64(&mut self, word: u64) {
-        // Low and high halves, both whole.
+        // Low and high halves, both in full.
         self.checksum_step((word & 0xFFFF_FFFF) as u32);
         self.checksum_step(word.wrapping_shr(32) as u32);
     }
@@ -89,7 +86,7 @@ impl Checksum {
         Self::made(|sum| state.hash(sum))
     }
 
-    /// Checksum of what `write` puts into the sum.
+    /// Checksum of what `write` feeds into the sum.
     #[inline(always)]
     pub(crate) fn made(write: impl FnOnce(&mut WordSum)) -> Self {
         let mut sum = WordSum(0);

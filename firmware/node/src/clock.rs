@@ -2,13 +2,13 @@
 
 use wheeleg_units::Micros;
 
-/// Unwraps the 32-bit microsecond counter; must be asked at least every 35 min.
-/// It starts with the first instant, whatever the counter shows then.
+/// Unwraps the 32-bit microsecond counter; must be called at least every 35 min. It starts with the first instant,
+/// whatever the counter shows then.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
     time_us: u64,
-    /// Less the rounds of the counter in `time_us`: a flipped bit there would be hours.
-    /// One in the low word is harmless, the counter itself sets that right.
+    /// Minus the rounds of the counter in `time_us`: a flipped bit there would mean hours. One in the low word is
+    /// harmless, because the counter itself corrects it.
     minus_rounds: u32,
     started: bool,
 }
@@ -35,8 +35,8 @@ impl Clock {
             self.time_us = u64::from(now.get());
         }
         let newest = self.time_us;
-        // Low word of the newest time; the shorter way round is taken, so an
-        // instant slightly in the past is in the past.
+        // Low word of the newest time. The shorter way round is taken, so an instant slightly in the past counts as
+        // past.
         let low = (newest & 0xFFFF_FFFF) as u32;
         let step = now.get().wrapping_sub(low);
         if step > i32::MAX as u32 {
@@ -44,13 +44,13 @@ impl Clock {
         }
         let time = newest.wrapping_add(u64::from(step));
         self.time_us = time;
-        // What was damaged before stays damaged.
+        // Damage that was already there stays detectable.
         let carry = ((time >> 32) as u32).wrapping_sub((newest >> 32) as u32);
         self.minus_rounds = self.minus_rounds.wrapping_sub(carry);
         time
     }
 
-    /// Takes the rounds as they are, after damage to them was reported.
+    /// Accepts the rounds as they are, after damage to them was reported.
     #[cold]
     pub const fn mend(&mut self) {
         self.minus_rounds = ((self.time_us >> 32) as u32).wrapping_neg();

@@ -1,8 +1,8 @@
-//! Debounce of up to eight switches: a bit changes after the raw level has
-//! differed from it for a number of ticks in a row.
+//! Debounce of up to eight switches: a bit changes after the raw level has differed from it for a number of consecutive
+//! ticks.
 //!
-//! The delay is exactly `ticks` samples in both directions, so that lift and
-//! touchdown are delayed alike and step lengths are not biased.
+//! The delay is exactly `ticks` samples in both directions, so that lift and touchdown are delayed equally and step
+//! lengths are not biased.
 
 /// Largest number of samples.
 const MOST: u8 = 7;
@@ -14,8 +14,8 @@ const fn plane(ticks: u8, bit: u8) -> u8 {
 
 /// Debounced state of up to eight switches, one bit each.
 ///
-/// The eight counters stand upright: bit n of the three planes is the counter of
-/// switch n, so that all of them count in one pass.
+/// The eight counters are stored bit-sliced: bit n of the three planes is the counter of switch n, so that all of them
+/// count in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Debounce<const TICKS: u8> {
     state: u8,
@@ -29,7 +29,7 @@ impl<const TICKS: u8> Default for Debounce<TICKS> {
 }
 
 impl<const TICKS: u8> Debounce<TICKS> {
-    /// All ones where the number of samples has a one.
+    /// All ones where the number of samples has a one bit.
     const TARGET: [u8; 3] = {
         assert!(TICKS >= 1 && TICKS <= MOST, "1 to 7 samples");
         [plane(TICKS, 1), plane(TICKS, 2), plane(TICKS, 4)]
@@ -52,7 +52,7 @@ impl<const TICKS: u8> Debounce<TICKS> {
             return self.state;
         }
         let [ones, twos, fours] = self.planes;
-        // Where the level differs, the counter goes up by one; elsewhere it is zero.
+        // Where the level differs, the counter increases by one; elsewhere it is zero.
         let ones_up = !ones & changed;
         let twos_up = (twos ^ ones) & changed;
         let fours_up = (fours ^ (ones & twos)) & changed;
@@ -63,7 +63,7 @@ impl<const TICKS: u8> Debounce<TICKS> {
         self.state
     }
 
-    /// A tick in which the levels could not be read: no samples are in a row across it.
+    /// A tick in which the levels could not be read: samples on either side of it are not consecutive.
     pub fn missed(&mut self) {
         self.planes = [0; 3];
     }

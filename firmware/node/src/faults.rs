@@ -14,8 +14,7 @@ pub struct FirstFault {
 
 /// Latched faults of one board.
 ///
-/// `latched` bars arming until it is cleared; `sticky` remembers everything
-/// since reset, for diagnosis.
+/// `latched` bars arming until it is cleared; `sticky` keeps every fault since reset, for diagnosis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct FaultLog {
     latched: FaultBits,
@@ -33,7 +32,7 @@ impl FaultLog {
         }
     }
 
-    /// Latches `fault`; true when it was not latched before.
+    /// Latches `fault`; returns true if it was not latched before.
     pub fn latch(&mut self, fault: Fault, at: Micros) -> bool {
         let new = !self.latched.contains(fault);
         self.latched.insert(fault);

@@ -1,9 +1,8 @@
-//! What a board gives to its application: sensors, switches and outputs.
+//! What a board provides to its application: sensors, switches and outputs.
 //!
-//! Outputs and switches are thin bundles over embedded-hal 1.0 pins and PWM
-//! channels, so that a board, the simulator and a test mock plug in the same
-//! way. The two sensors have traits of our own, because embedded-hal 1.0 has
-//! none for converters and counters.
+//! Outputs and switches are thin bundles over embedded-hal 1.0 pins and PWM channels, so that a board, the simulator
+//! and a test mock plug in the same way. The two sensors have traits of our own, because embedded-hal 1.0 has none for
+//! converters and counters.
 
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
 use embedded_hal::pwm::SetDutyCycle;
@@ -30,9 +29,8 @@ pub trait PositionSensor {
 
 /// Quadrature encoder of a wheel.
 pub trait Encoder {
-    /// The 24-bit count latched at the start of this tick; never waits. `before` is that
-    /// of the tick before, within 32 767 counts: what a shorter counter is extended from,
-    /// so that no state is needed that nobody seals.
+    /// The 24-bit count latched at the start of this tick; never waits. `before` is the count of the tick before,
+    /// within 32 767 counts; a shorter counter is extended from it, so that no unsealed state is needed.
     fn count(&mut self, before: WheelCount) -> WheelCount;
 }
 
@@ -77,7 +75,7 @@ where
     #[inline(always)]
     fn write(&mut self, duty: [u16; 4]) -> Result<(), PinError> {
         let [fill_a, vent_a, fill_b, vent_b] = duty;
-        // All four, whatever becomes of the others.
+        // Writes all four, even if one fails.
         let sound = self.fill_a.set_duty_cycle(fill_a).is_ok()
             & self.vent_a.set_duty_cycle(vent_a).is_ok()
             & self.fill_b.set_duty_cycle(fill_b).is_ok()
@@ -131,8 +129,8 @@ impl SwitchBank for NoSwitches {
     }
 }
 
-/// Motor driver with one magnitude and one sign, as the HCTL-1100's Pulse and
-/// Sign pins (data sheet p. 23; low sign = positive).
+/// Motor driver with one magnitude and one sign, like the HCTL-1100's Pulse and Sign pins (data sheet p. 23; low sign =
+/// positive).
 pub trait MotorDrive {
     /// Presets magnitude (0…100 % of the PWM period) and sign, effective at the
     /// next tick edge. Zero brakes the motor through the bridge.
@@ -155,7 +153,7 @@ impl<P: SetDutyCycle, D: OutputPin> MotorDrive for HBridge<P, D> {
         let pulse = if sign.is_ok() {
             self.pulse.set_duty_cycle_percent(magnitude)
         } else {
-            // A bridge that turns the wrong way must not be driven.
+            // A bridge that may turn the wrong way must not be driven.
             self.pulse.set_duty_cycle_fully_off()
         };
         if sign.is_ok() && pulse.is_ok() {
@@ -166,7 +164,7 @@ impl<P: SetDutyCycle, D: OutputPin> MotorDrive for HBridge<P, D> {
     }
 }
 
-/// The valve that dumps the robot's air supply; on the first wheel board only.
+/// The valve that dumps the robot's air supply; only on the first wheel board.
 pub trait DumpValve {
     /// Opens or closes the dump valve.
     fn set_open(&mut self, open: bool) -> Result<(), PinError>;
@@ -192,16 +190,16 @@ impl DumpValve for NoDumpValve {
     }
 }
 
-/// The parameters could not be stored; the set stored before is still there.
+/// The parameters could not be stored; the previous set is still there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoreError;
 
-/// Memory that keeps parameters without power: two copies, the older one
-/// replaced, so that a power cut at any instant leaves a whole set.
+/// Memory that keeps parameters without power: of two copies the older one is replaced, so that a power cut at any
+/// instant leaves a complete set.
 pub trait ParameterStore {
     /// Stores a set, given as numbers and raw values.
     ///
     /// # Errors
-    /// [`StoreError`]; then the set stored before is still there.
+    /// [`StoreError`]; then the previous set is still there.
     fn save(&mut self, records: impl Iterator<Item = (u16, i32)>) -> Result<(), StoreError>;
 }

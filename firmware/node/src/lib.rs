@@ -9,23 +9,21 @@
 //! 2. `tick(now)` from the sample timer, then `tick_done(end)` when it returns;
 //! 3. `take_transmission()` after either: bytes to send and when to start.
 //!
-//! Inputs are latched at the start of a tick. Outputs are written in every
-//! tick, also on a fault, and take effect at the next tick edge. Time is an
-//! argument: the low 32 bits of a microsecond counter, compared modulo 2^32.
+//! Inputs are latched at the start of a tick. Outputs are written in every tick, even on a fault, and take effect at
+//! the next tick edge. Time is an argument: the low 32 bits of a microsecond counter, compared modulo 2^32.
 //!
 //! Nothing here panics for any input, allocates, blocks or uses floating point.
 //!
 //! # Glossary
 //!
 //! * **node**: the application of one board: sense, control, actuate, supervise, talk
-//! * **mode**: what a node may do: DISARMED, ARMED, HOLD, EXHAUST, FAULT, …; one table says which
-//!   follows which
-//! * **HOLD**: four valves shut, air trapped; a wheel ramps to standstill
+//! * **mode**: what a node may do: DISARMED, ARMED, HOLD, EXHAUST, FAULT, …; one table says which mode may follow which
+//! * **HOLD**: four valves shut, air trapped; a wheel ramps to a standstill
 //! * **EXHAUST**: inlets shut, outlets open
-//! * **latched**: a fault stays until it is cleared, also when its cause is gone
+//! * **latched**: of a fault: stays until it is cleared, even when its cause has gone
 //! * **precharge**: filling both chambers before a joint moves
 //! * **supervisor**: decides from sensors, link and outputs whether the mode must change
-//! * **seal**: checksum of state between two ticks, by which a flipped bit is found
+//! * **seal**: checksum of state between two ticks, which reveals a flipped bit
 #![cfg_attr(not(test), no_std)]
 #![cfg_attr(
     not(test),
@@ -74,10 +72,10 @@ pub const FIRMWARE_VERSION: [u8; 3] = [0, 1, 0];
 /// for less than 2 ms at a passing edge).
 const SWITCH_TICKS: u8 = 3;
 
-/// Joint ticks after which a self-test without good readings has failed.
+/// Joint ticks after which a self-test without enough good readings has failed.
 const SELF_TEST_TICKS: Ticks = Ticks(500);
 
-/// Why a board could not be made.
+/// Why a board could not be constructed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
     /// The address straps do not name a board of this kind.

@@ -1,27 +1,25 @@
-//! The log stream of a board: records in left-over bandwidth, while somebody reads.
+//! The log stream of a board: sends records in left-over bandwidth while somebody reads.
 //!
-//! A reader holds a lease; without one nothing is recorded. A token bucket keeps a
-//! storm of events from pushing everything else out: sixteen records at once, one
-//! per millisecond on the average. What is beyond is counted.
+//! A reader holds a lease; without one nothing is recorded. A token bucket keeps a storm of events from crowding out
+//! everything else: sixteen records at once, and one per millisecond on average. What exceeds this is counted as lost.
 //!
-//! A tick only notes what happened, in a few words; whether that is recorded is worked
-//! out between two ticks, so that a fault costs its tick no more than its reaction. The
-//! result is the same whenever that is done.
+//! A tick only notes what happened, in a few words. Whether that is recorded is decided between two ticks, so that a
+//! fault costs its tick no more than its reaction. The result does not depend on when that is done.
 
 use heapless::Deque;
 use wheeleg_protocol::{LOG_ENTRIES, LogEntry, LogRecords};
 use wheeleg_units::Micros;
 
-/// Records that wait, and tokens of a full bucket.
+/// Capacity for waiting records, and tokens of a full bucket.
 const DEPTH: usize = 16;
 
-/// Notes that fit; a fault and the change of mode that it leads to are two.
+/// Capacity for notes; a fault and the change of mode that it causes are two.
 const NOTES: usize = 8;
 
 /// Waiting records of one board.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
-    /// What happened and was not looked at yet, oldest first.
+    /// What happened and has not been processed yet, oldest first.
     noted: heapless::Vec<LogEntry, NOTES>,
     waiting: Deque<[u8; 8], DEPTH>,
     lost: u16,
@@ -33,21 +31,19 @@ pub struct Log {
 }
 
 impl Log {
-    /// Notes what happened, to be worked off by [`Self::settle`]; gives it back if there
-    /// is no room.
+    /// Notes what happened, to be processed by [`Self::settle`]; returns it if there is no room.
     #[inline]
     pub fn note(&mut self, entry: LogEntry) -> Result<(), LogEntry> {
         self.noted.push(entry)
     }
 
-    /// Whether anything waits to be worked off.
+    /// Whether anything waits to be processed.
     #[inline]
     pub fn has_notes(&self) -> bool {
         !self.noted.is_empty()
     }
 
-    /// Works off what was noted; `time_us` gives the time of an entry on the clock that
-    /// does not wrap.
+    /// Processes what was noted; `time_us` converts the time of an entry to the clock that does not wrap.
     pub fn settle(&mut self, time_us: impl Fn(Micros) -> u64) {
         let mut at = 0;
         while let Some(entry) = self.noted.get(at).copied() {
@@ -57,7 +53,7 @@ impl Log {
         self.noted.clear();
     }
 
-    /// Takes what happened at `now_us` on the clock that does not wrap.
+    /// Takes an entry that happened at `now_us` on the clock that does not wrap.
     #[cold]
     fn push(&mut self, entry: LogEntry, now_us: u64) {
         if now_us >= self.lease_end_us {
@@ -74,12 +70,11 @@ impl Log {
         }
     }
 
-    /// Gives the oldest records away and the lease a new end; all that was noted has been
-    /// worked off.
+    /// Returns the oldest records and extends the lease; all notes have been processed before.
     #[cold]
     pub fn read(&mut self, lease_ms: u16, now_us: u64) -> LogRecords {
         if now_us >= self.lease_end_us {
-            // A lease that ended takes what was not fetched with it.
+            // A lease that has ended takes unfetched records with it.
             *self = Self {
                 tokens: DEPTH as u8,
                 filled_ms: now_us.wrapping_shr(10),
@@ -132,7 +127,7 @@ mod tests {
         assert_eq!(numbers(&log.read(0, 20_999)), [2]);
         push(&mut log, 4, 21_001);
         assert!(numbers(&log.read(20, 22_000)).is_empty());
-        // What a reader that died left behind is not told to the next one.
+        // What a dead reader left behind is not reported to the next one.
         push(&mut log, 5, 23_000);
         let late = log.read(20, 90_000);
         assert_eq!((numbers(&late), late.lost), (vec![], 0));
@@ -140,7 +135,7 @@ mod tests {
 
     #[test]
     fn notes_are_recorded_by_their_own_times_whenever_they_are_worked_off() {
-        // Worked off at once, or all together before the records are read.
+        // Processed at once, or all together before the records are read.
         let recorded = |at_once: bool| {
             let mut log = Log::default();
             let mut found = Vec::new();
@@ -183,10 +178,10 @@ mod tests {
         assert_eq!(numbers(&first), [0, 1, 2, 3]);
         assert_eq!((first.lost, first.left), (4, 12));
         assert_eq!(numbers(&log.read(60_000, 12)), [4, 5, 6, 7]);
-        // The bucket is empty although there is room again.
+        // The bucket is empty, although there is room again.
         push(&mut log, 99, 13);
         assert_eq!(log.read(60_000, 14).lost, 1);
-        // A millisecond earns at least one record, a pause no more than sixteen.
+        // A millisecond earns at least one record, a pause at most sixteen.
         push(&mut log, 100, 2000);
         let records: Vec<u16> = (0..3)
             .flat_map(|_| numbers(&log.read(60_000, 2001)))

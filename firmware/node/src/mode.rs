@@ -1,9 +1,8 @@
 //! Modes of a board and the one table that says how they change.
 //!
-//! The table is the whole mode logic: every (mode, event) pair has an entry,
-//! and nothing else in this crate assigns a mode. What the outputs do in a
-//! mode is said by [`ModeRules::may_drive`] and [`ModeRules::is_latched`] and carried out
-//! by the joint and wheel applications.
+//! The table is the whole mode logic: every (mode, event) pair has an entry, and nothing else in this crate assigns a
+//! mode. [`ModeRules::may_drive`] and [`ModeRules::is_latched`] determine what the outputs do in a mode; the joint and
+//! wheel applications carry it out.
 //!
 //! | mode | joint outputs | wheel outputs | leaves by |
 //! |---|---|---|---|
@@ -15,10 +14,9 @@
 //! | Exhaust | inlets shut, outlets open (PWM-limited when staged) | (never entered) | clear fault, emergency brake, E-stop |
 //! | Fault | all valves shut | drive off | clear fault |
 //!
-//! Hold is the answer to what comes from outside or from the axis (link,
-//! E-stop, brake, sensor, following error, a bit flip); Fault is the answer
-//! when the board itself missed its deadline or failed its self-test, so that
-//! no staging is run by a program that cannot be trusted. Both are latched.
+//! Hold is the answer to what comes from outside or from the axis (link, E-stop, brake, sensor, following error, a bit
+//! flip). Fault is the answer when the board itself missed its deadline or failed its self-test, so that no staging is
+//! run by a program that cannot be trusted. Both are latched.
 
 pub use wheeleg_protocol::NodeMode as Mode;
 
@@ -69,11 +67,11 @@ pub enum Refusal {
     Latched,
     /// The self-test has not passed.
     NotReady,
-    /// The mode has no use for the event.
+    /// The event has no meaning in this mode.
     NotApplicable,
     /// The cause of the latched stop is still present.
     CausePresent,
-    /// No living link: arming would trip the watchdog at once.
+    /// The link is not alive: arming would trip the watchdog at once.
     NoLink,
 }
 
@@ -111,11 +109,10 @@ const LTCH: Entry = Err(Refusal::Latched);
 const NRDY: Entry = Err(Refusal::NotReady);
 const NAPP: Entry = Err(Refusal::NotApplicable);
 
-/// Row: event. Column: present mode. Entry: next mode, or why not.
+/// Row: event. Column: present mode. Entry: next mode, or the refusal.
 ///
-/// A disarmed board does not move to Hold on link loss or axis faults (nothing
-/// is energised, and a staged exhaust would energise); the fault is latched
-/// all the same and bars arming.
+/// A disarmed board does not move to Hold on link loss or axis faults (nothing is energised, and a staged exhaust would
+/// energise outputs); the fault is still latched and bars arming.
 #[rustfmt::skip]
 const TABLE: [[Entry; 7]; 16] = [
     //                       Boot  Idle  Armed Track Hold  Exha  Fault
@@ -137,19 +134,19 @@ const TABLE: [[Entry; 7]; 16] = [
     /* BlowThroughOver   */ [NAPP, NAPP, NAPP, NAPP, NAPP, IDLE, NAPP],
 ];
 
-/// What the mode table says of a mode.
+/// What the mode table implies for a mode.
 pub trait ModeRules: Sized {
-    /// The mode after `event`, or why the event is refused (the mode stays).
+    /// The mode after `event`, or why the event is refused (then the mode stays).
     fn after(self, event: Event) -> Result<Mode, Refusal>;
 
     /// Whether the closed loop may drive outputs.
     fn may_drive(self) -> bool;
 
-    /// Whether the mode is left by an explicit clear only.
+    /// Whether the mode is left only by an explicit clear.
     fn is_latched(&self) -> bool;
 
-    /// Whether nothing is energised and nothing is about to be: parameters
-    /// marked "disarmed only" may be set, maintenance may run.
+    /// Whether nothing is energised or about to be: parameters marked "disarmed only" may be set, and maintenance may
+    /// run.
     fn is_disarmed(&self) -> bool;
 }
 
@@ -179,9 +176,8 @@ impl ModeRules for Mode {
 mod tests {
     use super::*;
 
-    /// Every pair, written down a second time: modes by initial
-    /// (Boot, Idle, Armed, Tracking, Hold, Exhaust, Fault), refusals by sign.
-    /// `-` not applicable, `!` latched, `r` not ready, `d` not disarmed.
+    /// Every pair, written down a second time: modes by initial (Boot, Idle, Armed, Tracking, Hold, Exhaust, Fault),
+    /// refusals by symbol: `-` not applicable, `!` latched, `r` not ready, `d` not disarmed.
     const EXPECTED: [(Event, &str); 16] = [
         (Event::SelfTestPassed, "I------"),
         (Event::SelfTestFailed, "F------"),

@@ -1,11 +1,9 @@
 //! Overrun detection by measurement.
 //!
-//! A tick overruns when it ends later than one period after its start, or when
-//! the next one starts more than half a period late, which means that a timer
-//! edge was missed. The first start after reset is taken as it comes.
+//! A tick overruns when it ends later than one period after its start, or when the next one starts more than half a
+//! period late, which means that a timer edge was missed. The first start after reset is accepted as it comes.
 //!
-//! Instants are the low 32 bits of a microsecond counter and are compared
-//! modulo 2^32 (71 minutes).
+//! Instants are the low 32 bits of a microsecond counter, compared modulo 2^32 (71 minutes).
 
 use wheeleg_units::Micros;
 
@@ -32,7 +30,7 @@ impl OverrunDetector {
         }
     }
 
-    /// Notes the start of a tick; true when it started too late after the last.
+    /// Notes the start of a tick; returns true if it started too late after the last one.
     pub fn begin(&mut self, now: Micros, period: Micros) -> bool {
         let late = self.start.is_some_and(|last| {
             elapsed(last, now) > period.saturating_add(Micros(period.get() / 2))
@@ -41,7 +39,7 @@ impl OverrunDetector {
         self.count(late)
     }
 
-    /// Notes the end of the tick; true when it took longer than its period.
+    /// Notes the end of the tick; returns true if it took longer than its period.
     pub fn end(&mut self, end: Micros, period: Micros) -> bool {
         let Some(start) = self.start else {
             return false;
@@ -58,7 +56,7 @@ impl OverrunDetector {
         overrun
     }
 
-    /// The period changes: the next start is taken as it comes.
+    /// The period changes: the next start is accepted as it comes.
     pub fn restart(&mut self) {
         self.start = None;
     }

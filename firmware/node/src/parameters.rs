@@ -1,9 +1,8 @@
 //! Parameter values of one board in RAM, with the limits of the protocol's table.
 //!
-//! A value is set in two steps: [`Parameters::with`] checks one new value
-//! against its row and gives a trial copy; the application turns the copy into
-//! settings, which checks the relations between parameters, and only then
-//! replaces the old values. So a refused value changes nothing.
+//! A value is set in two steps. [`Parameters::with`] checks one new value against its row and returns a trial copy. The
+//! application turns the copy into settings, which checks the relations between parameters, and only then replaces the
+//! old values. So a refused value changes nothing.
 
 use wheeleg_protocol::NackReason;
 use wheeleg_protocol::param::{JointParam, ParamLimits, WheelParam, parameter_sum};
@@ -60,8 +59,8 @@ impl<const N: usize> Parameters<N> {
         Ok(trial)
     }
 
-    /// Sum by which sets of parameters are told apart (protocol/SPEC.md, Parameter sets): any single
-    /// value that differs changes it.
+    /// Sum that distinguishes sets of parameters (protocol/SPEC.md, Parameter sets): any single differing value changes
+    /// it.
     pub fn sum(&self) -> u32 {
         parameter_sum(&self.values)
     }
@@ -85,7 +84,7 @@ macro_rules! parameters_of {
                 self.at(parameter.index())
             }
 
-            /// Every parameter that is not at its default: number and raw value.
+            /// Every parameter that is not at its default, as number and raw value.
             pub fn changed_from_default(&self) -> impl Iterator<Item = (u16, i32)> + '_ {
                 let rows = $param::LIMITS.iter().zip(&self.values);
                 rows.filter(|(row, value)| row.default != **value)

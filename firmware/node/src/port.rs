@@ -1,8 +1,7 @@
 //! The bus side of a board: bytes in, messages out, answers queued.
 //!
-//! The receiver is off while the board's own driver is on, so the board never
-//! hears itself: a frame with its own address as the source comes from another
-//! board that has the same straps.
+//! The receiver is off while the board's own driver is on, so the board never hears itself: a frame with its own
+//! address as the source comes from another board with the same straps.
 
 use crate::transmission::Transmission;
 use heapless::Vec;
@@ -16,7 +15,7 @@ use wheeleg_units::Micros;
 pub enum Incoming {
     /// The set-points of all nodes.
     Sync(Sync),
-    /// A frame of the master to this board, whatever its payload.
+    /// A frame from the master to this board, whatever its payload.
     Addressed(Envelope, u8, Result<Message, ParseError>),
     /// A frame that claims to come from this board.
     AddressConflict,
@@ -44,8 +43,8 @@ impl BusPort {
         }
     }
 
-    /// Takes bytes from the front of `bytes`, which is shortened by what was taken, up
-    /// to the end of the next frame for this board; gives what that means to it.
+    /// Takes bytes from the front of `bytes`, which is shortened by what was taken, up to the end of the next frame for
+    /// this board. Returns what that frame means to the board.
     pub fn receive(&mut self, bytes: &mut &[u8]) -> Option<Incoming> {
         while !bytes.is_empty() {
             let incoming = self.receive_one(bytes);
@@ -56,14 +55,14 @@ impl BusPort {
         None
     }
 
-    /// As [`Self::receive`], up to the end of the next frame for whomever.
+    /// As [`Self::receive`], up to the end of the next frame for any board.
     fn receive_one(&mut self, bytes: &mut &[u8]) -> Option<Incoming> {
         let frame = self.decoder.next(bytes)?.ok()?;
         let envelope = Envelope::from(frame.header);
         if envelope.source == self.address {
             return Some(Incoming::AddressConflict);
         }
-        // Only the master asks; an answer to anybody else would disturb the line.
+        // Only the master makes requests; an answer to anybody else would disturb the line.
         if envelope.source != Address::MASTER {
             return None;
         }
@@ -83,8 +82,7 @@ impl BusPort {
         None
     }
 
-    /// Queues the slot reply of this cycle; an unsent older one is dropped and
-    /// counted.
+    /// Queues the slot reply of this cycle; an older unsent one is dropped and counted.
     pub fn queue_slot_reply(&mut self, message: &Message, start_at: Micros) {
         let envelope = Envelope {
             source: self.address,
@@ -96,8 +94,7 @@ impl BusPort {
         encode(&mut self.slot_reply, message, envelope, start_at, true);
     }
 
-    /// Queues the answer to a request; the bus has one requester, so an unsent
-    /// older one is dropped and counted.
+    /// Queues the answer to a request. The bus has one requester, so an older unsent answer is dropped and counted.
     pub fn queue_answer(&mut self, message: &Message, request: Envelope, start_at: Micros) {
         let replaced = self.answer.is_some();
         self.unsent = self.unsent.saturating_add(u32::from(replaced));
@@ -105,11 +102,10 @@ impl BusPort {
         encode(&mut self.answer, message, envelope, start_at, false);
     }
 
-    /// The next frame to send: an answer before a slot reply, because it is due
-    /// at once.
+    /// The next frame to send. An answer goes before a slot reply, because it is due at once.
     #[inline]
     pub fn take(&mut self) -> Option<Transmission> {
-        // Asked in every turn of the main loop: without a frame, none is copied.
+        // Called in every turn of the main loop: nothing is copied if there is no frame.
         if self.answer.is_none() && self.slot_reply.is_none() {
             return None;
         }
@@ -121,7 +117,7 @@ impl BusPort {
         self.answer.take().or_else(|| self.slot_reply.take())
     }
 
-    /// A frame was taken and not sent, because its time had passed.
+    /// A frame was taken but not sent, because its time had passed.
     pub(crate) fn missed(&mut self) {
         self.unsent = self.unsent.saturating_add(1);
     }
@@ -136,13 +132,13 @@ impl BusPort {
         self.decoder.quality()
     }
 
-    /// Frames that were replaced before the board took them, or taken too late to be sent.
+    /// Frames that were replaced before the board took them, or were taken too late to be sent.
     pub const fn unsent(&self) -> u32 {
         self.unsent
     }
 }
 
-/// Writes the frame where it waits, without a copy of the buffer.
+/// Encodes the frame directly into its place, without copying the buffer.
 fn encode(
     place: &mut Option<Transmission>,
     message: &Message,

@@ -1,13 +1,12 @@
 //! From potentiometer code to stroke, with range and rate check.
 //!
-//! stroke = (code − zero) · full scale / 2^16. An open or shorted potentiometer pulls the converter
-//! input to a rail, outside the valid codes; a loose wiper causes jumps that no piston can make. A
-//! rejected reading is replaced by the last good one, for as long as the sensor is faulty. Two
-//! rejections in a row are a fault, so a dead sensor is acted upon in its second tick. So is a wiper
-//! that loses contact every other tick, at its third rejection (a leaky count: +2 bad, −1 good,
-//! fault at 4). After a fault the wiper may have come back anywhere: the first good reading is
-//! compared with nothing, and anything that keeps a history of strokes must restart there. A sensor
-//! that is stuck inside its range is not detected here, but by the following error.
+//! stroke = (code − zero) · full scale / 2^16. An open or shorted potentiometer pulls the converter input to a rail,
+//! outside the valid codes; a loose wiper causes jumps that no piston can make. A rejected reading is replaced by the
+//! last good one for as long as the sensor is faulty. Two consecutive rejections are a fault, so a dead sensor is acted
+//! upon in its second tick. A wiper that loses contact every other tick is a fault at its third rejection (a leaky
+//! count: +2 bad, −1 good, fault at 4). After a fault the wiper may have come back anywhere: the first good reading is
+//! not compared with anything, and whatever keeps a history of strokes must restart there. A sensor that is stuck
+//! inside its range is not detected here, but by the following error.
 
 use crate::hardware::SensorError;
 use core::hash::{Hash, Hasher};
@@ -16,10 +15,10 @@ use wheeleg_units::{AdcCode, PositionMm};
 /// Added to the leaky count by a rejected reading; a good one takes 1 off.
 const REJECTED_WEIGHT: u8 = 2;
 
-/// Leaky count that makes a fault.
+/// Leaky count that is a fault.
 const FAULT_LEVEL: u8 = 4;
 
-/// Good readings in a row that pass the self-test after reset.
+/// Consecutive good readings that pass the self-test after reset.
 pub const SELF_TEST_READINGS: u16 = 10;
 
 /// Calibration and limits of a position sensor.
@@ -48,9 +47,9 @@ pub enum Rejection {
     Missing,
     /// Code outside the valid range: open or short circuit.
     Range,
-    /// A sound code, but outside the allowed travel.
+    /// A valid code, but outside the allowed travel.
     Travel,
-    /// Faster than a piston can move.
+    /// Change faster than a piston can move.
     Rate,
 }
 
@@ -61,15 +60,14 @@ pub struct Reading {
     pub position: PositionMm,
     /// Why this tick's reading was rejected.
     pub rejected: Option<Rejection>,
-    /// Set when the sensor is faulty now: the reason of the newest rejection.
+    /// Set while the sensor is faulty: the reason of the newest rejection.
     pub fault: Option<Rejection>,
-    /// The first good reading, or the first one after a fault: no stroke before it belongs
-    /// to the same motion.
+    /// The first good reading, or the first one after a fault: no earlier stroke belongs to the same motion.
     pub is_first: bool,
 }
 
-/// Checks and converts the readings of one position sensor. In an order in which it is two whole
-/// words, which are sealed as they are.
+/// Checks and converts the readings of one position sensor. The order of the fields makes it two whole words, which are
+/// sealed as they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct SensorMonitor {
@@ -84,8 +82,7 @@ pub struct SensorMonitor {
 impl Hash for SensorMonitor {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here; small ones in
-        // one word.
+        // Destructured, so that a new field cannot be forgotten here; the small ones share a word.
         let Self {
             last,
             rejected,
@@ -137,8 +134,8 @@ impl SensorMonitor {
                 self.rejected = level.min(FAULT_LEVEL);
                 let fault = (level >= FAULT_LEVEL).then_some(rejection);
                 if fault.is_some() {
-                    // Nothing to compare with any more: the wiper may come back
-                    // anywhere. Its last good place is still the best guess.
+                    // Nothing to compare with any more: the wiper may come back anywhere. Its last good position is
+                    // still the best guess.
                     self.has_last = false;
                 }
                 Reading {
@@ -151,8 +148,7 @@ impl SensorMonitor {
         }
     }
 
-    /// Another calibration: the sensor has to prove itself again. Until it does, the last good
-    /// position stands.
+    /// After another calibration the sensor has to prove itself again. Until it does, the last good position is used.
     pub fn restart(&mut self) {
         *self = Self {
             last: self.last,
@@ -160,7 +156,7 @@ impl SensorMonitor {
         };
     }
 
-    /// Whether enough good readings have been seen in a row.
+    /// Whether enough consecutive good readings have been seen.
     pub const fn is_settled(&self) -> bool {
         self.good_in_row >= SELF_TEST_READINGS
     }
@@ -268,7 +264,7 @@ mod tests {
         }
     }
 
-    /// A blind sensor says nothing of the stroke: neither that it is zero nor that it moves.
+    /// A blind sensor says nothing about the stroke: neither that it is zero nor that it moves.
     #[test]
     fn the_last_good_position_stands_for_as_long_as_the_sensor_is_faulty() {
         let mut monitor = SensorMonitor::new();

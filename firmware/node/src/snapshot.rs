@@ -13,7 +13,7 @@ pub struct TickReport {
     pub mode: Mode,
     /// Latched faults.
     pub faults: FaultBits,
-    /// The tick started late after the last one, or an earlier one was too long.
+    /// The tick started late after the last one, or an earlier tick took too long.
     pub overran: bool,
 }
 
@@ -26,8 +26,8 @@ pub struct JointSnapshot {
     pub mode: Mode,
     /// Measured stroke.
     pub measured: PositionMm,
-    /// Reference of the control law, after slew limit; the measured stroke while
-    /// disarmed, and that of arming during a precharge.
+    /// Reference of the control law, after the slew limit; the measured stroke while disarmed, and that of arming
+    /// during a precharge.
     pub reference: PositionMm,
     /// Reference of the newest SYNC slot.
     pub commanded: PositionMm,
@@ -35,8 +35,7 @@ pub struct JointSnapshot {
     pub velocity: VelocityMmS,
     /// Signed duty of the control law; zero while not driving.
     pub duty: Duty,
-    /// Energised time of each coil in the tick that follows, µs; order
-    /// `[fill A, vent A, fill B, vent B]`.
+    /// Energised time of each coil in the following tick, µs; order `[fill A, vent A, fill B, vent B]`.
     pub pulses: OnTimes,
     /// Debounced switches, one bit each.
     pub switches: u8,
@@ -59,7 +58,7 @@ pub struct WheelSnapshot {
     pub count: WheelCount,
     /// Result of the wheel controller.
     pub control: WheelOutput,
-    /// Drive written, per cent with sign.
+    /// Drive as written, per cent with sign.
     pub drive_percent: i8,
     /// Supply pressure present (debounced); false on boards without the switch.
     pub supply_present: bool,

@@ -1,14 +1,12 @@
-//! What joint and wheel boards have in common: mode, faults, link supervision,
-//! overrun detection and the staging of a stop.
+//! What joint and wheel boards have in common: mode, faults, link supervision, overrun detection and the staging of a
+//! stop.
 //!
 //! # Staged stop
 //!
-//! Link loss and E-stop of an armed axis put it in Hold at once. After the hold
-//! time the axis goes on to Exhaust, if the link-loss action of the newest
-//! SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg
-//! may not). While the master lives no axis goes on: the slots of a robot that it holds say
-//! Hold, and a SYNC with the bit of an E-stop takes an axis back to it. An emergency
-//! brake, a sensor or state fault stays in Hold.
+//! Link loss and E-stop of an armed axis put it in Hold at once. After the hold time the axis proceeds to Exhaust, if
+//! the link-loss action of the newest SYNC slot allows it (the gait phase: a swing leg may go limp, a stance leg may
+//! not). While the master is alive no axis proceeds: the slots of a robot that it holds say Hold, and a SYNC with the
+//! E-stop bit takes an axis back to it. After an emergency brake, or a sensor or state fault, the axis stays in Hold.
 
 use crate::clock::Clock;
 use crate::faults::FaultLog;
@@ -24,7 +22,7 @@ use wheeleg_units::Micros;
 pub struct SupervisionTimes {
     /// Control tick.
     pub tick: Micros,
-    /// Missed SYNC cycles that are a link loss.
+    /// Number of missed SYNC cycles that counts as link loss.
     pub watchdog: WatchdogCycles,
     /// Time in Hold before a staged exhaust.
     pub hold: Micros,
@@ -32,7 +30,7 @@ pub struct SupervisionTimes {
     pub blow_through: Micros,
 }
 
-/// The watchdog of a parameter; the default where the number is none.
+/// The watchdog of a parameter; the default if the number is invalid.
 pub(crate) fn watchdog(cycles: i32) -> WatchdogCycles {
     u8::try_from(cycles)
         .ok()
@@ -40,11 +38,11 @@ pub(crate) fn watchdog(cycles: i32) -> WatchdogCycles {
         .unwrap_or_default()
 }
 
-/// What an open-outlet mode is for.
+/// Purpose of a mode with open outlets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum ExhaustKind {
-    /// End of a staged stop: outlets pulsed, so that a loaded leg sinks slowly.
+    /// End of a staged stop: outlets are pulsed, so that a loaded leg sinks slowly.
     #[default]
     Staged,
     /// Commanded: outlets fully open.
@@ -57,7 +55,7 @@ pub enum ExhaustKind {
 #[derive(Clone, Debug)]
 pub struct Supervisor {
     mode: Mode,
-    /// Complement of what steers the outputs, to detect a flipped bit.
+    /// Complement of the state that steers the outputs, to detect a flipped bit.
     check: u32,
     entered_at: Micros,
     staged: bool,
@@ -74,7 +72,7 @@ pub struct Supervisor {
     log: Log,
 }
 
-/// The reason with which a refused request is answered.
+/// The reason given when a request is refused.
 impl From<Refusal> for NackReason {
     fn from(refusal: Refusal) -> Self {
         match refusal {
@@ -87,7 +85,7 @@ impl From<Refusal> for NackReason {
     }
 }
 
-/// Why a board that drove does so no longer.
+/// Why a board that was driving no longer does.
 const fn disarm_reason(event: Event) -> DisarmReason {
     match event {
         Event::LinkLost => DisarmReason::LinkLost,
@@ -128,11 +126,11 @@ impl Supervisor {
         fresh
     }
 
-    /// What decides, with the mode, which outputs are driven and when: all in one word.
+    /// The state that decides, together with the mode, which outputs are driven and when: all in one word.
     #[inline(always)]
     fn steering(&self) -> u32 {
         let flag = |flag: bool, place: u32| u32::from(flag).wrapping_shl(place);
-        // Every byte whole.
+        // Each in a byte of its own, in full.
         u32::from(self.mode as u8)
             ^ u32::from(self.exhaust as u8).wrapping_shl(8)
             ^ flag(self.staged, 16)
@@ -146,8 +144,8 @@ impl Supervisor {
         self.check == !self.steering()
     }
 
-    /// Changes what the check covers. What was damaged before keeps its broken
-    /// check, so that the next tick still sees the damage.
+    /// Changes state that the check covers. State that was already damaged keeps its broken check, so that the next
+    /// tick still sees the damage.
     #[inline]
     fn change(&mut self, change: impl FnOnce(&mut Self)) {
         let intact = self.is_intact();
@@ -157,7 +155,7 @@ impl Supervisor {
         }
     }
 
-    /// Notes what happened, for whoever reads the log.
+    /// Notes what happened, for the reader of the log.
     #[inline(never)]
     pub(crate) fn note(&mut self, event: LogEvent, a: u8, b: u16, at: Micros) {
         let entry = LogEntry {
@@ -171,7 +169,7 @@ impl Supervisor {
         }
     }
 
-    /// Without room for a note the others are worked off at once.
+    /// Without room for a note, the others are processed at once.
     #[cold]
     #[inline(never)]
     fn note_more(&mut self, entry: LogEntry) {
@@ -179,7 +177,7 @@ impl Supervisor {
         let _ = self.log.note(entry);
     }
 
-    /// Works off what was noted, if there is any: called between two ticks.
+    /// Processes notes, if there are any; called between two ticks.
     #[inline]
     pub(crate) fn settle_log(&mut self) {
         if self.log.has_notes() {
@@ -192,13 +190,13 @@ impl Supervisor {
     fn work_off_notes(&mut self) {
         let clock = self.clock;
         self.log.settle(|at| {
-            // A copy: to look back never sets the clock.
+            // A copy, because looking back must not set the clock.
             let mut clock = clock;
             clock.unwrap(at)
         });
     }
 
-    /// The oldest records of the log, which goes on for `lease_ms`.
+    /// The oldest records of the log, which continues for `lease_ms`.
     pub(crate) fn read_log(&mut self, lease_ms: u16, at: Micros) -> LogRecords {
         self.settle_log();
         let now_us = self.time_us(at);
@@ -215,7 +213,7 @@ impl Supervisor {
         self.exhaust
     }
 
-    /// Why the board is, or was last, not driving.
+    /// Why the board is not driving, or last stopped driving.
     pub const fn disarm_reason(&self) -> DisarmReason {
         self.disarm_reason
     }
@@ -241,19 +239,18 @@ impl Supervisor {
         &self.overrun
     }
 
-    /// Whether SYNC frames with an advancing counter arrive, and no loss is latched.
+    /// Whether SYNC frames with an advancing counter arrive and no link loss is latched.
     pub fn link_alive(&self) -> bool {
         self.link.state() == LinkState::Up
     }
 
-    /// The unwrapped time of `now`, µs since reset. One copy for all but the tick.
+    /// The unwrapped time of `now`, µs since reset. A single copy for all callers but the tick.
     #[inline(never)]
     pub fn time_us(&mut self, now: Micros) -> u64 {
         self.clock.unwrap(now)
     }
 
-    /// Whether the E-stop bit stood in the newest fresh SYNC of a living link,
-    /// or an E-stop is latched.
+    /// Whether the E-stop bit was set in the newest fresh SYNC of a living link, or an E-stop is latched.
     pub fn emergency_stop(&self) -> bool {
         self.emergency || self.faults.latched().contains(Fault::EmergencyStop)
     }
@@ -271,8 +268,8 @@ impl Supervisor {
         {
             self.change(|own| own.exhaust = ExhaustKind::Commanded);
         }
-        // An axis that is at fault holds: in whatever order the two are found, a lost link
-        // or an E-stop does not let it exhaust later.
+        // An axis with a fault stays in Hold: whichever is found first, a lost link or an E-stop does not let it
+        // exhaust later.
         if event == Event::AxisFault && self.staged {
             self.change(|own| own.staged = false);
         }
@@ -308,14 +305,13 @@ impl Supervisor {
         }
     }
 
-    /// Latches a fault and applies the event it stands for.
+    /// Latches a fault and applies the corresponding event.
     pub fn fault(&mut self, fault: Fault, event: Event, at: Micros) {
         if self.faults.latch(fault, at) {
             let mode = u16::from(self.mode as u8);
             self.note(LogEvent::Fault, fault.code(), mode, at);
         }
-        // Every fault event has a next mode in every mode; the table test
-        // holds that, so there is no refusal to lose here.
+        // Every fault event has a next mode in every mode, as the test of the table checks, so no refusal is lost here.
         let _ = self.apply(event, at);
     }
 
@@ -324,11 +320,10 @@ impl Supervisor {
         self.link.agrees(newest)
     }
 
-    /// Takes the header of a SYNC latched at `at`. True when it is fresh, so
-    /// that its slot may be used.
+    /// Takes the header of a SYNC latched at `at`. Returns true if it is fresh, so that its slot may be used.
     pub fn sync(&mut self, counter: u16, emergency: bool, at: Micros) -> bool {
         if emergency {
-            // Even with a frozen counter: stopping needs no proof of freshness.
+            // Even with a frozen counter: a stop needs no proof of freshness.
             self.set_emergency(true);
             self.fault(Fault::EmergencyStop, Event::EmergencyStop, at);
         }
@@ -379,7 +374,7 @@ impl Supervisor {
         }
     }
 
-    /// A bit has flipped: Hold, and nothing of what it may have been.
+    /// A bit has flipped: go to Hold, and keep nothing that may have been damaged.
     #[cold]
     #[inline(never)]
     fn repair(&mut self, now: Micros) {
@@ -388,8 +383,8 @@ impl Supervisor {
         self.staged = false;
         self.from_drive = false;
         self.exhaust_allowed = false;
-        // An E-stop bit that flipped off comes with the next SYNC; the latched
-        // fault keeps the dump valve open meanwhile.
+        // An E-stop bit that has flipped off comes again with the next SYNC; meanwhile the latched fault keeps the dump
+        // valve open.
         self.emergency = false;
         self.check = !self.steering();
         self.clock.mend();
@@ -409,7 +404,7 @@ impl Supervisor {
         self.overrun.restart();
     }
 
-    /// Clears latched faults and leaves the latched stop, unless a cause stands.
+    /// Clears latched faults and leaves the latched stop, unless a cause persists.
     pub fn clear(&mut self, healthy: bool, at: Micros) -> Result<Mode, Refusal> {
         if !healthy || self.emergency {
             return Err(Refusal::CausePresent);
@@ -422,7 +417,7 @@ impl Supervisor {
         Ok(next)
     }
 
-    /// Arms, when the link lives and nothing is latched.
+    /// Arms, if the link is alive and nothing is latched.
     pub fn arm(&mut self, at: Micros) -> Result<Mode, Refusal> {
         if !self.faults.latched().is_empty() {
             return Err(Refusal::Latched);
@@ -459,7 +454,7 @@ mod tests {
         own
     }
 
-    /// A tick has room for eight notes; with more of them the first are worked off at once.
+    /// A tick has room for eight notes; when more come, the first ones are processed at once.
     #[test]
     fn no_note_is_lost_however_many_a_tick_makes() {
         let mut own = Supervisor::new();
@@ -487,7 +482,7 @@ mod tests {
         assert!(own.agrees(7), "a stale one came since");
     }
 
-    /// Only a fresh SYNC takes an E-stop back; a repeated one proves nothing.
+    /// Only a fresh SYNC withdraws an E-stop; a repeated one proves nothing.
     #[test]
     fn a_stale_sync_does_not_take_an_emergency_stop_back() {
         let mut own = held();
@@ -516,7 +511,7 @@ mod tests {
             |own| own.check ^= 1 << 15,
         ];
         for (index, flip) in flips.into_iter().enumerate() {
-            // Damage is seen also when something changes before the next tick.
+            // Damage is seen even if something changes before the next tick.
             for changed in [false, true] {
                 let mut own = held();
                 flip(&mut own);

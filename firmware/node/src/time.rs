@@ -1,30 +1,29 @@
-//! The board's clock against the master's.
+//! The board's clock relative to the master's.
 //!
-//! SYNC carries the master's time at its start. What is kept is the difference at
-//! the latch of the newest SYNC, and the drift over the last second: how far the
-//! difference has moved. A jump of more than 100 ms is another master, not a drift.
+//! SYNC carries the master's time at its start. The board keeps the difference at the latch of the newest SYNC, and the
+//! drift over the last second, which is how far the difference has moved. A jump of more than 100 ms means another
+//! master, not a drift.
 
 use crate::overrun::elapsed;
 use wheeleg_protocol::MessageType;
 use wheeleg_protocol::link::SlotTiming;
 use wheeleg_units::{Micros, divide_signed};
 
-/// Time from the master's stamp to the latch: SYNC on the line, µs.
+/// Time from the master's stamp to the latch: the duration of a SYNC on the line, µs.
 const SYNC_US: u32 = SlotTiming::DEFAULT.frame_us(MessageType::Sync);
 
-/// Time over which a drift is measured: then one µs is one ppm.
+/// Time over which a drift is measured: in it, 1 µs is 1 ppm.
 const WINDOW: Micros = Micros::from_millis(1000);
 
-/// Largest step of the difference that is a drift, µs.
+/// Largest step of the difference that counts as drift, µs.
 const JUMP_US: i32 = 100_000;
 
-/// Drift beyond which a board does not keep to its slot, ppm: from the latch of SYNC to the
-/// end of the last slot it is 5 µs, of a gap of 20 µs between two of them, and the
-/// neighbour may run as wrong the other way.
+/// Drift beyond which a board does not keep to its slot, ppm. From the latch of SYNC to the end of the last slot it
+/// makes 5 µs, out of a gap of 20 µs between two slots, and the neighbour may be equally wrong in the other direction.
 ///
-/// A board on its internal oscillator, good to about 2 %, is beyond it as any other whose clock is
-/// wrong: it would cut off the replies of its neighbours, and sound boards would be blamed.
-/// It answers and says why; it is not to be driven before its crystal is changed.
+/// A board on its internal oscillator, accurate to about 2 %, exceeds it like any other whose clock is wrong: it would
+/// cut off the replies of its neighbours, and sound boards would be blamed. It answers and gives the reason; it must
+/// not be driven before its crystal is replaced.
 pub const DRIFT_LIMIT_PPM: i16 = 2000;
 
 /// Offset and drift.
@@ -37,9 +36,8 @@ pub struct TimeSync {
 }
 
 impl TimeSync {
-    /// Takes the stamp of a SYNC latched at `at`; true when the drift was beyond its
-    /// limit in two windows in a row, in the same direction: late frames are
-    /// not a clock that runs wrong.
+    /// Takes the stamp of a SYNC latched at `at`. Returns true if the drift exceeded its limit in two consecutive
+    /// windows in the same direction: late frames do not mean that the clock is wrong.
     pub fn sync(&mut self, master_time_us: u32, at: Micros) -> bool {
         self.offset_us = master_time_us.wrapping_add(SYNC_US).wrapping_sub(at.get());
         let Some((from, offset_us)) = self.start else {
@@ -66,13 +64,13 @@ impl TimeSync {
         before != 0 && before == limit(self.drift_ppm)
     }
 
-    /// Master time less board time, µs, modulo 2^32; 0 before the first SYNC.
+    /// Master time minus board time, µs, modulo 2^32; 0 before the first SYNC.
     #[must_use]
     pub const fn offset_us(&self) -> u32 {
         self.offset_us
     }
 
-    /// How much faster than the master's the board's clock runs, ppm.
+    /// How much faster the board's clock runs than the master's, ppm.
     #[must_use]
     pub const fn drift_ppm(&self) -> i16 {
         self.drift_ppm
@@ -85,7 +83,7 @@ mod tests {
     use wheeleg_protocol::Address;
     use wheeleg_protocol::link::GAP_US;
 
-    /// Seconds after which a clock that is wrong by `ppm` is a fault, of ten.
+    /// Seconds, out of ten, after which a clock that is wrong by `ppm` is a fault.
     fn fault_after(ppm: i64, late_us: impl Fn(i64) -> i64) -> (Option<i64>, TimeSync) {
         let mut clock = TimeSync::default();
         let mut fault = None;
@@ -124,9 +122,9 @@ mod tests {
             .and_then(|a| timing.slot_start_us(a));
         let end_us = last.unwrap() + timing.frame_us(MessageType::SlotReply);
         let off_us = |ppm: u32| end_us * ppm / 1_000_000;
-        // Two neighbours that run as wrong, one each way.
+        // Two neighbours that are equally wrong, one in each direction.
         assert!(2 * off_us(DRIFT_LIMIT_PPM.unsigned_abs().into()) < GAP_US);
-        // The oscillator over 0 to 85 °C (DATASHEET), against a sound neighbour.
+        // The oscillator over 0 to 85 °C (DATASHEET), next to a sound neighbour.
         assert!(off_us(10_000) > GAP_US && off_us(19_000) > 2 * GAP_US);
     }
 
@@ -154,7 +152,7 @@ mod tests {
 
     #[test]
     fn late_frames_and_a_new_master_are_no_drift() {
-        // Late by up to 5 ms, in an order without sense.
+        // Late by up to 5 ms, in no particular order.
         let (fault, _) = fault_after(0, |cycle| cycle * 7919 % 5000);
         assert_eq!(fault, None);
         let mut clock = TimeSync::default();

@@ -9,7 +9,7 @@ use wheeleg_units::Micros;
 pub struct Transmission {
     /// Start, in the board's microseconds (modulo 2^32).
     pub start_at: Micros,
-    /// It belongs into the board's own slot: later it would fall into those of others.
+    /// It belongs in the board's own slot; if sent later it would fall into other boards' slots.
     pub in_slot: bool,
     /// The frame with both delimiters.
     pub bytes: Vec<u8, MAX_ENCODED>,

@@ -1,5 +1,5 @@
-//! The wheel board: one DC motor with encoder under the HCTL-1100's control
-//! laws; on the first wheel also the supply-pressure switch and the dump valve.
+//! The wheel board: one DC motor with encoder under the HCTL-1100's control laws; the first wheel also has the
+//! supply-pressure switch and the dump valve.
 
 mod encoder;
 mod motion;

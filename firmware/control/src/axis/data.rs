@@ -8,8 +8,8 @@ use crate::gain::Gain;
 use fixed::types::I16F16;
 use wheeleg_units::{Micros, PositionMm};
 
-/// What the controller is told about its axis. Formats are those of the
-/// parameter table; a number of a [`PositionMm`] is read in the unit named.
+/// What the controller knows of its axis. Formats are those of the parameter table; the number of a [`PositionMm`] is
+/// in the unit stated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AxisData {
     /// Bore, 4…100 mm.
@@ -26,7 +26,7 @@ pub struct AxisData {
     pub critical_ratio: Gain,
     /// Supply pressure, kPa absolute, 200…1700.
     pub supply: PositionMm,
-    /// Mass that moves with the rod, kg, 0.02…200: the first guess.
+    /// Mass that moves with the rod, kg, 0.02…200: the initial value.
     pub mass: PositionMm,
     /// Coulomb friction, N, 0…500.
     pub coulomb: PositionMm,
@@ -34,23 +34,23 @@ pub struct AxisData {
     pub breakaway: PositionMm,
     /// Viscous friction, N·s/m, 0…1000.
     pub viscous: PositionMm,
-    /// Energised to open, µs, 0…50 000.
+    /// From energising the coil to open, µs, 0…50 000.
     pub valve_on: Micros,
-    /// Released to shut, µs, 0…50 000.
+    /// From releasing the coil to shut, µs, 0…50 000.
     pub valve_off: Micros,
-    /// Margin by which pulses and gaps exceed these, µs, 1…10 000.
+    /// Margin by which pulses and gaps exceed these delays, µs, 1…10 000.
     pub margin: Micros,
-    /// Wave's way from a valve to its chamber, µs, 0…20 000.
+    /// Travel time of the wave from a valve to its chamber, µs, 0…20 000.
     pub line_delay: Micros,
-    /// Rest begins within this error, mm, 0.02…5: three times the noise of the
-    /// position, and no less than the converter's step.
+    /// Rest begins within this error, mm, 0.02…5: three times the noise of the position, but no less than the
+    /// converter's step.
     pub band: PositionMm,
-    /// A piston at rest stays so up to this error, mm, 0…50; 0: by the band alone.
+    /// A piston at rest stays at rest up to this error, mm, 0…50; 0: by the band alone.
     pub release: PositionMm,
-    /// Both chambers are filled before the law drives, and it seats the piston at end stops. Without,
+    /// Both chambers are filled before the law drives, and the law seats the piston at end stops. Otherwise the
     /// chambers count as vented.
     pub precharged: bool,
-    /// The mass is learnt from moves, which must be free of loads that come and go in them.
+    /// The mass is learnt from moves, during which the load must not change.
     pub learns_mass: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,
@@ -84,7 +84,7 @@ impl Default for AxisData {
     }
 }
 
-/// Name of rejected axis data.
+/// Which axis data were rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum AxisField {
@@ -113,7 +113,7 @@ pub enum AxisField {
 }
 
 impl AxisData {
-    /// Ranges of the data, as its fields say.
+    /// Checks the ranges documented at the fields.
     #[inline]
     pub(crate) fn check(&self) -> Result<(), AxisField> {
         const fn raw(value: I16F16) -> i32 {

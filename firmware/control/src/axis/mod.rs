@@ -1,4 +1,4 @@
-//! What the controller is told of its axis, and the coefficients made of it.
+//! The axis data of a controller, and the coefficients computed from them.
 
 mod data;
 mod model;

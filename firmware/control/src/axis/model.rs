@@ -1,4 +1,4 @@
-//! The coefficients of the predictive law, made of an axis's data.
+//! The coefficients of the predictive law, computed from an axis's data.
 //!
 //! ```text
 //! A_A = π/4 bore²     A_B = A_A − π/4 rod²       L_i = dead volume_i / A_i
@@ -13,7 +13,8 @@
 //! T²  = 4 π² m / k_air                           oscillation on the air of both chambers
 //! ```
 //!
-//! Names in capitals are factors of [`crate::tuning`]. Gains of the observer: fading memory, `observer/motion.rs`.
+//! Names in capitals are factors of [`crate::tuning`]. The gains of the observer are those of a fading memory,
+//! `observer/motion.rs`.
 //!
 //! Source: conductance and critical ratio by ISO 6358; ρ0 and T0 of the reference atmosphere by ISO 8778; the rest DERIVED.
 //!
@@ -57,9 +58,9 @@ pub struct AxisModel {
     pub force_a: i32,
     /// The same for B.
     pub force_b: i32,
-    /// Ambient force on the rod's section, mN.
+    /// Force of the ambient pressure on the rod's cross-section, mN.
     pub force_rod: i32,
-    /// Half the pressure that makes a force in A: 1/256 Pa per mN, × 2^12.
+    /// Half the pressure in A per force: 1/256 Pa per mN, × 2^12.
     pub half_pressure_a: i32,
     /// Area of A over area of B, × 2^24.
     pub area_ratio: i32,
@@ -67,13 +68,13 @@ pub struct AxisModel {
     pub pressure_b: i32,
     /// Pressure in A per force, likewise.
     pub pressure_a: i32,
-    /// Mean pressure of A about which forces are made.
+    /// Mean pressure of A, about which forces are made.
     pub mean: i32,
-    /// Lowest pressure asked for.
+    /// Lowest pressure that is demanded.
     pub low: i32,
-    /// Highest pressure asked for.
+    /// Highest pressure that is demanded.
     pub high: i32,
-    /// Largest extending force with these, mN.
+    /// Largest extending force with these pressures, mN.
     pub force_out: i32,
     /// Largest retracting force, mN, positive.
     pub force_in: i32,
@@ -87,15 +88,15 @@ pub struct AxisModel {
     pub breakaway: i32,
     /// Viscous friction, mN per mm/s, × 2^8.
     pub viscous: i32,
-    /// Dead time T_d: from the moment of a period to that at which pulses of the next act, t_on and
-    /// the line behind its begin, in s × 2^32.
+    /// Dead time T_d, s × 2^32: from the moment of a period until pulses of the next one take effect, which is t_on and
+    /// the line after that begins.
     pub dead_time: i32,
     /// Dead time in µs.
     pub dead_time_us: i32,
-    /// Dead time T_r, from the tick that works out the force on: one tick, t_on and the line, in s × 2^32.
+    /// Dead time T_r, s × 2^32, from the tick that computes the force: one tick, t_on and the line.
     pub dead_time_reference: i32,
-    /// Moment for which a period's motion and pressures are worked out, µs after it begins: the
-    /// middle of the two ticks whose stroke is used.
+    /// Moment for which a period's motion and pressures are estimated, µs after the period begins: the middle of the
+    /// two ticks whose strokes are used.
     pub moment: i32,
     /// Period in s × 2^32.
     pub period: i32,
@@ -103,27 +104,27 @@ pub struct AxisModel {
     pub mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
     pub nimble_mass: i32,
-    /// Force of the finest pulse F_1, the shortest opening of a vent valve at mid-stroke, mN.
+    /// Force F_1 of the finest pulse, mN: the shortest opening of B's vent valve at mid-stroke.
     pub pulse_force: i32,
-    /// Slope of the speed law at the target k, 1/s × 2^8, up to `nimble_mass`.
+    /// Slope k of the speed law at the target, 1/s × 2^8, up to `nimble_mass`.
     pub slope: i32,
-    /// Gain of the speed error D, 1/s × 2^8, likewise.
+    /// Gain D of the speed error, 1/s × 2^8, likewise.
     pub damping: i32,
     /// Deceleration towards the target a_b, mm/s², likewise.
     pub brake: i32,
-    /// Highest speed asked for, raw mm/s.
+    /// Highest speed that is demanded, raw mm/s.
     pub top_speed: i32,
-    /// Observer: share of the innovation in stroke, × 2^16.
+    /// Observer: correction of the stroke per innovation, × 2^16.
     pub observe_stroke: i32,
-    /// Observer: mm/s per mm × 2^16.
+    /// Observer: correction of the speed, mm/s per mm, × 2^16.
     pub observe_speed: i32,
-    /// Observer: mm/s³ per mm: load per innovation and kg, in mN/(kg mm).
+    /// Observer: correction of the load, mm/s² per mm: load per innovation and kg, in mN/(kg mm).
     pub observe_load: i32,
-    /// Growth of the force on a piston that sticks, mN per period × 2^8.
+    /// Growth of the force on a stuck piston, mN per period × 2^8.
     pub stick_step: i32,
     /// Rest band, raw mm.
     pub band: i32,
-    /// Error at which a piston that rests is awake again, if more than the band says, raw mm.
+    /// Error at which a piston at rest is released, if larger than the band implies, raw mm.
     pub release: i32,
     /// Both chambers are filled before the law drives.
     pub precharged: bool,
@@ -133,37 +134,35 @@ pub struct AxisModel {
     pub oscillation: i32,
 }
 
-/// R T0 of air at 293.15 K, J/kg, times its density ρ0 at the reference atmosphere
-/// of ISO 8778, kg/m³: 1.185 × 287.05 × 293.15 Pa. Times 1e-8 m³/(s Pa) and 1e9 mm³:
-/// mm³/s of choked outflow per dm³/(s bar).
+/// R T0 of air at 293.15 K, J/kg, times its density ρ0 in the reference atmosphere of ISO 8778, kg/m³: 1.185 × 287.05 ×
+/// 293.15 Pa. Times 1e-8 m³/(s Pa) and 1e9 mm³: mm³/s of choked outflow per dm³/(s bar).
 const CHOKED_MM3_S: u64 = 997_162;
-/// What of the memory θ the present counts: gains 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
+/// 1 − θ of the memory θ, for the gains 1 − θ³, 3/2 (1 − θ)² (1 + θ) and (1 − θ)³.
 const FRESH: u64 = (1 << 16) - MEMORY;
-/// Share of the innovation in stroke, × 2^16.
+/// Gain in stroke, × 2^16.
 const OBSERVE_STROKE: u64 = (1 << 16) - ((MEMORY * MEMORY * MEMORY) >> 32);
-/// In speed, per period, × 2^16.
+/// Gain in speed, per period, × 2^16.
 const OBSERVE_SPEED: u64 = (3 * ((FRESH * FRESH) >> 16) * ((1 << 16) + MEMORY)) >> 17;
-/// In acceleration, per square of a period, × 2^16.
+/// Gain in acceleration, per period squared, × 2^16.
 const OBSERVE_LOAD: u64 = ((FRESH * FRESH * FRESH) >> 32) * LOAD_PERCENT / 100;
-/// Ticks of a period of observer and law: valves that take milliseconds need no decision in every one.
+/// Ticks of a period of observer and law: valves that take milliseconds do not need a decision in every tick.
 pub const PERIOD_TICKS: u8 = 4;
-/// Square of the time of one oscillation, 4 π² m / k_air, with a stiffness k_air of 86 % of what both sides
-/// make in `coefficients` times the area of A: that is n p (A_A² / V_A + A_B² / V_B) at
-/// mid stroke and mean pressure to 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
+/// Square of the time of one oscillation, 4 π² m / k_air. The stiffness k_air is 86 % of that of both sides in
+/// `coefficients` times the area of A, which is n p (A_A² / V_A + A_B² / V_B) at mid stroke and mean pressure to within
+/// 10 %. (2 π × 10^6 µs/s)² × 10^3 / 0.86 × 2^8.
 const OSCILLATION: u64 = 11_751_714_000_000_000_000;
 /// π/4 × 2^30.
 const QUARTER_PI: u64 = 843_314_857;
 
 impl AxisModel {
-    /// Checks the data and works out the coefficients for a tick of `tick`.
+    /// Checks the data and computes the coefficients for a tick of `tick`.
     ///
-    /// The speed law is scaled by two facts of the axis: the dead time
-    /// T_d = 1.5 ticks + t_on + line, which bounds its slope and damping,
-    /// and the speed at which a choked outlet lets the piston go, which bounds
-    /// its top. The factors are those of [`crate::tuning`].
+    /// The speed law is scaled by two facts of the axis: the dead time T_d = 1.5 ticks + t_on + line, which bounds its
+    /// slope and damping, and the piston speed that a choked outlet allows, which bounds its top speed. The factors are
+    /// those of [`crate::tuning`].
     ///
-    /// In integers, like the tick: every coefficient is within 0.1 % of the exact
-    /// one, or a step of its format.
+    /// Everything is computed in integers, as in the tick: every coefficient is within 0.1 % of the exact one, or a
+    /// step of its format.
     ///
     /// # Errors
     /// [`AxisField`] names what is outside its range.
@@ -175,8 +174,8 @@ impl AxisModel {
 
     #[inline]
     fn coefficients(data: &AxisData, tick: Micros) -> Self {
-        // Formats as "value × 2^bits": the two digits at the end of a name. What a
-        // 64-bit product needs at most is said beside it; data are within `check`.
+        // A name ending in two digits has the format "value × 2^digits". The largest size of a 64-bit product is noted
+        // beside it; the data are within `check`.
         let micros = |value: Micros| u64::from(value.get());
         let area_a_16 = circle_16(data.bore);
         let area_rod_16 = circle_16(data.rod);
@@ -188,7 +187,7 @@ impl AxisModel {
         let flow_b_16 = divide(flow_24.wrapping_shl(8), area_b_16);
         let tick_us = micros(tick);
         let period_us = tick_us.wrapping_mul(u64::from(PERIOD_TICKS));
-        // Between the last two ticks, and from there to the next period.
+        // Between the last two ticks; the rest of the dead time runs from there to the next period.
         let moment_us = tick_us.wrapping_mul(5).wrapping_shr(1);
         let valve_us = micros(data.valve_on).wrapping_add(micros(data.line_delay));
         let dead_time_us = less(period_us, moment_us).wrapping_add(valve_us);
@@ -206,12 +205,11 @@ impl AxisModel {
             force(low_8, area_a_16),
         );
 
-        // Speed law. The larger piston side is the slower outlet, of choked speed
-        // C ρ0 R T0 / area.
+        // Speed law. The larger side of the piston is the slower outlet, with choked speed C ρ0 R T0 / area.
         let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1));
         let per_dead_time_8 =
             |percents: u64| divide(percents.wrapping_mul(2_560_000), dead_time_us);
-        // × 2^14, below 256/s: that of a dead time of 1.4 ms, and no steeper below it.
+        // × 2^14, limited below 256/s: the slope for a dead time of 1.4 ms, and no steeper for less.
         // 2^22 × 2^37.
         let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, dead_time_us).min(65_535 << 6);
         let slope_8 = slope_14.wrapping_shr(6);
@@ -219,8 +217,8 @@ impl AxisModel {
             slope_14.wrapping_mul(top_16).wrapping_shr(30),
             BRAKE_PERCENT,
         );
-        // Both chambers at mid stroke and mean pressure, one filled and one vented:
-        // how fast the force can change, mN/s.
+        // Both chambers at mid stroke and mean pressure, one filled and one vented: how fast the force can change,
+        // mN/s.
         let vent_8 = stiffness_8(mean_8, area_b_16, data.dead_b, data.stroke);
         let both_8 = percent(
             stiffness_8(supply_8, area_a_16, data.dead_a, data.stroke),
@@ -243,7 +241,7 @@ impl AxisModel {
             brake.wrapping_mul(slope_8),
         );
 
-        // Pa/mm times mm², in 1e-3 N/m: with the tick below 2^64.
+        // Pa/mm times mm², in 1e-3 N/m: times the square of the period it stays below 2^64.
         let stiffness = both_8.wrapping_mul(area_a_16).wrapping_shr(24);
 
         let to_mn = |newton: PositionMm| raw(newton).wrapping_mul(1000).wrapping_shr(16);
@@ -299,7 +297,7 @@ impl AxisModel {
             moment: number(moment_us),
             period: seconds_32(period_us),
             mass: number(raw(data.mass)),
-            // 0.01 to 1000 kg: beyond what may be told, and fits.
+            // 0.01 to 1000 kg: beyond the range of the axis data, and fits.
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             // Below 2^41 mN/s and 2^16 µs.
             pulse_force: number(divide(
@@ -318,7 +316,7 @@ impl AxisModel {
                     .wrapping_shr(16),
                 period_us.wrapping_mul(period_us),
             ),
-            // Break-away forces in a second, × 2^8.
+            // Break-away forces per second, × 2^8.
             stick_step: ratio(
                 to_mn(data.breakaway)
                     .wrapping_mul(period_us)
@@ -337,7 +335,7 @@ impl AxisModel {
     }
 }
 
-/// `value × percents / 100`, to one in a hundred thousand.
+/// `value × percents / 100`, to within 1e-5.
 #[inline(never)]
 fn percent(value: u64, percents: u64) -> u64 {
     divide(value.wrapping_mul(percents), 100)
@@ -349,7 +347,7 @@ fn less(a: u64, b: u64) -> u64 {
     a.saturating_sub(b)
 }
 
-/// A number of the data, × 2^16.
+/// A value of the axis data, × 2^16.
 #[inline]
 fn raw(value: PositionMm) -> u64 {
     u64::from(value.raw().unsigned_abs())
@@ -374,7 +372,7 @@ fn force(pa_8: u64, area_16: u64) -> u64 {
     pa_8.wrapping_mul(force_32(area_16)).wrapping_shr(32)
 }
 
-/// Pressure (1/256 Pa) per length of a chamber at mid stroke, Pa/mm.
+/// Pressure (1/256 Pa) over the length of a chamber at mid stroke, Pa/mm.
 #[inline(never)]
 fn stiffness_8(pa_8: u64, area_16: u64, dead: PositionMm, stroke: PositionMm) -> u64 {
     let dead_8 = raw(dead).wrapping_mul(1000).wrapping_shr(8);
@@ -395,7 +393,7 @@ fn ratio(a: u64, b: u64) -> i32 {
     number(divide(a, b))
 }
 
-/// As a coefficient, saturating.
+/// `value` as a coefficient, saturating.
 #[inline(never)]
 fn number(value: u64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)

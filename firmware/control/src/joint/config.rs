@@ -1,4 +1,4 @@
-//! Gains in physical units, and the validated configuration made of them.
+//! Gains in physical units, and the validated configuration computed from them.
 
 use super::types::Law;
 use crate::axis::{AxisData, AxisField, AxisModel};
@@ -14,9 +14,8 @@ pub type JointRules = GridRules<7, 7>;
 
 /// Parameters of a joint controller in physical units.
 ///
-/// [`JointGains::default`] is a cautious start for a bore 20 mm, stroke 180 mm
-/// cylinder with throttled valves; each field says what it does and
-/// where it is sensible.
+/// [`JointGains::default`] is a cautious start for a bore 20 mm, stroke 180 mm cylinder with throttled valves. Each
+/// field states its effect and its sensible range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct JointGains {
     /// Kp, duty per millimetre of error. Range 0…4; sensible 0.005…0.1. Larger is
@@ -27,30 +26,28 @@ pub struct JointGains {
     pub correction_pd: Gain,
     /// Duty at full output of the ID rule base. Range 0…2; sensible 0.2…1.
     pub correction_id: Gain,
-    /// Duty per mm/s of reference velocity. Range 0…0.1; sensible 1/(top speed),
-    /// 0.002…0.004 for 250…500 mm/s. Removes the lag behind a moving reference.
+    /// Duty per mm/s of reference velocity. Range 0…0.1; sensible 1/(top speed), 0.002…0.004 for 250…500 mm/s. Removes
+    /// the lag behind a moving reference.
     pub feed_forward: Gain,
-    /// Error that stands at the edge of the rule base. 0.25…1000 mm; sensible 10…60.
+    /// Error at the edge of the rule base. 0.25…1000 mm; sensible 10…60.
     pub error_scale: PositionMm,
     /// Velocity error at the edge of the rule base. 1…5000 mm/s; sensible 200…500.
     pub velocity_scale: VelocityMmS,
-    /// Time integral of the error at the edge of the rule base, in mm·s (the
-    /// number of a `PositionMm` is read as mm·s), and its anti-windup bound.
-    /// 0.05…1000; sensible 0.5…10.
+    /// Time integral of the error at the edge of the rule base, in mm·s (the number of the `PositionMm` is in mm·s),
+    /// and its anti-windup bound. 0.05…1000; sensible 0.5…10.
     pub integral_scale: PositionMm,
     /// The integral advances only while |error| is at most this. 0…1000 mm;
     /// sensible 5…30: outside it, the proportional term does the work.
     pub integral_zone: PositionMm,
     /// Largest |duty|. 0…1, above `minimum_duty` and `dead_zone_duty`.
     pub duty_limit: Duty,
-    /// Duty added, with its sign, to a duty that drives towards the reference
-    /// from outside the settle band, or along a moving reference; one that brakes
-    /// goes out without it. Bridges the static friction and the shortest opening that a valve can make. 0…0.5; sensible
-    /// (t_off + margin) / PWM period, 0.05…0.25; below it, small duties give
-    /// pulses that [`crate::pwm`] can not send.
+    /// Duty added, with its sign, to a duty that drives towards the reference from outside the settle band, or along a
+    /// moving reference; not added to one that brakes. It bridges the static friction and the shortest opening that a
+    /// valve can make. 0…0.5; sensible (t_off + margin) / PWM period, 0.05…0.25; below that, small duties give pulses
+    /// that [`crate::pwm`] can not send.
     pub dead_zone_duty: Duty,
-    /// |duty| of the law below which the valves stay shut. 0…0.5; sensible
-    /// 0.005…0.03. Must exceed what measurement noise makes of Kp.
+    /// |duty| of the law below which the valves stay shut. 0…0.5; sensible 0.005…0.03. Must exceed what Kp makes of
+    /// measurement noise.
     pub minimum_duty: Duty,
     /// At rest, all valves shut, when |error| is at most this … 0…100 mm; sensible
     /// 0.3…1, at least half of what the shortest opening moves the piston.
@@ -65,15 +62,14 @@ pub struct JointGains {
     pub release_band: PositionMm,
     /// … for this long: one noisy sample does not move a valve. 0…1 s; sensible 3 ms.
     pub release_dwell: Micros,
-    /// Time over which the step of a change of law is faded out. 0…10 s;
-    /// sensible 50…200 ms.
+    /// Time over which the step after a change of law is faded out. 0…10 s; sensible 50…200 ms.
     pub bumpless_time: Micros,
     /// Window of the velocity estimate, in ticks: 2…64; sensible 10…32. Its delay
     /// is (N − 1)/2 ticks; its noise falls with N^1.5.
     pub velocity_window: u8,
-    /// Lower end of the stroke that the reference is limited to.
+    /// Lower limit of the reference, in the stroke.
     pub stroke_min: PositionMm,
-    /// Upper end of the stroke that the reference is limited to.
+    /// Upper limit of the reference, in the stroke.
     pub stroke_max: PositionMm,
     /// Control law.
     pub law: Law,
@@ -86,8 +82,8 @@ pub struct JointGains {
     pub sliding_time: Micros,
     /// Data of the axis, for the predictive law.
     pub axis: AxisData,
-    /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED); slower valves take longer ones; a whole number of
-    /// ticks in 1 ms…1 s.
+    /// Valve PWM period: 10…20 ms for 50…100 Hz (ASSUMED), longer for slower valves; a whole number of ticks in 1 ms…1
+    /// s.
     pub pwm_period: Micros,
 }
 
@@ -124,7 +120,7 @@ impl Default for JointGains {
     }
 }
 
-/// Name of a rejected parameter.
+/// Which parameter was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum JointParameter {
@@ -186,7 +182,7 @@ pub enum JointParameter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// The parameter is outside the range of its documentation.
+    /// The parameter is outside its documented range.
     OutOfRange(JointParameter),
     /// The parameter contradicts another one: the release band does not exceed
     /// the settle band, the minimum or the dead-zone duty is not below the limit, the stroke is
@@ -194,18 +190,17 @@ pub enum ConfigError {
     Inconsistent(JointParameter),
 }
 
-// What is done once, at start-up or for a request, is marked `#[inline]` here and where it
-// leads: it is then compiled in the crate that calls it, which on a joint board is
-// compiled for size, while what a tick does is compiled here, for speed.
+// Code that runs once, at start-up or for a request, is marked `#[inline]`, here and in what it calls. It is then
+// compiled in the calling crate, which on a joint board is compiled for size, while the code of a tick is compiled
+// here, for speed.
 
-/// The shipped rule bases, in one place each.
+/// The shipped rule bases, each at a single address.
 static RULES_PD: JointRules = rules::PD;
 static RULES_ID: JointRules = rules::ID;
 
 /// A validated configuration: raw coefficients for one tick length.
 ///
-/// Its `Hash` is for sealing memory: rule bases, which are constants, count by
-/// their address.
+/// Its `Hash` is for sealing memory; the rule bases, which are constants, enter it by their address.
 #[derive(Clone, Copy, Debug)]
 pub struct JointConfig {
     gains: JointGains,
@@ -236,8 +231,8 @@ pub(super) const INTEGRAL_SHIFT: u32 = 40;
 const FULL_SCALE: i64 = 32_767;
 
 impl JointConfig {
-    /// Checks the gains and works out the coefficients for a control tick of
-    /// `tick` (100 µs…2 ms), with the shipped rule bases.
+    /// Checks the gains and computes the coefficients for a control tick of `tick` (100 µs…2 ms), with the shipped rule
+    /// bases.
     ///
     /// # Errors
     /// [`ConfigError`] names the first parameter that is out of its range.
@@ -246,9 +241,8 @@ impl JointConfig {
         Self::with_rules(gains, tick, &RULES_PD, &RULES_ID)
     }
 
-    /// As [`JointConfig::new`], with rule bases of the user's own. Their inputs
-    /// and outputs have full scale ±32 767, and at most two neighbouring sets of an
-    /// input may overlap: a tick has time for four rules.
+    /// As [`JointConfig::new`], with the caller's own rule bases. Their inputs and outputs have full scale ±32 767, and
+    /// at most two neighbouring sets of an input may overlap, because a tick has time for four rules only.
     ///
     /// # Errors
     /// [`ConfigError`] names the first parameter that is out of its range.
@@ -320,7 +314,7 @@ impl JointConfig {
 
 impl Hash for JointConfig {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+        // Destructured, so that a new field cannot be forgotten here.
         let Self {
             gains,
             tick,
@@ -339,7 +333,7 @@ impl Hash for JointConfig {
         (gains.stroke_min, gains.stroke_max, gains.law, tick).hash(state);
         axis.hash(state);
         if axis.is_some() {
-            // The predictive law has no use for the rest.
+            // The predictive law does not use the rest.
             return;
         }
         gains.hash(state);

@@ -1,5 +1,5 @@
-//! The joint tick: from reference and position to valve openings. The equations are those of the module
-//! above ([`crate::joint`]), of `modes.rs` and `settle.rs`; the predictive law ([`crate::law`]) has its own tick.
+//! The joint tick: from reference and position to valve openings. The equations are in the parent module
+//! ([`crate::joint`]), `modes.rs` and `settle.rs`; the predictive law ([`crate::law`]) has its own tick.
 
 use super::config::{INPUT_SHIFT, INTEGRAL_SHIFT, JointConfig};
 use super::modes;
@@ -28,7 +28,7 @@ const RULE_SHIFT: u32 = 24 + 15 - 30;
 pub struct JointController {
     config: JointConfig,
     correction: Correction,
-    /// The last tick tracked.
+    /// The joint tracked in the last tick.
     tracked: bool,
     /// Set by a change of law: the next tick continues from `last_law`.
     changed: bool,
@@ -36,9 +36,9 @@ pub struct JointController {
     settle: Settle,
     /// Σ e in raw mm × ticks, within the configured bound.
     integral: i64,
-    /// u before the limit, × 2^30 and within ±2, of the last tick.
+    /// u of the last tick before the limit, × 2^30 and within ±2.
     last_law: i32,
-    /// What is still added to the law after a change, × 2^30, and its decay.
+    /// What is still added to the law after a change, × 2^30, and its decay per tick.
     fade: i32,
     fade_step: i32,
     /// The predictive law, when it is chosen.
@@ -71,8 +71,7 @@ impl JointController {
         &self.config
     }
 
-    /// What a tick changes and the next one reads, to be sealed apart from the
-    /// configuration.
+    /// What a tick changes and the next one reads, to be sealed separately from the configuration.
     #[must_use]
     pub const fn state(&self) -> State<'_> {
         State(self)
@@ -93,7 +92,7 @@ impl JointController {
         }
     }
 
-    /// Whether the next tick has more work than others: the predictive law plans its period in it.
+    /// Whether the next tick has more work than others, because the predictive law plans its period in it.
     #[must_use]
     pub fn plans(&self) -> bool {
         self.predictive.as_ref().is_some_and(Predictive::plans)
@@ -105,8 +104,8 @@ impl JointController {
         self.predictive.as_ref()
     }
 
-    /// Takes note that nothing is sent of what the last [`JointController::step`] gave, after which
-    /// it is not called before others have driven.
+    /// Notes that nothing was sent of what the last [`JointController::step`] returned; it is not called again before
+    /// something else has driven.
     #[inline]
     pub fn stopped(&mut self) {
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
@@ -114,9 +113,9 @@ impl JointController {
         }
     }
 
-    /// Takes note of what was sent for the next tick where no law drives, once after each
-    /// [`JointController::observe`]: for how much of it each valve counts as open without its
-    /// switching delays, µs. The predictive law follows the air by it.
+    /// Notes what was sent for the next tick while no law drives, once after each [`JointController::observe`]: how
+    /// long each valve counts as open in that tick, without its switching delays, µs. The predictive law tracks the air
+    /// from this.
     #[inline]
     pub fn external_on_times(&mut self, open: &OnTimes) {
         if let Some(law) = &mut self.predictive {
@@ -134,21 +133,19 @@ impl JointController {
         }
     }
 
-    /// Changes the configuration, without a bump. The integral keeps its share
-    /// of the new bound at most; the velocity window starts anew if its length
-    /// or the tick differ.
+    /// Changes the configuration, without a bump. The integral is limited to the new bound; the velocity window starts
+    /// afresh if its length or the tick changes.
     #[inline]
     pub fn retune(&mut self, config: JointConfig) {
         if config.window != self.config.window {
             self.velocity.reset();
         }
         self.integral = within(self.integral, config.integral_limit);
-        // What the coefficients are made of: fewer than they are.
+        // Compares the inputs of the coefficients, which are fewer than the coefficients.
         let made_of =
             |config: &JointConfig| (config.axis.is_some(), config.tick(), config.gains().axis);
         if made_of(&config) != made_of(&self.config) {
-            // The state of the law that is left was not watched while another was in
-            // use.
+            // The state of the remaining law was not updated while another one was in use.
             self.config = config;
             self.reset();
         }
@@ -156,17 +153,15 @@ impl JointController {
         self.changed = true;
     }
 
-    /// Forgets everything but configuration and correction: as after
-    /// [`JointController::new`].
+    /// Forgets everything but configuration and correction, as after [`JointController::new`].
     pub fn reset(&mut self) {
         let correction = self.correction;
         *self = Self::new(self.config);
         self.correction = correction;
     }
 
-    /// A tick in which the joint does not track (idle, hold, exhaust): follows the
-    /// measured position, and forgets the integral and the rest state, so that the
-    /// next [`JointController::step`] starts afresh with a valid velocity.
+    /// A tick in which the joint does not track (idle, hold, exhaust). It follows the measured position, and forgets
+    /// the integral and the rest state, so that the next [`JointController::step`] starts afresh with a valid velocity.
     pub fn observe(&mut self, measured: PositionMm) -> VelocityMmS {
         if let (Some(law), Some(model)) = (&mut self.predictive, &self.config.axis) {
             return law.observe(model, measured);
@@ -212,7 +207,7 @@ impl JointController {
         let error_rate = input.reference_velocity.saturating_sub(velocity);
 
         let law = self.law(error, error_rate, input.reference_velocity, &mut limits);
-        // What is beyond ±2 is cut to a duty of ±1 in any case.
+        // A value beyond ±2 is cut to a duty of ±1 in any case.
         let law = self.faded(saturate_i32(law));
         self.last_law = law;
         self.tracked = true;
@@ -299,14 +294,14 @@ impl JointController {
             .wrapping_add(shift_right_round_inner(correction, RULE_SHIFT))
     }
 
-    /// Adds what is left of the last change of law; a bump of more than 2, from one
-    /// end of the duty beyond the other, is faded by that much.
+    /// Adds the rest of the bump of the last change of law. A bump of more than 2, which would exceed the range of the
+    /// duty end to end, is faded as 2.
     #[inline]
     fn faded(&mut self, law: i32) -> i32 {
         if self.changed {
             self.changed = false;
             let last = if self.tracked { self.last_law } else { law };
-            // Symmetric, so that its magnitude is a number, too.
+            // Symmetric, so that its absolute value fits, too.
             self.fade = last.saturating_sub(law).max(-i32::MAX);
             // Rounded up: the fade ends within the configured time.
             match self
@@ -336,7 +331,7 @@ impl JointController {
         limits: &mut JointLimits,
     ) -> Duty {
         let gains = self.config.gains();
-        // At most 2^31: the sum stays below 2^32, and no duty of the gains is negative.
+        // At most 2^31: the sum stays below 2^32, because no duty of the gains is negative.
         let magnitude = law.unsigned_abs();
         if magnitude == 0 {
             return Duty::ZERO;
@@ -357,7 +352,7 @@ impl JointController {
         Duty::from_raw(if law < 0 { cut.wrapping_neg() } else { cut })
     }
 
-    /// Conditional, bounded integration; what it adds acts from the next tick on.
+    /// Conditional, bounded integration; what it adds takes effect from the next tick on.
     #[inline]
     fn integrate(&mut self, error: PositionMm, duty: Duty, limits: &mut JointLimits) {
         let outside = error.saturating_abs() > self.config.gains().integral_zone;
@@ -377,7 +372,7 @@ pub struct State<'a>(&'a JointController);
 
 impl Hash for State<'_> {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+        // Destructured, so that a new field cannot be forgotten here.
         let JointController {
             config: _,
             correction,
@@ -393,15 +388,15 @@ impl Hash for State<'_> {
         } = self.0;
         (correction, tracked, changed).hash(state);
         if let Some(law) = predictive {
-            // The other laws begin afresh after it.
+            // The other laws start afresh after it.
             return law.hash(state);
         }
         (velocity, settle, integral, last_law, fade, fade_step).hash(state);
     }
 }
 
-/// `value` limited to ±`bound`. Not `clamp`, which panics if its bounds are
-/// swapped: the compiler can not see that a bound is never negative.
+/// `value` limited to ±`bound`. Not `clamp`, which panics if its bounds are swapped: the compiler can not see that a
+/// bound is never negative.
 #[inline]
 fn within(value: i64, bound: i64) -> i64 {
     value.max(bound.wrapping_neg()).min(bound)

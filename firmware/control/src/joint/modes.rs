@@ -11,10 +11,10 @@
 //!           else: push or pull, by the sign of s
 //! ```
 //!
-//! Source: textbook laws; seven-mode sliding control after Hodgson, Le, Tavakoli and Pham, Mechatronics 22 (2012).
-//! Its two bounds on s are ASSUMED: those of rest and of the fuzzy correction.
+//! Source: textbook laws; seven-mode sliding control after Hodgson, Le, Tavakoli and Pham, Mechatronics 22 (2012). Its
+//! two bounds on s are ASSUMED to be those of rest and of the fuzzy correction.
 //!
-//! Assumes: a velocity without much noise ([`crate::paper::velocity`]), and a period much shorter than the move.
+//! Assumes: a velocity with little noise ([`crate::paper::velocity`]), and a period much shorter than the move.
 
 use super::config::JointGains;
 use super::types::Law;
@@ -24,8 +24,8 @@ use wheeleg_units::{Duty, Micros, PositionMm, VelocityMmS, saturate_i32, shift_r
 /// From gain (24) × position or velocity (16) fractional bits to duty (30).
 const PHYSICAL_SHIFT: u32 = 24 + 16 - 30;
 
-/// u × 2^30 of the on/off, P and PID laws; of the sliding law, the surface as a
-/// share of its outer band, for the record. `integral` is Σ e in raw mm × ticks.
+/// u × 2^30 of the on/off, P and PID laws; for the sliding law that of the on/off law, for the record. `integral` is Σ
+/// e in raw mm × ticks.
 #[inline]
 pub(super) fn law(
     gains: &JointGains,
@@ -51,8 +51,7 @@ pub(super) fn law(
                 reference_velocity.raw(),
             ));
             if gains.law == Law::Pid {
-                // |integral| < 2^26 mm s raw × 10^4 ticks; to mm s by the tick in
-                // s × 2^30, at most 2^21.
+                // |integral| < 2^26 mm s raw × 10^4 ticks; converted to mm s by the tick in s × 2^30, at most 2^21.
                 let tick_s = i64::from(tick.get()).wrapping_mul(1074);
                 let area = shift_right_round(integral.wrapping_mul(tick_s), 30);
                 let area = i64::from(saturate_i32(area));
@@ -65,11 +64,11 @@ pub(super) fn law(
     }
 }
 
-/// One of seven valve modes by the surface s = e + T ė.
+/// One of seven valve modes, chosen by the surface s = e + T ė.
 ///
-/// Inside the settle band nothing opens; up to the error scale one valve acts:
-/// it vents the counter chamber to drive, and fills it to brake; beyond, push or
-/// pull. Openings are whole periods: the mode is held until it changes.
+/// Inside the settle band nothing opens. Up to the error scale one valve acts: the counter chamber is vented to drive,
+/// and filled to brake. Beyond that the mode is push or pull. Openings are whole periods: a mode is held until it
+/// changes.
 #[inline]
 pub(super) fn sliding(
     gains: &JointGains,

@@ -15,7 +15,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Settle {
     settled: bool,
-    /// Ticks for which the condition to change has held.
+    /// Ticks for which the condition for a change has held.
     held: u32,
 }
 
@@ -31,9 +31,8 @@ impl Settle {
         self.settled
     }
 
-    /// Takes the magnitudes of this tick; gives whether the valves are to be
-    /// shut: at rest, and already while the dwell before it runs, because the
-    /// shortest opening of a valve would push a small error out of the band again.
+    /// Takes the magnitudes of this tick. Returns whether the valves are to be shut: at rest, and also during the dwell
+    /// before it, because the shortest opening of a valve would push a small error out of the band again.
     #[inline]
     pub(super) fn update(
         &mut self,
@@ -58,7 +57,7 @@ impl Settle {
         } else {
             0
         };
-        // A dwell of 0 acts as one tick: the condition must hold now.
+        // A dwell of 0 acts like one tick: the condition must hold now.
         let elapsed = change && self.held >= dwell;
         if elapsed || (self.settled && reference_moves) {
             self.settled = !self.settled;

@@ -31,12 +31,12 @@ pub enum Law {
     /// Seven valve modes on a sliding surface e + T ė (after Hodgson, Le,
     /// Tavakoli and Pham, Mechatronics 22, 2012).
     Sliding,
-    /// Estimated pressures and motion ahead over the dead time: [`crate::axis`].
+    /// Estimated pressures, and motion predicted over the dead time: [`crate::axis`].
     Predictive,
 }
 
 impl Law {
-    /// All laws, by the numbers of the parameter `law`.
+    /// All laws, in the order of the numbers of the parameter `law`.
     pub const ALL: [Self; 6] = [
         Self::Fuzzy,
         Self::OnOff,
@@ -56,9 +56,8 @@ pub struct JointInput {
     pub reference: PositionMm,
     /// Velocity of the reference; zero for a step.
     pub reference_velocity: VelocityMmS,
-    /// The reference announced for later, and when it becomes the reference.
-    /// The predictive law vents the counter chamber ahead of a known move; the
-    /// other laws give the same with or without it.
+    /// The reference announced for later, and when it takes effect. The predictive law vents the counter chamber ahead
+    /// of a known move; the output of the other laws does not depend on it.
     pub announced: Option<Announced>,
 }
 
@@ -76,17 +75,16 @@ pub struct Announced {
 pub struct JointLimits {
     /// The duty was cut to the configured limit.
     pub duty: bool,
-    /// The integral was not advanced: the output is saturated and the error
-    /// pushes further, or the error is outside the integral zone. At rest it is
-    /// not advanced either, and that is no limit.
+    /// The integral was not advanced, because the output is saturated and the error pushes further, or because the
+    /// error is outside the integral zone. At rest it is not advanced, either, but that is not a limit.
     pub integral_frozen: bool,
-    /// The integral stands at its bound.
+    /// The integral is at its bound.
     pub integral_clamped: bool,
-    /// The error was beyond the domain of the rule base, which saw its edge.
+    /// The error was beyond the domain of the rule base and was limited to its edge.
     pub error: bool,
     /// The velocity error was beyond the domain of the rule base.
     pub velocity: bool,
-    /// The duty was below the smallest one that is acted upon; valves shut.
+    /// The duty was too small to act on; the valves are shut.
     pub below_minimum: bool,
     /// The reference was outside the stroke limits and was cut to them.
     pub reference: bool,
@@ -107,8 +105,8 @@ pub struct JointOutput {
     pub duty: Duty,
     /// The duty allocated to the valves: effective openings per PWM period.
     pub openings: ValveOpenings,
-    /// On-times of the next tick, when the law times each pulse itself; the
-    /// openings are then all zero and the PWM is left out.
+    /// On-times of the next tick if the law times each pulse itself; the openings are then all zero and the PWM is not
+    /// used.
     pub direct: Option<OnTimes>,
     /// Error, reference − measured.
     pub error: PositionMm,

@@ -5,22 +5,23 @@
 //! pB = (pA AA − pa (AA − AB) − F) / AB          each limited to what valves can make; the other makes up for it
 //! ```
 //!
-//! F, N; p, Pa absolute; AA, AB: areas of bore and annulus, m². Valves can make 1.03 p_a to 0.985 p_s. F is limited
-//! before to what these make. Within the limits each chamber makes half of a change of F: AA dpA = dF/2, AB dpB =
-//! −dF/2.
+//! F, N; p, Pa absolute; AA, AB: areas of bore and annulus, m². The valves can make 1.03 p_a to 0.985 p_s, and F is
+//! limited beforehand to what these pressures make. Within the limits each chamber makes half of a change of F:
+//! AA dpA = dF/2, AB dpB = −dF/2.
 //!
-//! Two actuators and one force: the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
-//! Goldfarb 2007); about the mean of supply and atmosphere A has as far to go up as down, and B nearly so behind a thin rod. It is
-//! neither the stiffest level, which is the highest, nor the one at which filling and venting are equally fast.
+//! Two actuators make one force, so the split is a choice. Symmetric about a mean is the usual one (e.g. Shen and
+//! Goldfarb 2007). About the mean of supply and atmosphere, A can rise as far as it can fall, and B nearly so behind a
+//! thin rod. This is neither the stiffest level, which is the highest, nor the one at which filling and venting are
+//! equally fast.
 //!
-//! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in one from an end
-//! stop, the drive chamber makes up for what the counter chamber still has too much, and gives way as that falls: the
-//! force is there as soon as either chamber can make it. It ends once the counter chamber is expected to have at most
-//! 10 kPa too much. Source: this project (decision 38).
+//! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in a move from an end
+//! stop, the drive chamber compensates for the excess pressure that is still in the counter chamber, and falls back as
+//! that vents: the force is there as soon as either chamber can make it. The swap ends once the expected excess of the
+//! counter chamber is at most 10 kPa. Source: this project (decision 38).
 //!
 //! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its
-//! pressure, and the force is less than asked for. For the swap: that the counter chamber's pressure is estimated to 10
-//! kPa.
+//! pressure, and the force is less than demanded. For the swap: that the counter chamber's pressure is estimated to
+//! within 10 kPa.
 //!
 //! Config [`AxisModel`], state [`PressureSwap`], update [`PressureSwap::targets`].
 
@@ -30,7 +31,7 @@ use crate::observer::pressure::Pressures;
 use crate::tuning::SWAP_LAG;
 use wheeleg_units::{Duty, saturate_i32};
 
-/// A pressure that valves can make.
+/// Limits a pressure to what the valves can make.
 #[inline]
 fn possible(model: &AxisModel, pressure: i32) -> i32 {
     pressure.max(model.low).min(model.high)
@@ -40,8 +41,7 @@ fn possible(model: &AxisModel, pressure: i32) -> i32 {
 #[inline]
 fn b_of(model: &AxisModel, force: i32, a: i32) -> i32 {
     let times = |a: i32, b: i32| i64::from(a).wrapping_mul(i64::from(b));
-    // Over the annulus of a thick rod each of the two is more than 32 bits hold (8.4 MPa);
-    // their difference is a pressure again.
+    // Over the annulus of a thick rod each of the two exceeds 32 bits (8.4 MPa); their difference is a pressure again.
     let of_a = times(a, model.area_ratio).wrapping_shr(24);
     let of_force = times(force.saturating_add(model.force_rod), model.pressure_b).wrapping_shr(12);
     saturate_i32(of_a.wrapping_sub(of_force))
@@ -56,15 +56,15 @@ fn a_of(model: &AxisModel, force: i32, b: i32) -> i32 {
     mul_shr_sat(sum, model.pressure_a, 12)
 }
 
-/// What the supply can give of a force, mN.
+/// Limits a force to what the supply can deliver, mN.
 pub(super) fn possible_force(model: &AxisModel, force: i32) -> i32 {
     force
         .max(model.force_in.wrapping_neg())
         .min(model.force_out)
 }
 
-/// Pressures whose force is `force`, about the mean. The force must be one that the
-/// supply can give, so that products with it fit.
+/// Pressures about the mean that make `force`, which must be one that the supply can deliver so that products with it
+/// fit.
 #[inline]
 pub(super) fn targets(model: &AxisModel, force: i32) -> Pressures {
     let a = possible(
@@ -82,14 +82,14 @@ pub(super) fn targets(model: &AxisModel, force: i32) -> Pressures {
     Pressures { a, b: bounded }
 }
 
-/// The drive chamber makes up for what the counter chamber still has too much.
+/// Whether the drive chamber compensates for the excess pressure of the counter chamber.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum PressureSwap {
-    /// It does not.
+    /// No.
     No,
-    /// In a move that extends.
+    /// Yes, in a move that extends.
     Extends,
-    /// In one that retracts.
+    /// Yes, in a move that retracts.
     Retracts,
 }
 
@@ -103,7 +103,7 @@ impl PressureSwap {
         }
     }
 
-    /// By how much the counter chamber has more than it should, 1/256 Pa.
+    /// Excess pressure of the counter chamber, 1/256 Pa.
     const fn lag(self, target: Pressures, expected: Pressures) -> i32 {
         match self {
             Self::No => 0,
@@ -112,13 +112,13 @@ impl PressureSwap {
         }
     }
 
-    /// Whether the counter chamber still has too much for a force that the supply can give.
+    /// Whether the counter chamber still has too much pressure for a force that the supply can deliver.
     pub(super) fn lags(self, model: &AxisModel, force: i32, expected: Pressures) -> bool {
         self.lag(targets(model, force), expected) > SWAP_LAG
     }
 
-    /// Chamber pressures for a force that the supply can give, with chambers that are `expected` to be at these.
-    /// The swap is over when the counter chamber no longer lags.
+    /// Chamber pressures for a force that the supply can deliver, while the chambers are `expected` to be at these. The
+    /// swap ends when the counter chamber no longer lags.
     pub(super) fn targets(
         &mut self,
         model: &AxisModel,
@@ -143,7 +143,7 @@ impl PressureSwap {
     }
 }
 
-/// A force that the supply can give as a share of its largest, in steps of 2^-14.
+/// A force that the supply can deliver, as a share of its largest, in steps of 2^-14.
 pub(super) fn duty(model: &AxisModel, force: i32) -> Duty {
     let share = if force > 0 {
         model.share_out
@@ -160,17 +160,16 @@ mod tests {
     use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
 
-    /// Force of `pressures` with the areas themselves, mN.
+    /// Force of `pressures`, mN, from the areas themselves.
     fn force(pressures: Pressures, data: &AxisData) -> f64 {
         let circle = |d: PositionMm| core::f64::consts::FRAC_PI_4 * d.to_f64() * d.to_f64();
         let (bore, rod) = (circle(data.bore), circle(data.rod));
         let [a, b] = [pressures.a, pressures.b].map(|p| f64::from(p) / 256.0);
-        // Pa mm² are 1e-3 mN.
+        // 1 Pa mm² is 1e-3 mN.
         (a * bore - b * (bore - rod) - 101_325.0 * rod) * 1e-3
     }
 
-    /// Whatever bore, rod and supply: targets make the force that was asked for, up to the
-    /// largest that the supply gives.
+    /// For any bore, rod and supply the targets make the demanded force, up to the largest that the supply can deliver.
     #[test]
     fn targets_make_their_force_at_every_supply_and_rod() {
         for bore in [4, 20, 100] {
@@ -203,7 +202,7 @@ mod tests {
         }
     }
 
-    /// B still has 2 bar too much: A makes up for it, and gives way once that is less than 10 kPa.
+    /// B still has 2 bar too much: A compensates for it, and falls back once the excess is below 10 kPa.
     #[test]
     fn a_counter_chamber_that_lags_is_made_up_for() {
         let data = AxisData::default();

@@ -1,4 +1,4 @@
-//! Dead-time predictor: the motion at the end of the dead time, where a pulse that begins now acts.
+//! Dead-time predictor: the motion at the end of the dead time, when a pulse that begins now takes effect.
 //!
 //! ```text
 //! T_d = rest of the period (1.5 ticks) + t_on + t_line
@@ -15,11 +15,10 @@
 //! Source: control of a plant with dead time by its predicted state (Smith 1957; Manitius and Olbrot 1979); one step of
 //! the trapezoidal rule.
 //!
-//! Assumes: valve delays, supply and friction as specified; the load that is estimated, unchanged in the dead time; a
-//! force that changes in proportion to time in it. If the supply falls, a pulse that fills adds less to F expected than
-//! is counted.
+//! Assumes: valve delays, supply and friction as specified; within the dead time, a constant load as estimated and a
+//! force that changes linearly. If the supply falls, a filling pulse adds less to F expected than is counted.
 //!
-//! x', v' are what `inverse_dynamics` acts by; `standstill`, `seat` and `preload` act by the motion now.
+//! `inverse_dynamics` acts on x' and v'; `standstill`, `seat` and `preload` act on the motion now.
 //!
 //! Config [`AxisModel`]; no state of its own; update [`PredictedState::new`].
 
@@ -85,7 +84,7 @@ mod tests {
 
     const LOAD_N: f64 = 12.0;
 
-    /// A piston in motion with forces now and expected, N; what is predicted, mm and mm/s.
+    /// The prediction, mm and mm/s, for a moving piston with these forces now and expected, N.
     fn predicted(stroke_mm: f64, speed: f64, now_n: f64, expected_n: f64, stuck: bool) -> [f64; 2] {
         let model = model();
         let mut law = Predictive::new(&model);
@@ -109,7 +108,7 @@ mod tests {
     /// Dead time of the default axis: 1.5 ticks, 3.5 ms of the valve and 2.9 ms of the line.
     const DEAD_TIME_S: f64 = 7.9e-3;
 
-    /// The speed by the formulas of the text, mm/s: 1.5 kg, 10 N and 40 N s/m.
+    /// Speed by the formulas in the module's documentation, mm/s: 1.5 kg, 10 N and 40 N s/m.
     fn exact(speed: f64, now_n: f64, expected_n: f64) -> f64 {
         let force = 0.5 * (now_n + expected_n) + LOAD_N - 40.0 * speed * 1e-3;
         let free = speed + force * DEAD_TIME_S / 1.5 * 1e3;
@@ -138,7 +137,7 @@ mod tests {
         }
     }
 
-    /// The force is the mean of now and expected, either way round.
+    /// The mean of the force now and the expected one acts, whichever of them is larger.
     #[test]
     fn the_force_now_counts_for_as_much_as_the_expected_one() {
         let [_, one] = predicted(90.0, 200.0, 0.0, 40.0, false);
@@ -146,10 +145,10 @@ mod tests {
         assert!((one - other).abs() < 0.5, "{one} {other}");
     }
 
-    /// Friction takes 48 mm/s in the dead time, but turns nothing round.
+    /// Friction takes 48 mm/s in the dead time, but never reverses the motion.
     #[test]
     fn friction_stops_a_slow_piston_and_turns_it_not_round() {
-        // 12 N of load are balanced.
+        // The 12 N of load are balanced.
         for (speed, stops) in [(40.0, true), (-40.0, true), (80.0, false), (-80.0, false)] {
             let [_, found] = predicted(90.0, speed, -LOAD_N, -LOAD_N, false);
             assert_eq!(found == 0.0, stops, "{speed}: {found}");
@@ -157,7 +156,7 @@ mod tests {
         }
     }
 
-    /// Break-away friction is 15 N: one that is stuck stands below it, and slips above it.
+    /// Break-away friction is 15 N: a stuck piston stands below it and slips above it.
     #[test]
     fn a_piston_that_is_stuck_stands_until_the_expected_force_breaks_it_away() {
         for (force_n, moves) in [(14.5, false), (15.5, true), (-14.5, false), (-15.5, true)] {
@@ -165,7 +164,7 @@ mod tests {
             assert_eq!(found != 0.0, moves, "{force_n}: {found}");
             assert_eq!(stroke != 90.0, moves, "{force_n}: {stroke}");
         }
-        // One that is not stuck slides below it, too.
+        // A piston that is not stuck slides below it, too.
         assert!(predicted(90.0, 0.0, 12.0 - LOAD_N, 12.0 - LOAD_N, false)[1] > 1.0);
     }
 

@@ -1,25 +1,25 @@
-//! Which part of the firmware commands the valves: the law, or another one.
+//! Which part of the firmware commands the valves: the law or another one.
 //!
-//! The estimates live on what was sent. Where another part drives (exhaust, precharge, hold), and reports it by
-//! [`Predictive::external_on_times`], the observer counts that at once and the law waits until it is counted; a plan
-//! that is cut counts as far as it was sent.
+//! The estimates depend on what was sent. When another part drives (exhaust, precharge, hold) and reports it through
+//! [`Predictive::external_on_times`], the observer counts that at once, and the law waits until it has been counted. A
+//! plan that is cut short counts as far as it was sent.
 //!
-//! | | what is left when another part drives | why |
+//! | | what is kept when another part drives | why |
 //! |---|---|---|
-//! | goes on | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
-//! | begins anew, if the other part has the last tick of a period, and at the end of each period of its own | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
-//! | is dropped at once | the plan, as far as it was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
+//! | continues | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
+//! | starts afresh, if the other part has the last tick of a period, and at the end of each period in which it drives | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
+//! | is dropped at once | the part of the plan that was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
 //!
 //! A part that drives for less than a period, and not in its last tick, leaves rest, ramp and preload as they were. An
-//! axis that the node holds or has shut off for a fault is one where another part drives.
+//! axis that the node holds, or has shut off because of a fault, is one that another part drives.
 //!
-//! The law begins to plan again at the end of the first period in which it is called ([`Predictive::drive`]); until
-//! then all valves are shut. A new law, without any of this, is made by the board alone: `JointController::reset`,
-//! after a sensor's fault, damaged memory or other axis data.
+//! The law starts to plan again at the end of the first period in which it is called ([`Predictive::drive`]); until
+//! then all valves are shut. Only the board makes a new law without any of this, by `JointController::reset`: after a
+//! sensor fault, damaged memory or a change of axis data.
 //!
-//! Assumes: that whoever drives reports it in every tick, and that this reaches the chamber: without supply the air
-//! that is counted never came. What is not reported is air that the observer does not know of. In both cases the bounds
-//! of the pressures hold no longer.
+//! Assumes: that whoever drives reports it in every tick, and that what is reported reaches the chamber. Without
+//! supply, the air that is counted never came; what is not reported is air that the observer does not know of. In both
+//! cases the bounds of the pressures no longer hold.
 
 use super::Predictive;
 use super::inching::Inching;
@@ -33,7 +33,7 @@ use crate::pwm::OnTimes;
 use wheeleg_units::{Duty, PositionMm, VelocityMmS};
 
 impl Predictive {
-    /// A tick after which somebody else drives. Follows chambers and piston, and forgets that the piston rests.
+    /// A tick after which somebody else drives. Tracks chambers and piston, and forgets that the piston is at rest.
     pub fn observe(&mut self, model: &AxisModel, measured: PositionMm) -> VelocityMmS {
         if self.drives {
             self.release_valves(model);
@@ -49,8 +49,8 @@ impl Predictive {
         VelocityMmS::from_raw(self.observer.motion.speed)
     }
 
-    /// What somebody else has sent for the next tick: for how much of it each valve counts as open
-    /// without its switching delays, µs. It counts at once: the delays are not waited for.
+    /// What somebody else has sent for the next tick: how long each valve counts as open in it, without its switching
+    /// delays, µs. It counts at once, without waiting for the delays.
     pub fn external_on_times(&mut self, open: &OnTimes) {
         if self.drives {
             return;
@@ -60,14 +60,14 @@ impl Predictive {
         }
     }
 
-    /// Nothing of the plan has been sent in the tick to come, nor will be.
+    /// Nothing of the plan was sent for the tick to come, nor will be.
     pub fn stopped(&mut self, model: &AxisModel) {
         let sent = (model.times.tick as u16).wrapping_mul(u16::from(self.tick_of_period));
         self.plan = self.plan.map(|on| on.min(sent));
     }
 
-    /// Whether the tick that begins is the last of its period; the first stroke that is measured is where the
-    /// piston stands.
+    /// Whether the tick that begins is the last of its period. The first measured stroke is taken as the piston's
+    /// position.
     pub(super) fn ends_period(&mut self, measured: PositionMm) -> bool {
         if !self.primed {
             self.primed = true;
@@ -78,13 +78,13 @@ impl Predictive {
         self.plans()
     }
 
-    /// To the next tick.
+    /// Advances to the next tick.
     pub(super) const fn next_tick(&mut self, measured: PositionMm) {
         self.measured = measured.raw();
         self.tick_of_period = self.tick_of_period.wrapping_add(1) % PERIOD_TICKS;
     }
 
-    /// The end of a period: observes it, and begins the next.
+    /// Ends a period: observes it and begins the next.
     pub(super) fn observe_period(&mut self, model: &AxisModel, measured: PositionMm) {
         let period = self.period(model);
         let stroke = self.measured.saturating_add(measured.raw()) >> 1;
@@ -99,7 +99,7 @@ impl Predictive {
         self.external = [0; 4];
     }
 
-    /// Somebody else drives from the end of this tick on: what is planned for after it does not happen.
+    /// Somebody else drives from the end of this tick on: what was planned after it does not happen.
     #[cold]
     fn release_valves(&mut self, model: &AxisModel) {
         let ticks = i32::from(self.tick_of_period).wrapping_add(1);

@@ -1,4 +1,4 @@
-//! Inching: a piston on coarse valves goes to its target in steps, with the valves shut between them.
+//! Inching: on coarse valves the piston approaches its target in steps, with the valves shut between them.
 //!
 //! ```text
 //!          |e| < 20 bands, |v| < 120 mm/s            at rest for 2 periods
@@ -12,33 +12,34 @@
 //! F_i   = A_i |ṗ_i| (t_off + margin)                     the finest pulse of valve i, now
 //! ```
 //!
-//! e: error, mm; v: speed, mm/s; F_1, and whether half of the acceleration is enough: `switching_curve`; Fb, Fc:
-//! break-away and Coulomb friction, mN, as told; k_air: stiffness of the air in both shut chambers, mN/mm; p, A, L, n, ṗ:
-//! pressure, area, length of a chamber, exponent, and how fast an open valve changes the pressure, as in `pulse_planner`.
+//! e: error, mm; v: speed, mm/s; F_1, and when half of the acceleration is enough: `switching_curve`; Fb, Fc:
+//! break-away and Coulomb friction as specified, mN; k_air: stiffness of the air in both shut chambers, mN/mm; p, A, L,
+//! n, ṗ: pressure, area and length of a chamber, exponent, and rate of pressure change through an open valve, as in
+//! `pulse_planner`.
 //!
-//! The position servo asks for a force in every period. Where the finest pulse makes more force than friction holds and
-//! the mass is small, that is a limit cycle: each pulse is answered by one of another valve a dead time later, and the
-//! piston drifts with it, or stands because m a* + Fc is less than a pulse. So the force is asked for once, by
-//! the distance: the change that moves the piston by e against the spring of its air and its friction. Without damping
-//! half of the spring's force would do, with much of it all (the share is searched). The valves then stay shut until the
-//! piston has come to rest.
+//! The position servo demands a force in every period. Where the finest pulse makes more force than friction can hold
+//! and the mass is small, the result is a limit cycle: each pulse is answered by one from another valve a dead time
+//! later, and the piston drifts along, or stands because m a* + Fc is less than a pulse. Inching demands the force only
+//! once, and from the distance: the change that moves the piston by e against its air spring and its friction. Without
+//! damping half of the spring's force would be enough, with heavy damping all of it is needed (the share is searched).
+//! The valves then stay shut until the piston has come to rest.
 //!
 //! **Which valves.** Fill the drive chamber or vent the counter chamber, if ΔF is at least 0.8 of the finest pulse of
-//! that valve and its chamber has room; of both, fill where the mean of the pressures is below the middle, otherwise vent,
-//! so that they stay about it. If ΔF is less than either, a *vernier* pair: both chambers filled, or both vented, for the
-//! difference of their forces, begun together. All openings are sent as they were planned, whatever the piston does
-//! meanwhile.
+//! that valve and its chamber has room. If both are possible, fill when the mean of the pressures is below the middle,
+//! otherwise vent, so that the pressures stay about it. If ΔF is less than either, use a *vernier* pair: both chambers
+//! are filled, or both vented, starting together, and the difference of their forces acts. All openings are sent as
+//! planned, whatever the piston does meanwhile.
 //!
-//! `standstill` goes before: where it holds the valves shut (CATCH, PAUSE, REST), what is left of the pulses is dropped.
-//! While a preload or a seat decides, while the reference moves, and after another target it is AWAY. Break-away ramp and
-//! patience go on as without it.
+//! `standstill` has priority: where it holds the valves shut (CATCH, PAUSE, REST), the rest of the pulses is dropped.
+//! The state is AWAY while a preload or a seat decides, while the reference moves, and after a new target. The
+//! break-away ramp and patience continue as they would without inching.
 //!
-//! Assumes: flows that stay the same over the pulse, friction as told. The net force of a piston at rest is anywhere
-//! within its friction; it counts as none (taken from the observer, or from what the last step did, it was worse). If the
-//! supply is lower, a fill does less than planned, and the next step is another one.
+//! Assumes: flows that stay constant over the pulse, friction as specified. The net force on a piston at rest can be
+//! anywhere within its friction; it is taken as zero (estimates from the observer, or from the effect of the last step,
+//! did worse). If the supply is lower, a filling pulse does less than planned, and another step follows.
 //!
 //! Source: stepwise positioning of a drive with stiction (impulse control: Armstrong-Hélouvry et al., Automatica 30,
-//! 1994, section 4.5); the vernier pair is `docs/decisions/0064-inching-on-coarse-valves.md`.
+//! 1994, section 4.5); the vernier pair: `docs/decisions/0064-inching-on-coarse-valves.md`.
 //!
 //! Config [`AxisModel`], state [`Inching`], update [`Inching::update`].
 
@@ -53,15 +54,15 @@ use crate::tuning::{
     INCH_STILL_PERIODS, STILL_SPEED,
 };
 
-/// What the steps are at.
+/// State of inching.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 enum State {
     /// The position servo acts.
     #[default]
     Away,
-    /// Valves shut, until the piston has stood for so many periods.
+    /// Valves shut, until the piston has stood still for enough periods; `still` counts them.
     Wait { still: u16 },
-    /// Pulses are under way: what is left of their on-times, µs.
+    /// Pulses are under way; `left` is the rest of their on-times, µs.
     Pulses { left: [i32; 4] },
 }
 
@@ -71,7 +72,7 @@ pub(super) struct Inching {
     state: State,
 }
 
-/// What a step wants of the next period.
+/// What a step demands for the next period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Inch {
     /// All valves shut.
@@ -80,22 +81,22 @@ pub(super) enum Inch {
     Pulses(OnTimes),
 }
 
-/// Whether these valves are coarse for a piston for which half of the acceleration is enough, or not.
+/// Whether these valves are coarse for a piston, for which half of the acceleration may be enough or not.
 pub(super) fn is_coarse(model: &AxisModel, half_is_enough: bool) -> bool {
     let much = mul_shr_sat(model.breakaway, INCH_COARSE, 16);
     model.pulse_force > much && !half_is_enough && !is_without(Part::Inching)
 }
 
 impl Inching {
-    /// Something else holds the valves shut: a step under way ends.
+    /// Something else holds the valves shut: ends a step under way.
     pub(super) fn interrupt(&mut self) {
         if !matches!(self.state, State::Away) {
             self.state = State::Wait { still: 0 };
         }
     }
 
-    /// One period in which the piston is to come to rest at `reference` (raw mm); the next one begins `next`. `None`:
-    /// the position servo acts.
+    /// One period in which the piston is to come to rest at `reference` (raw mm); the next period begins at `next`.
+    /// `None`: the position servo acts.
     pub(super) fn update(
         &mut self,
         model: &AxisModel,
@@ -106,7 +107,7 @@ impl Inching {
         let error = reference.saturating_sub(observer.motion.stroke);
         let size = error.saturating_abs();
         let speed = observer.motion.speed.wrapping_abs();
-        // A band of at most 5 mm, below 2^19, times up to 80: it fits.
+        // A band is at most 5 mm, below 2^19; times up to 80 it fits.
         if size > model.band.wrapping_mul(INCH_ENDS_BANDS) {
             self.state = State::Away;
         } else if matches!(self.state, State::Away)
@@ -137,12 +138,12 @@ impl Inching {
         } else {
             State::Pulses { left: later }
         };
-        // At most a period, 8000.
+        // At most a period, 8000 µs.
         Some(Inch::Pulses(left.map(|on| on.min(period) as u16)))
     }
 }
 
-/// Whether no pulse is to change the pressures any more.
+/// Whether no pulse will change the pressures any more.
 fn air_rests(observer: &Observer) -> bool {
     let (now, then) = (observer.pressures(), observer.expected());
     let rests = |now: i32, then: i32| then.saturating_sub(now).saturating_abs() <= INCH_AIR_RESTS;
@@ -160,7 +161,7 @@ fn on_times(model: &AxisModel, openings: [i32; 4]) -> [i32; 4] {
     })
 }
 
-/// Stiffness of the air in both chambers, mN/mm: 5 % more, as n/L has it.
+/// Stiffness of the air in both chambers, mN/mm; 5 % too high, by the factor of [`AxisModel::exponent_per_length`].
 fn stiffness(model: &AxisModel, observer: &Observer) -> i32 {
     let (now, stroke) = (observer.expected(), observer.motion.stroke);
     let of = |pressure: i32, force: i32, length: i32| {
@@ -174,7 +175,7 @@ fn stiffness(model: &AxisModel, observer: &Observer) -> i32 {
     a.saturating_add(of(now.b, model.force_b, model.length_b(stroke)))
 }
 
-/// Openings of the valves, µs, that move a piston at rest by `error`, raw mm.
+/// Openings of the valves, µs, that move a resting piston by `error`, raw mm.
 fn openings(model: &AxisModel, observer: &Observer, error: i32) -> [i32; 4] {
     let away = mul_shr_sat(stiffness(model, observer), error.saturating_abs(), 16);
     let wanted = mul_shr(away, INCH_SPRING, 16).saturating_add(model.coulomb);
@@ -195,8 +196,8 @@ fn openings(model: &AxisModel, observer: &Observer, error: i32) -> [i32; 4] {
     [fill_a, vent_a, fill_b, vent_b]
 }
 
-/// Openings of fill and vent, µs, of the drive and of the counter chamber, that change the force by `wanted` mN. Of
-/// each chamber: its pressure, its fill and its vent valve.
+/// Openings of fill and vent valve, µs, of the drive and of the counter chamber, that change the force by `wanted` mN.
+/// Each chamber is given as its pressure, its fill valve and its vent valve.
 fn step(
     model: &AxisModel,
     wanted: i32,
@@ -210,7 +211,7 @@ fn step(
     let can_vent = counter.saturating_sub(by_vent) > model.low;
     let fits = |finest: i32| wanted > mul_shr(finest, INCH_FITS, 16);
     let (fills, vents) = (can_fill && fits(fills_least), can_vent && fits(vents_least));
-    // Which keeps the pressures about their middle.
+    // This choice keeps the pressures about their middle.
     let high = drive.saturating_add(counter) > model.mean.saturating_mul(2);
     if fills && !(vents && high) {
         return [[fill.opening(by_fill), 0], [0, 0]];
@@ -218,7 +219,7 @@ fn step(
     if vents {
         return [[0, 0], [0, vent.opening(by_vent)]];
     }
-    // Both are finest pulses at least.
+    // Each of the two is at least a finest pulse.
     if high {
         let back = drive_vent.finest().max(vents_least.saturating_sub(wanted));
         let on = vent.pressure(back.saturating_add(wanted));

@@ -1,4 +1,4 @@
-//! Inverse dynamics: the force that gives the wanted speed, with friction fed forward.
+//! Inverse dynamics: the force that produces the wanted speed, with friction feed-forward.
 //!
 //! ```text
 //! e    = r + v_r T_r − x'
@@ -13,25 +13,26 @@
 //! | r, v_r | mm, mm/s | reference and its speed |
 //! | x', v' | mm, mm/s | motion at the end of the dead time, `dead_time_predictor` |
 //! | T_r | s | dead time from this tick: one tick, t_on and the line |
-//! | curve, k(e), D, a_b | mm/s, 1/s, 1/s, mm/s² | speed by the error and its slope, damping, deceleration: `switching_curve` |
-//! | F_in, F_out | mN | largest force of the supply, retracting and extending: what can brake |
+//! | curve, k(e), D, a_b | mm/s, 1/s, 1/s, mm/s² | speed as a function of the error and its slope, damping, deceleration: `switching_curve` |
+//! | F_in, F_out | mN | largest force that the supply can deliver, retracting and extending: available for braking |
 //! | load, Fc, d, m | mN, mN, mN s/mm, kg | as in [`crate::observer::motion`]; Fb instead of Fc while \|v\| < 3 mm/s; faded by `standstill` |
-//! | sat(u) | 1 | u within ±1 |
-//! | ramp | mN | towards r, +5 Fb in a second while \|v\| < 3 mm/s or stuck, and r rests; −41 % a period above 10 mm/s; at most F_out; unchanged between, and while the valves are shut |
+//! | sat(u) | 1 | u limited to ±1 |
+//! | ramp | mN | towards r: +5 Fb per second while \|v\| < 3 mm/s or stuck, and r rests; −41 % per period above 10 mm/s; at most F_out; unchanged in between, and while the valves are shut |
 //!
 //! Source: computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
-//! coefficients, break-away while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration that a load
-//! leaves, and the ramp, are this project's (decision 38). The fed-forward friction is faded out where the piston does
-//! not come to rest: more than there is makes a relay. The ramp is an integral that is forgotten with each target that
-//! is more than one band from the last one, and when another part drives. Half the acceleration where patience is over
-//! (`standstill`) is the reduction of the gain against a limit cycle (Slotine and Li, Applied Nonlinear Control, ch.
-//! 5): a heavy piston that sticks beside its target gives way to a pulse on the spring of its friction, faster than the
-//! curve allows, and with the full gain other pulses push it back. Whether half is enough says `switching_curve`.
+//! coefficients, with break-away friction while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration
+//! that the load leaves, and the ramp, are this project's (decision 38). The friction feed-forward is faded out where
+//! the piston does not come to rest, because more than the real friction makes a relay. The ramp is an integral that is
+//! forgotten with each target more than one band from the last one, and when another part drives. Halving the
+//! acceleration when patience is over (`standstill`) is the usual reduction of the gain against a limit cycle (Slotine
+//! and Li, Applied Nonlinear Control, ch. 5): a heavy piston that sticks beside its target yields to a pulse on the
+//! spring of its friction, faster than the curve allows, and with the full gain further pulses push it back.
+//! `switching_curve` determines whether half is enough.
 //!
-//! Assumes: friction and supply as specified: neither is learnt. Load and mass are those of the observer. The force
-//! that is asked for is there at the end of the dead time, as far as the pulses of one period can make it. If the
-//! supply falls, F_in and F_out are taken for too large, so that the piston brakes too late under a load; what is
-//! missing in motion comes back as load, and in a piston that stands as ramp.
+//! Assumes: friction and supply as specified; neither is learnt. Load and mass are those of the observer. The demanded
+//! force is reached at the end of the dead time, as far as the pulses of one period can make it. If the supply falls,
+//! F_in and F_out are overestimated, and under a load the piston brakes too late. The force that is missing is made up
+//! by the load estimate while the piston moves, and by the ramp while it stands.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], state [`BreakawayRamp`], updates [`ForceDemand::ramp`] and
 //! [`ForceDemand::force`].
@@ -48,7 +49,7 @@ use crate::tuning::{
     IMPATIENT_DIVISOR, RAMP_DECAY, REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED,
 };
 
-/// Extra force on a piston that sticks: it grows until the piston slips.
+/// Extra force on a stuck piston: it grows until the piston slips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct BreakawayRamp {
     /// mN × 2^8.
@@ -56,9 +57,8 @@ pub(super) struct BreakawayRamp {
 }
 
 impl BreakawayRamp {
-    /// One period at `speed` raw mm/s with `missing` raw mm to a reference of
-    /// `reference_speed`. What moves slower than it slides only gives way by the spring
-    /// of its friction: that takes nothing back.
+    /// One period at `speed`, raw mm/s, with `missing` raw mm to a reference of `reference_speed`. A piston slower than
+    /// sliding speed only yields on the spring of its friction; that takes nothing off the ramp.
     fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {
         if speed > SLIDING_SPEED {
             let decay = mul_shr(self.force, RAMP_DECAY, 16);
@@ -78,13 +78,13 @@ impl BreakawayRamp {
     }
 }
 
-/// What is asked for, and with what.
+/// The demand, and what it is computed from.
 pub(super) struct ForceDemand<'a> {
     /// Raw mm.
     pub(super) reference: i32,
     /// Raw mm/s.
     pub(super) reference_speed: i32,
-    /// What is known now.
+    /// What the observer knows now.
     pub(super) observer: &'a Observer,
     /// Motion at the end of the dead time.
     pub(super) ahead: PredictedState,
@@ -93,7 +93,7 @@ pub(super) struct ForceDemand<'a> {
 }
 
 impl ForceDemand<'_> {
-    /// One period in which the law acts on the piston.
+    /// Updates the ramp in a period in which the law acts on the piston.
     pub(super) fn ramp(&self, model: &AxisModel, ramp: &mut BreakawayRamp) {
         let motion = &self.observer.motion;
         let missing = self.reference.saturating_sub(motion.stroke);
@@ -121,7 +121,7 @@ impl ForceDemand<'_> {
         let error = reference
             .saturating_add(mul_shr(reference_speed, model.dead_time_reference, 32))
             .saturating_sub(ahead.stroke);
-        // The force that can brake, beside the load.
+        // The force left for braking, given the load.
         let left = if error > 0 {
             model.force_in.saturating_sub(load)
         } else {
@@ -131,7 +131,7 @@ impl ForceDemand<'_> {
         let brake = gains.brake.min(possible).max(BRAKE_LEAST);
         let (speed, slope) = gains.speed(error, brake, model.top_speed);
         let wanted = reference_speed.saturating_add(speed);
-        // 1/s × 2^8 times raw mm/s: mm/s² × 2^24.
+        // 1/s × 2^8 times raw mm/s makes mm/s² × 2^24.
         let pull = mul_shr_sat(slope, reference_speed.saturating_sub(ahead.speed), 24);
         let damp = mul_shr(gains.damping, wanted.saturating_sub(ahead.speed), 24);
         let limit = gains.brake.saturating_mul(ACCELERATION_LIMIT_HALVES) >> 1;
@@ -153,7 +153,7 @@ impl ForceDemand<'_> {
         } else {
             wanted
         };
-        // In proportion up to the speed of full friction, 10 mm/s.
+        // Proportional to speed up to that of full friction, 10 mm/s.
         let friction = mul_shr(
             within(along, FULL_FRICTION_SPEED << 16),
             full / FULL_FRICTION_SPEED,

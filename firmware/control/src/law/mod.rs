@@ -1,7 +1,7 @@
-//! The predictive law: position of one axis with four on/off valves and one potentiometer.
+//! The predictive law: position control of one axis with four on/off valves and one potentiometer.
 //!
-//! *Predictive*: it acts by the state that is predicted for the end of the dead time. Nothing is optimised over a
-//! horizon, and there is no cost.
+//! *Predictive* means that it acts on the state predicted for the end of the dead time. Nothing is optimised over a
+//! horizon, and there is no cost function.
 //!
 //! ```text
 //!    x, v, load; p also at T_d
@@ -12,65 +12,69 @@
 //!
 //! | file | concept |
 //! |---|---|
-//! | [`reference_generator`] | second-order reference with a lead-limiting governor; runs ahead of the law, each tick |
-//! | `dead_time_predictor` | motion at the end of the dead time, where a pulse begun now acts |
-//! | `switching_curve` | proximate time-optimal: parabola of braking, straight line at the target |
-//! | `inverse_dynamics` | force for the speed that is wanted, with friction fed forward and the break-away ramp |
+//! | [`reference_generator`] | second-order reference with a lead-limiting governor; runs ahead of the law in every tick |
+//! | `dead_time_predictor` | motion at the end of the dead time, when a pulse begun now takes effect |
+//! | `switching_curve` | proximate time-optimal: a braking parabola with a straight line at the target |
+//! | `inverse_dynamics` | force for the wanted speed, with friction feed-forward and the break-away ramp |
 //! | `allocation` | from a force to two chamber pressures about their mean; the pressure swap |
 //! | `pulse_planner` | from a pressure to the on-times of the next period |
 //! | `standstill` | when the valves stay shut: a state machine |
-//! | `inching` | coarse valves: steps towards the target, with the valves shut between them |
-//! | `seat` | a force instead of a position at an end stop |
-//! | `preload` | the edge of slipping ahead of an announced move |
+//! | `inching` | coarse valves: steps towards the target, with the valves shut in between |
+//! | `seat` | force control instead of position control at an end stop |
+//! | `preload` | brings the force to the edge of slipping ahead of an announced move |
 //! | `handover` | which part of the firmware commands the valves |
 //!
-//! Valves that take milliseconds need no new decision in every one: observer and law work once in a period of
-//! [`PERIOD_TICKS`] (4) ticks, whole in its last tick, and plan the pulses of the next period to the microsecond. The
-//! steps, in the order of the code:
+//! Valves that take milliseconds to switch do not need a new decision every millisecond. Observer and law work once per
+//! period of [`PERIOD_TICKS`] (4) ticks, entirely in its last tick, and plan the pulses of the next period to the
+//! microsecond. The steps, in the order of the code:
 //!
-//! 1. [`Predictive::drive`] is called in every tick. In the last one of a period it does 2 to 10, in the others 10 alone.
-//! 2. `observe_period` (`handover`): the observer takes what was sent, and the mean of the last two strokes
-//!    ([`crate::observer`] has its steps). A mass that it has learnt gives new gains (`switching_curve`).
-//! 3. `plan_period`: another target? Then patience begins anew (`standstill`), and the ramp is forgotten.
-//! 4. `preload`: does the piston rest (or stand at a stop), and is a move announced? Then its force, or no pulse where that stands already.
-//! 5. `seat`, if 4 has nothing to say: is the target an end stop, and the piston there? Then its force, or rest.
-//! 6. `standstill`, if 4 has nothing to say: its state follows from 5, or else from how the piston comes to the target.
-//! 7. `allocation`: the pressure swap begins with a preload, or where the piston stands at an end stop.
-//! 8. F\*: that of 4 or 5. No pulse, where 4 says so, or the state of 6 is PAUSE, CATCH or REST. Where the valves are
-//!    coarse and the piston near, the pulses of a step, or none (`inching`), and 9 is left out. Otherwise that of the
-//!    position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics` with `switching_curve` in it.
-//! 9. F\*, limited to what the supply can give, becomes two pressures (`allocation`) and these pulses
+//! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, otherwise only 10.
+//! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
+//!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`).
+//! 3. `plan_period`: if the target is new, patience starts afresh (`standstill`) and the ramp is forgotten.
+//! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
+//!    that force is already there.
+//! 5. `seat`, unless 4 has decided: if the target is an end stop and the piston is there, this gives a force, or rest.
+//! 6. `standstill`, unless 4 has decided: its state follows from 5, or otherwise from how the piston approaches the
+//!    target.
+//! 7. `allocation`: the pressure swap starts with a preload, or when the piston stands at an end stop.
+//! 8. F\* is that of 4 or 5. There is no pulse if 4 says so, or if the state of 6 is PAUSE, CATCH or REST. If the
+//!    valves are coarse and the piston is near, `inching` gives the pulses of a step, or none, and 9 is skipped.
+//!    Otherwise F\* is that of the position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics`,
+//!    which uses `switching_curve`.
+//! 9. F\*, limited to what the supply can deliver, is turned into two pressures (`allocation`) and their pulses
 //!    (`pulse_planner`).
 //! 10. The on-times of the next tick are cut out of the plan (`due`).
 //!
-//! Gains and thresholds stand in [`crate::tuning`], all of them, each with its unit, its reason, and file and name of
-//! the test that guards it; what follows from them and from the axis data, in [`AxisModel`]. Formats are those of
-//! [`crate::observer`]; beside them k and D 1/s × 2^8, a_b whole mm/s², the ramp mN × 2^8, on-times whole µs.
+//! All gains and thresholds are in [`crate::tuning`], each with its unit, its reason, and the file and name of the test
+//! that guards it. What follows from them and from the axis data is in [`AxisModel`]. Formats are those of
+//! [`crate::observer`]; in addition k and D are in 1/s × 2^8, a_b in whole mm/s², the ramp in mN × 2^8, on-times in
+//! whole µs.
 //!
-//! The files have times as: T_t tick, T period, T_d dead time from the moment of the observer, T_r dead time from the
-//! tick that works; and the deceleration towards the target as a_b.
+//! Symbols used in these files: T_t tick, T period, T_d dead time from the observer's moment, T_r dead time from the
+//! tick that does the work, a_b deceleration towards the target.
 //!
-//! Assumes: a stroke that is true; delays of the valves that are as specified ([`crate::observer::valve_delay`] says
-//! how they are found); ticks of the length for which the [`AxisModel`] was made, none left out. What else each part
-//! assumes is in its file. Where that does not hold:
+//! Assumes: a true stroke; valve delays as specified ([`crate::observer::valve_delay`] says how to find them); ticks of
+//! the length for which the [`AxisModel`] was made, with none left out. Each part states its further assumptions in its
+//! own file. Where they do not hold:
 //!
 //! | what happens | what follows |
 //! |---|---|
-//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`): it hands over the last good stroke; two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the data, the air counts as unknown |
-//! | a frozen potentiometer | the node misses the motion (`no_motion_detector.rs` there) |
-//! | no new reference | the node lets the last one run on at its speed for one bus cycle, then stand; when it gives the master up it shuts the valves. The law comes to rest at what it is given |
-//! | somebody else drives the valves | `handover`: the observer counts what they send; when the law acts again, its standstill, ramp and preload begin anew (if the other part had the last tick of a period), all else goes on |
-//! | the supply is lower than specified | nobody notices it. The estimate of a filled chamber is too high and pulses do less than planned; while the piston slides the load takes the difference, so the speed is kept after some 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is off ([`crate::observer::mass`] says how far that is believed) |
+//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`) and passes on the last good stroke. Two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the axis data, the state of the air counts as unknown |
+//! | a frozen potentiometer | the node notices the missing motion (`no_motion_detector.rs` there) |
+//! | no new reference | the node lets the last one continue at its speed for one bus cycle and then stand; when it gives up on the master it shuts the valves. The law comes to rest at whatever reference it is given |
+//! | somebody else drives the valves | `handover`: the observer counts what they send. When the law acts again, its standstill, ramp and preload start afresh (if the other part had the last tick of a period); everything else continues |
+//! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers after some 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
-//! | friction that is not as specified | shows as load; what is fed forward beyond it makes a relay near the target: it is faded out there (`standstill`) |
+//! | friction that is not as specified | it appears as load. Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
-//! Tests stand at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
-//! `preload` are in `tests.rs` here and in `tests/preload.rs`. What all of it is worth in the closed loop:
-//! `tests/system/control_bars.rs`.
+//! Tests are at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
+//! `preload` are in `tests.rs` here and in `tests/preload.rs`. `tests/system/control_bars.rs` shows what all of it is
+//! worth in the closed loop.
 //!
-//! Three frictions are used on purpose: the observer and the predictor count 0.92 of Coulomb friction, because counting
-//! more than there is would hide speed; `inverse_dynamics` feeds all of it forward; `standstill` counts on 0.85 of it where friction
-//! has to stop the piston.
+//! Three values of friction are used on purpose. The observer and the predictor use 0.92 of Coulomb friction, because
+//! more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward. `standstill` relies on
+//! 0.85 of it where friction has to stop the piston.
 
 mod allocation;
 mod dead_time_predictor;
@@ -101,23 +105,23 @@ use standstill::{Approach, Standstill};
 use switching_curve::SpeedGains;
 use wheeleg_units::{Duty, VelocityMmS};
 
-/// What the law gives in a tick.
+/// Output of the law in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drive {
     /// On-times of the next tick, µs.
     pub on: OnTimes,
     /// Estimated speed.
     pub velocity: VelocityMmS,
-    /// Force asked for as a share of what the supply can give, in steps of 2^-14.
+    /// Demanded force as a share of what the supply can deliver, in steps of 2^-14.
     pub duty: Duty,
     /// At rest at the reference.
     pub settled: bool,
-    /// The force asked for is beyond what the supply can give.
+    /// The demanded force is more than the supply can deliver.
     pub limited: bool,
 }
 
-/// State of the law and of its observer. It keeps no coefficients: every call is given those of the
-/// axis, which must be the same from call to call.
+/// State of the law and of its observer. It holds no coefficients: every call is given those of the axis, which must be
+/// the same from call to call.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Predictive {
     observer: Observer,
@@ -130,28 +134,28 @@ pub struct Predictive {
 
     /// A stroke has been measured.
     primed: bool,
-    /// The law decides about the coils, not somebody else.
+    /// The law commands the coils, and nobody else.
     drives: bool,
-    /// Tick of the period that comes next.
+    /// Index in its period of the tick that comes next.
     tick_of_period: u8,
-    /// Begin of the present period, µs; wraps. In the last tick of a period, once that is observed, of the next.
+    /// Start of the present period, µs; wraps. In the last tick of a period, once that has been observed, start of the
+    /// next.
     begin: u32,
     /// Stroke of the last tick, raw mm.
     measured: i32,
-    /// On-times of the present period from its begin, µs.
+    /// On-times of the present period, counted from its start, µs.
     plan: OnTimes,
-    /// For how long somebody else had the valves open in it, without their delays, µs.
+    /// How long somebody else had the valves open in the present period, without switching delays, µs.
     external: OnTimes,
 
-    /// For the record: the share of the force that was asked for, as far as it is possible, and whether it
-    /// is not.
+    /// For the record: the deliverable part of the demanded force as a share, and whether the demand exceeded it.
     duty: Duty,
     limited: bool,
 }
 
 impl Predictive {
-    /// At rest. Chambers that a precharge fills before the law drives count as half full and in balance
-    /// from power-up on: the middle is wrong by the least. Others count as vented.
+    /// At rest. If a precharge fills the chambers before the law drives, they count as half full and in balance from
+    /// power-up on, since the middle is least wrong; otherwise as vented.
     #[must_use]
     pub fn new(model: &AxisModel) -> Self {
         let pressures = if model.precharged {
@@ -182,7 +186,6 @@ impl Predictive {
         }
     }
 
-    /// Its observer.
     #[must_use]
     pub const fn observer(&self) -> &Observer {
         &self.observer
@@ -200,7 +203,7 @@ impl Predictive {
         self.observer.pressures()
     }
 
-    /// Mass in use, kg × 2^16: as specified, or learnt.
+    /// Mass in use, kg × 2^16: as specified or as learnt.
     #[must_use]
     pub const fn mass(&self) -> i32 {
         self.observer.inertia.mass
@@ -212,14 +215,14 @@ impl Predictive {
         self.standstill.is_at_rest()
     }
 
-    /// Whether the next tick ends a period: it is the one with all the work.
+    /// Whether the next tick ends a period: that tick does all the work.
     #[must_use]
     pub const fn plans(&self) -> bool {
         self.tick_of_period.saturating_add(1) >= PERIOD_TICKS
     }
 
-    /// A tick of the law's own; on-times for the next tick, which are sent. The law begins to decide at the
-    /// end of a period, once all is counted that somebody else has sent.
+    /// One tick in which the law drives; returns the on-times to send for the next tick. The law starts to decide at
+    /// the end of a period, once everything that somebody else sent has been counted.
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
         if self.ends_period(input.measured) {
             self.observe_period(model, input.measured);
@@ -246,16 +249,16 @@ impl Predictive {
         }
     }
 
-    /// On-times of the next tick by the plan.
+    /// On-times of the next tick according to the plan.
     fn due(&self, model: &AxisModel) -> OnTimes {
         let tick = model.times.tick as u16;
-        // The tick after the last of a period is the first of the next one, whose plan is new.
+        // After the last tick of a period comes the first of the next one, whose plan is new.
         let next = self.tick_of_period.wrapping_add(1) % PERIOD_TICKS;
         let gone = tick.wrapping_mul(u16::from(next));
         self.plan.map(|on| on.saturating_sub(gone).min(tick))
     }
 
-    /// The pulses of the next period.
+    /// Plans the pulses of the next period.
     fn plan_period(&mut self, model: &AxisModel, input: &JointInput) {
         let reference = input.reference.raw();
         let reference_speed = input.reference_velocity.raw();
@@ -311,7 +314,7 @@ impl Predictive {
         self.make_force(model, force, preload.is_none() && self.standstill.is_near());
     }
 
-    /// What a step on coarse valves wants of the next period; preload or seat may decide instead.
+    /// What a step on coarse valves demands for the next period; `None` if preload or seat decides.
     fn inch(&mut self, model: &AxisModel, input: &JointInput, decides: bool) -> Option<Inch> {
         let reference_rests = input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS;
         if decides || !reference_rests || !inching::is_coarse(model, self.gains.half_is_enough) {
@@ -339,14 +342,14 @@ impl Predictive {
         demand.force(model, self.ramp, &self.standstill)
     }
 
-    /// All valves shut as soon as the pulses under way allow.
+    /// Shuts all valves as soon as the pulses under way allow.
     fn shut(&mut self, model: &AxisModel) {
         self.plan = pulse_planner::shut(model, &self.observer, self.begin);
         self.limited = false;
         self.duty = Duty::ZERO;
     }
 
-    /// Pulses that make a force, mN; near the target, of one chamber alone.
+    /// Plans pulses that make a force, mN; near the target, pulses of one chamber only.
     fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
         let possible = allocation::possible_force(model, force);
         let target = self.swap.targets(model, possible, self.observer.expected());

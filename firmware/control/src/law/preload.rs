@@ -1,4 +1,4 @@
-//! Preload: ahead of an announced move the force stands at the edge of slipping in its direction.
+//! Preload: ahead of an announced move the force is brought to the edge of slipping in its direction.
 //!
 //! ```text
 //! F* = ½ Fc sgn(next − x₀) − load           the edge of slipping, in the direction of the move
@@ -6,32 +6,32 @@
 //! ```
 //!
 //! Fc: Coulomb friction, load: as in [`crate::observer::motion`], F expected: pressure force at the end of the dead
-//! time, mN; x₀: stroke when the preload began, next: the announced one, mm. Source: this project (decision 38).
+//! time, mN; x₀: stroke when the preload began, next: the announced target, mm. Source: this project (decision 38).
 //!
-//! The counter chamber vents and the drive chamber fills ahead of time, and the piston stands. This takes the
-//! paper's 0.25 s of delay out of a known move (`docs/guide/delay.md`).
+//! The counter chamber vents and the drive chamber fills ahead of time while the piston stands. This takes the paper's
+//! 0.25 s of delay out of a known move (`docs/guide/delay.md`).
 //!
-//! **It begins** where a piston is in REST at its target and a move of more than one band is announced; also where one
-//! stands within a millimetre of an end stop, with a target that rests more than a millimetre behind the stop or, if
-//! patience is over, less than one before it. At first it does not act: more than Fc/2 must be missing, as later on.
-//! With the net force N = F expected + load, |½ Fc sgn(next − x₀) − N| is missing. So where N is zero, or points along
-//! the move and is not above Fc, no pulse is sent, and a full counter chamber stays full. An N that points the other
-//! way is turned round.
+//! **It begins** when the piston is in REST at its target and a move of more than one band is announced. It also begins
+//! when the piston stands within 1 mm of an end stop and its resting target is more than 1 mm beyond the stop or, once
+//! patience is over, beyond it or less than 1 mm before it. At first it does not act: as later on, more than Fc/2 must
+//! be missing. With the net force N = F expected + load, |½ Fc sgn(next − x₀) − N| is missing. So where N is zero, or
+//! points along the move and is not above Fc, no pulse is sent, and a full counter chamber stays full. An N that points
+//! the other way is reversed.
 //!
-//! **It pauses** once the force is there, and the counter chamber no longer lags: the valves stay shut until the force
-//! is more than half the friction off. A piston that rests is not kept at the edge by pulses. The force alone is not
-//! enough: by the pressure swap two full chambers make it, too, and one of them would have to vent when the move
+//! **It pauses** once the force is reached and the counter chamber no longer lags: the valves stay shut until the force
+//! is off by more than half the friction. A resting piston is not kept at the edge by pulses. The force alone is not
+//! enough: with the pressure swap two full chambers make it, too, and one of them would have to vent when the move
 //! begins.
 //!
-//! **It ends** with the announcement, with a target more than one band from the old one (where that does not end REST,
-//! a preload begins anew a period later), or with the rest; and while the piston is more than two bands from x₀. While it
-//! lasts, `standstill` is not worked out: REST stays REST. Of an announcement that is not followed nothing is left but the
-//! air.
+//! **It ends** when the announcement or the rest ends, or with a target more than one band from the old one (where that
+//! does not end REST, a preload begins again a period later). It is suspended while the piston is more than two bands
+//! from x₀. While it lasts, `standstill` is not updated: REST stays REST. An announcement that is not followed leaves
+//! nothing behind but the air.
 //!
-//! Assumes: at least half of the friction that is specified, so that the piston stands; that the observer's load and
-//! pressures are right to the other half; the move as announced. If the supply falls, the drive chamber has less than
-//! was estimated: the force is short of the edge, the piston stands, and the move begins later. The counter chamber
-//! vents as before.
+//! Assumes: at least half of the specified friction, so that the piston stands; that the errors of the observer's load
+//! and pressures are covered by the other half; the move as announced. If the supply falls, the drive chamber has less
+//! pressure than estimated: the force falls short of the edge, the piston stands, and the move begins later. The
+//! counter chamber vents as before.
 //!
 //! Config [`AxisModel`], state [`Preload`], update [`Predictive::preload`].
 
@@ -44,36 +44,36 @@ use crate::tuning::{
     REFERENCE_RESTS,
 };
 
-/// A move that is awaited.
+/// An awaited move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Preload {
-    /// Where the piston stood when it was announced, raw mm; `None` without one.
+    /// Where the piston stood when the move was announced, raw mm; `None` without an announcement.
     place: Option<i32>,
-    /// Pulses are sent: more than half of the friction was missing, and the force is not there yet, or is made against a
-    /// counter chamber that lags.
+    /// Pulses are sent: more than half of the friction was missing, and either the force is not yet reached, or the
+    /// counter chamber still lags.
     pub(super) acts: bool,
 }
 
-/// What an announced move asks for.
+/// What an announced move demands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Awaited {
     /// A force, mN.
     Force(i32),
-    /// No pulse: the force is there, or was near enough from the begin.
+    /// No pulse: the force is reached, or was near enough from the start.
     Ready,
 }
 
 impl Predictive {
-    /// What an announced move asks for, as it is awaited; `None` if there is none, or one of a band at most, and if the
-    /// piston is on its way or has begun to move.
+    /// What an announced move demands while it is awaited. `None` without an announcement, for a move of at most one
+    /// band, and if the piston is on its way or has begun to move.
     pub(super) fn preload(
         &mut self,
         model: &AxisModel,
         input: &JointInput,
         stands: bool,
     ) -> Option<Awaited> {
-        // A move is awaited where the last one ended, not in the midst of that; against a stop with the target
-        // behind it, or where patience is over, the piston need not rest.
+        // A move is awaited where the last one ended, not in the middle of it. The piston need not rest against a stop
+        // with the target beyond it, or where patience is over.
         let reference_rests = input.reference_velocity.raw().wrapping_abs() <= REFERENCE_RESTS;
         let motion = &self.observer.motion;
         let pressed = stands

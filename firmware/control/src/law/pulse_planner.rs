@@ -6,30 +6,31 @@
 //! ```
 //!
 //! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean
-//! of the pressure now and that expected. L: length of the chamber at the end of the dead time. Source: this project,
-//! decision 7; flow by ISO 6358-1.
+//! of the present and the expected pressure. L: length of the chamber at the end of the dead time. Source: this
+//! project, decision 7; flow by ISO 6358-1.
 //!
-//! Pulses are timed to the microsecond and may outlast a period: what is left of one is decided again in the next
-//! period, when it may be made longer, but not shorter than the shortest pulse. An opening below the shortest (the
+//! Pulses are timed to the microsecond and may outlast a period. The rest of a pulse is decided again in the next
+//! period, when it may be lengthened, but not cut to less than the shortest pulse. An opening below the shortest (the
 //! shortest on-time − t_on + t_off) is rounded to that or to nothing, whichever is nearer.
 //!
 //! Each chamber is planned by itself, for its own pressure. The coils of its two valves are never on together: the
 //! valve that would undo a change goes off as soon as its own pulse allows, and the other one waits for that. Near the
-//! target (`standstill` has counted more than four periods within 24 bands), and with no coil on, only the longer of the
-//! two chambers' pulses is sent: both may be too much of valves that cannot open for less. A preload sends both.
-//! A valve still shutting does not keep the other one's coil off: their openings overlap where t_off is longer than t_on.
+//! target (`standstill` has counted more than four periods within 24 bands), and with no coil on, only the longer of
+//! the two chambers' pulses is sent: both may be too much with valves that cannot open for less. A preload sends both.
+//! A valve still shutting does not keep the other one's coil off: their openings overlap where t_off is longer than
+//! t_on.
 //!
-//! **Grain.** A chamber has half of a force to make (`allocation`), and is left as it is if half of its shortest
-//! opening would be too much. So the least force that makes a pulse is about that of one shortest opening,
-//! F_1 of `switching_curve`. A smaller one is not stored: the next period asks again, and in a piston that stands the
-//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse, or `standstill` lets the piston rest. Pulses of A and B whose forces oppose each other come about where both pressures are to
-//! rise, or both to fall; for the small difference of their forces `inching` alone chooses them.
+//! **Grain.** A chamber has half of a force to make (`allocation`), and is left alone if half of its shortest opening
+//! would already be too much. So the least force that makes a pulse is about that of one shortest opening, F_1 of
+//! `switching_curve`. A smaller demand is not stored: the next period demands again, and on a standing piston the
+//! break-away ramp adds to it (`inverse_dynamics`) until it makes a pulse or `standstill` lets the piston rest. Pulses
+//! of A and B with opposing forces occur where both pressures are to rise, or both to fall; only `inching` chooses them
+//! deliberately, for the small difference of their forces.
 //!
-//! Assumes: a flow that stays the same over the pulse; what the piston's motion does to the pressure is in the expected
-//! one alone; delays of the valves as specified within their margin; supply and atmosphere as specified. If the supply
-//! falls, a fill valve passes less than planned, the observer counts what was planned, and only what
-//! is seen of the motion makes up for it: the load where the piston slides, the ramp where it stands. Vent valves do what
-//! they should.
+//! Assumes: a constant flow over the pulse; the effect of the piston's motion on the pressure only through the expected
+//! pressure; valve delays as specified, within their margin; supply and atmosphere as specified. If the supply falls, a
+//! fill valve passes less than planned while the observer counts what was planned. Only the observed motion corrects
+//! this: through the load while the piston slides, through the ramp while it stands. Vent valves do what they should.
 //!
 //! Config [`AxisModel`]; no state: what a valve can do follows from its track. Update [`plan`].
 
@@ -44,16 +45,16 @@ use crate::tuning::{OPENING_LONGEST, PRESSURE_RATE_LEAST, PULSE_LENGTHENED_LEAST
 /// What a valve can do in the next period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ready {
-    /// Its coil is on, and this is left of its shortest pulse, µs.
+    /// Its coil is on; this much is left of its shortest pulse, µs.
     On(i32),
-    /// Shut, for long enough to begin a pulse.
+    /// It has been shut for long enough to begin a pulse.
     Shut,
-    /// It would not shut in between.
+    /// It has been off for too short a time: it would not shut before a new pulse.
     Shuts,
 }
 
 impl Ready {
-    /// In the period that begins `next`, up to which the coil is decided.
+    /// State in the period that begins at `next`, up to which the coil has been decided.
     fn of(track: &ValveTrack, next: u32, times: &ValveTimes) -> Self {
         let elapsed = track.elapsed(next);
         if track.coil() {
@@ -65,7 +66,7 @@ impl Ready {
         }
     }
 
-    /// On-time of the period for no opening beyond what is [`ValveTrack::committed`].
+    /// On-time in the period if nothing is to open beyond what is [`ValveTrack::committed`].
     fn rest(self, times: &ValveTimes) -> u16 {
         match self {
             Self::On(left) => microseconds(left, times),
@@ -73,15 +74,15 @@ impl Ready {
         }
     }
 
-    /// On-time of the period for `need` µs of opening beyond what is
-    /// [`ValveTrack::committed`]; `rival` is the chamber's other valve.
+    /// On-time in the period for `need` µs of opening beyond what is [`ValveTrack::committed`]; `rival` is the
+    /// chamber's other valve.
     fn on_time(self, need: i32, rival: Self, times: &ValveTimes) -> u16 {
         match self {
             Self::On(left) if need < PULSE_LENGTHENED_LEAST => microseconds(left, times),
             Self::On(left) => microseconds(left.saturating_add(need), times),
             Self::Shut if !matches!(rival, Self::On(_)) => {
                 let shortest = times.shortest_opening();
-                // Rounded to what can be made: errs by half of it at most.
+                // Rounds to what can be made; the error is at most half of it.
                 if need <= shortest >> 1 {
                     return 0;
                 }
@@ -92,12 +93,12 @@ impl Ready {
     }
 }
 
-/// On-time, µs, that opens a shut valve for so many µs.
+/// On-time, µs, that opens a shut valve for this many µs.
 pub(super) fn on_for(opening: i32, times: &ValveTimes) -> i32 {
     opening.saturating_add(times.on).saturating_sub(times.off)
 }
 
-/// An on-time, 0…period (at most 8000).
+/// Limits an on-time to 0…period (at most 8000).
 fn microseconds(on: i32, times: &ValveTimes) -> u16 {
     on.max(0).min(times.period) as u16
 }
@@ -107,22 +108,22 @@ fn ready(chamber: &Chamber, next: u32, times: &ValveTimes) -> [Ready; 2] {
     [&chamber.fill, &chamber.vent].map(|track| Ready::of(track, next, times))
 }
 
-/// How fast an open valve's `power` changes the pressure in a chamber of `n_per_length`, 1/256 Pa per 16 µs.
+/// Rate of pressure change through an open valve of this `power` in a chamber of `n_per_length`, 1/256 Pa per 16 µs.
 fn rate(power: i32, n_per_length: i32) -> i32 {
     // 2^8 Pa mm/s × n/L.
     mul_shr(power, n_per_length, 22).max(PRESSURE_RATE_LEAST)
 }
 
-/// Opening, µs, in which an open valve's `power` changes the pressure by `change` (1/256 Pa, not
-/// negative) in a chamber of `n_per_length`.
+/// Opening, µs, in which an open valve of this `power` changes the pressure by `change` (1/256 Pa, not negative) in a
+/// chamber of `n_per_length`.
 fn opening(power: i32, change: i32, n_per_length: i32) -> i32 {
-    // Of at most 5 bar: below 2^31, and more than a period can make.
+    // Limited to 5 bar: below 2^31, and more than a period can make.
     let size = change.min(500_000 << 8).wrapping_shl(4);
     size.checked_div(rate(power, n_per_length)).unwrap_or(0)
 }
 
-/// On-times of the next period that bring a chamber of `length` (raw mm) from what is expected to `target`,
-/// fill and vent.
+/// On-times of the next period, fill and vent, that bring a chamber of `length` (raw mm) from its expected pressure to
+/// `target`.
 fn pulses(
     model: &AxisModel,
     chamber: &Chamber,
@@ -134,7 +135,7 @@ fn pulses(
     let [fill, vent] = ready(chamber, next, times);
     let n_per_length = model.exponent_per_length(length);
     let change = target.saturating_sub(chamber.expected);
-    // Of the pressure between now and the end of the dead time.
+    // At the mean of the pressures now and at the end of the dead time.
     let mean = chamber.pressure.saturating_add(chamber.expected) >> 1;
     if change > 0 {
         let need = opening(model.fill_power(choked_speed, mean), change, n_per_length);
@@ -149,7 +150,7 @@ fn pulses(
     }
 }
 
-/// On-times of the next period, which begins `next`, for these pressures.
+/// On-times of the next period, which begins at `next`, for these pressures.
 pub(super) fn plan(
     model: &AxisModel,
     observer: &Observer,
@@ -184,10 +185,10 @@ pub(super) fn plan(
     [fill_a, vent_a, fill_b, vent_b]
 }
 
-/// An open valve on a piston at rest, at the pressure that its chamber is expected to have.
+/// An open valve of a piston at rest, at the expected pressure of its chamber.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Valve {
-    /// Power over area, as in [`AxisModel::fill_power`].
+    /// Power over area, as given by [`AxisModel::fill_power`].
     power: i32,
     /// [`AxisModel::exponent_per_length`] of the chamber.
     n_per_length: i32,
@@ -200,18 +201,18 @@ pub(super) struct Valve {
 }
 
 impl Valve {
-    /// By how much the shortest opening changes the force, mN, not negative.
+    /// Change of force that the shortest opening makes, mN, not negative.
     pub(super) fn finest(&self) -> i32 {
         let rate = rate(self.power, self.n_per_length);
         mul_shr(mul_shr_sat(rate, self.shortest, 4), self.force, 32)
     }
 
-    /// Pressure that makes a force of so many mN, 1/256 Pa.
+    /// Pressure that makes this force, mN, in 1/256 Pa.
     pub(super) fn pressure(&self, force: i32) -> i32 {
         mul_shr_sat(force, self.pressure, 12)
     }
 
-    /// Opening that changes the pressure by so much (1/256 Pa), µs, at least the shortest.
+    /// Opening, µs, that changes the pressure by `change` (1/256 Pa), at least the shortest.
     pub(super) fn opening(&self, change: i32) -> i32 {
         opening(self.power, change, self.n_per_length)
             .max(self.shortest)
@@ -249,7 +250,7 @@ pub(super) fn valves(model: &AxisModel, observer: &Observer) -> [Valve; 4] {
     [fill_a, vent_a, fill_b, vent_b]
 }
 
-/// Whether every valve may begin a pulse in the period that begins `next`.
+/// Whether every valve can begin a pulse in the period that begins at `next`.
 pub(super) fn all_ready(model: &AxisModel, observer: &Observer, next: u32) -> bool {
     [&observer.a, &observer.b].iter().all(|chamber| {
         ready(chamber, next, &model.times)
@@ -258,7 +259,7 @@ pub(super) fn all_ready(model: &AxisModel, observer: &Observer, next: u32) -> bo
     })
 }
 
-/// Everything shut as soon as the pulses under way allow.
+/// Shuts everything as soon as the pulses under way allow.
 pub(super) fn shut(model: &AxisModel, observer: &Observer, next: u32) -> OnTimes {
     let times = &model.times;
     let rest = |chamber: &Chamber| ready(chamber, next, times).map(|valve| valve.rest(times));
@@ -283,8 +284,8 @@ mod tests {
         shortest_gap: 2350,
     };
 
-    /// From half of the shortest opening on a pulse is sent, which is never shorter than the
-    /// shortest, nor longer than the period.
+    /// A pulse is sent from half of the shortest opening upwards. It is never shorter than the shortest, nor longer
+    /// than the period.
     #[test]
     fn a_pulse_is_worth_its_opening() {
         let on = |need| Ready::Shut.on_time(need, Ready::Shut, &TIMES);
@@ -299,15 +300,15 @@ mod tests {
         assert_eq!(Ready::Shut.on_time(2400, Ready::On(0), &TIMES), 0);
     }
 
-    /// Where nothing flows any more, 50 Pa are asked for in a millisecond.
+    /// Where nothing flows any more, the rate is taken as 50 Pa per millisecond.
     #[test]
     fn a_chamber_at_its_end_asks_for_a_pulse_that_ends() {
         let ms = opening(0, 1000 << 8, 1 << 20);
         assert!((ms - 20_000).abs() < 100, "{ms}");
     }
 
-    /// Of a piston in balance at mid stroke the least force that makes a pulse is that of the finest one: each chamber has
-    /// half of it to make, and half of what its shortest opening makes is enough for a pulse.
+    /// For a piston in balance at mid stroke the least force that makes a pulse is that of the finest pulse: each
+    /// chamber has half of it to make, and half of what its shortest opening makes is enough for a pulse.
     #[test]
     fn the_least_force_that_makes_a_pulse_is_that_of_the_finest() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");

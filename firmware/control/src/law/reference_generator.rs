@@ -1,7 +1,7 @@
-//! Reference generator: from steps of the command to a motion that a piston can follow.
+//! Reference generator: turns steps of the command into a motion that a piston can follow.
 //!
-//! Second order, time-optimal within a speed and an acceleration, after the text-book profile of
-//! a double integrator; with a reference governor that lets it lead the piston by little:
+//! It is second order and time-optimal within a speed and an acceleration, after the text-book profile of a double
+//! integrator; a reference governor limits its lead over the piston:
 //!
 //! ```text
 //! d = target − r                                  distance that is left
@@ -14,48 +14,48 @@
 //!
 //! r, measured, target, d, e, ℓ in mm; v, v*, v_max in mm/s; a in mm/s². Source: the profile is text-book (Biagiotti
 //! and Melchiorri, Trajectory Planning for Automatic Machines and Robots); the governor is that of Gilbert and
-//! Kolmanovsky in its simplest form: only the pace is held back, never the target.
+//! Kolmanovsky in its simplest form: it holds back only the pace, never the target.
 //!
-//! It ends, r = target and v = v_target, as soon as a step would reach the target; this last change of v may be more
-//! than a T_t. A new target, at any time, is gone for from the present r and v.
+//! The profile ends, with r = target and v = v_target, as soon as a step would reach the target; this last change of v
+//! may exceed a T_t. A new target is accepted at any time and approached from the present r and v.
 //!
-//! A reference that runs away from a piston that has not begun to move asks for a speed that no valve gives: the piston
-//! then overshoots. For a piston that is stuck the reference goes on braking from 2 ℓ on: it stops at most 2 ℓ + v²/(2
-//! a) ahead, v being its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s, 1500 mm/s² and 4 mm). Where
-//! the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever watches the piston must
-//! compare it with the command.
+//! If the reference ran away from a piston that has not begun to move, it would demand a speed that no valve can
+//! deliver, and the piston would then overshoot. For a stuck piston the reference only brakes from a lead of 2 ℓ on: it
+//! stops at most 2 ℓ + v²/(2 a) ahead, where v is its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s,
+//! 1500 mm/s² and 4 mm). If the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever
+//! supervises the piston must compare it with the command.
 //!
 //! Assumes: a tick of 1 ms and a call in every tick, whatever tick the law is made for (the joint board has this tick,
-//! and calls it in `firmware/node/src/joint/reference.rs`); v_max and a that the axis can follow; a measured stroke
-//! that is true; a target that rests or moves evenly. If the supply falls, the piston lags, and the governor keeps the
-//! reference by it; of a target that moves it holds back only the approach, not v_target.
+//! and calls it in `firmware/node/src/joint/reference.rs`); v_max and a that the axis can follow; a true measured
+//! stroke; a target that rests or moves evenly. If the supply falls, the piston lags, and the governor keeps the
+//! reference close to it; for a moving target it holds back only the approach, not v_target.
 //!
-//! Config [`GeneratorConfig`], state [`Reference`], update [`Reference::update`]; without an acceleration in the
-//! board's parameters it is left out, and the law follows the command. Guarded by the tests at the end of this file: it
-//! has no row in [`crate::tuning`], its limits are parameters of the board.
+//! Config [`GeneratorConfig`], state [`Reference`], update [`Reference::update`]. Without an acceleration in the
+//! board's parameters it is left out, and the law follows the command. It is guarded by the tests at the end of this
+//! file: it has no row in [`crate::tuning`], because its limits are parameters of the board.
 
 use crate::math::square_root;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
-/// Ticks of 1 ms in a second.
+/// Ticks of 1 ms per second.
 const TICKS_PER_SECOND: i64 = 1000;
-/// Raw steps in a unit: I16F16.
+/// Raw steps per unit: I16F16.
 const ONE: i64 = 1 << 16;
-/// As near to the target as this the reference is there, raw mm (30 nm).
+/// The reference counts as arrived within this distance of the target, raw mm (30 nm).
 const THERE: i64 = 2;
 
-/// Limits of the reference, one set an axis.
+/// Limits of the reference, one set per axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GeneratorConfig {
     /// Largest speed, v_max.
     pub speed: VelocityMmS,
-    /// Acceleration a, mm/s², more than 0.
+    /// Acceleration a, mm/s², positive.
     pub acceleration: i32,
     /// Lead ℓ.
     pub lead: PositionMm,
 }
 
-/// A reference on its way.
+/// A reference, on its way or at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Reference {
     /// r.
@@ -74,8 +74,8 @@ impl Reference {
         }
     }
 
-    /// The reference of the next tick towards `target`, which itself moves at its velocity, with
-    /// the piston at `measured`; and whether it is so far from the target that v_max limits it.
+    /// The reference of the next tick towards `target`, which itself moves at its velocity, with the piston at
+    /// `measured`; and whether it is so far from the target that v_max limits it.
     #[must_use]
     pub fn update(
         self,
@@ -89,7 +89,7 @@ impl Reference {
         let sign = if missing < 0 { -1 } else { 1 };
         let acceleration = i64::from(config.acceleration);
 
-        // (mm/s)² × 2^16 has a root in mm/s × 2^8; beyond 32 bits 2^-10 of it has 2^-5 of that.
+        // The root of (mm/s)² × 2^16 is in mm/s × 2^8. Beyond 32 bits, 2^-10 of the square has 2^-5 of that root.
         let square = acceleration.saturating_mul(2).saturating_mul(distance);
         let root = match u32::try_from(square) {
             Ok(square) => i64::from(square_root(square)) << 8,
@@ -148,7 +148,7 @@ mod tests {
         lead: PositionMm::from_int(4),
     };
 
-    /// References of every tick towards `target`, with a piston that is where `piston` says.
+    /// References of every tick towards `target`, with a piston at the position that `piston` returns.
     fn run(
         from: i16,
         target: i16,
@@ -187,7 +187,7 @@ mod tests {
             } else {
                 2.0 * (distance / 2500.0).sqrt()
             };
-            // The last of the parabola is cut off by the sampling.
+            // Sampling cuts off the end of the parabola.
             let expected = expected * 1000.0;
             assert!(
                 (f64::from(ticks) - expected).abs() < 12.0,
@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// How far the reference stops ahead of a piston at 100 mm that is stuck, in mm, if it begins there at `speed` mm/s.
+    /// How far, in mm, the reference stops ahead of a piston stuck at 100 mm, if it starts there at `speed` mm/s.
     fn ahead_of_a_stuck_piston(config: &GeneratorConfig, speed: i16, target: i16) -> f64 {
         let stuck = PositionMm::from_int(100);
         let target = Reference::at(PositionMm::from_int(target));
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    /// The braking distance comes on top: from one lead on at the earliest, from two at the latest.
+    /// The braking distance is added, starting from one lead at the earliest and two at the latest.
     #[test]
     fn a_piston_that_jams_lets_the_reference_run_on_by_its_braking_distance() {
         for (config, speed) in [(CONFIG, 250), (ROBOT, 350)] {

@@ -1,4 +1,4 @@
-//! The seat at an end stop: where the target is a stop, a force instead of a position.
+//! The seat at an end stop: where the target is a stop, force control replaces position control.
 //!
 //! ```text
 //! seat: the target rests within 0.5 mm of the stop or behind it, the piston is within 3 mm of it and at most 60 mm/s fast
@@ -6,25 +6,26 @@
 //! rest: within 1.5 mm of the target, |v| < 3 mm/s, and F expected > ¾ F* towards the stop
 //! ```
 //!
-//! A cushion, a load or the give of the stop holds a piston some tenths of a millimetre beside a
-//! target at the very end of the stroke: beyond every rest band of a position law, which then
-//! pulses for ever. Pressed against its stop it may rest. Its chambers then make three
-//! break-away forces more than balance, by `allocation` as everywhere: only where F_in limits them is one full or the
-//! other empty. The observer follows the air from the pulses. It is not told that this is a stop. An axis without precharge has no seat: the air of it would make a
-//! start without notice 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
+//! A cushion, a load or the compliance of the stop holds a piston some tenths of a millimetre from a target at the very
+//! end of the stroke. That is outside every rest band of a position law, which then pulses for ever. Pressed against
+//! its stop, the piston may rest. Its chambers then make three break-away forces beyond balance, by `allocation` as
+//! everywhere: only where F_in limits them is one full or the other empty. The observer follows the air from the
+//! pulses; it is not told that this is a stop. An axis without precharge has no seat: with its air a start
+//! without notice would come 20 ms later (`docs/decisions/0042-robot-on-the-predictive-law.md`).
 //!
-//! A piston that rests here is pressed again when it is 1.5 mm off its target, not before: what its force has become
-//! does not count. **The seat ends** as soon as its condition above does not hold: a target 0.5 mm or more from the
+//! A piston that rests here is pressed again only once it is 1.5 mm off its target; what has become of its force does
+//! not matter. **The seat ends** as soon as its condition above no longer holds: a target 0.5 mm or more before the
 //! stop, a reference faster than 1 mm/s, a piston 3 mm off or faster than 60 mm/s. A new target as near to the stop as
-//! the old one ends nothing. A preload goes before the seat. What was PRESS goes on as from SERVO; what was REST,
-//! by the rules of REST (`standstill`). A target more than 1.5 mm behind the stop is pressed at for ever.
+//! the old one ends nothing. A preload has priority over the seat. After PRESS the standstill logic continues as from
+//! SERVO; after REST, by the rules of REST (`standstill`). A target more than 1.5 mm beyond the stop is pressed at for
+//! ever.
 //!
 //! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
 //! and Craig 1981).
 //!
-//! Assumes: the length of the stroke, as specified, is right to 0.5 mm; break-away friction and supply as specified;
-//! chambers that a precharge has filled, so that the expected force is right to a quarter. If the supply falls, the
-//! expected force is too high, and the piston rests pressed by less than 3 Fb.
+//! Assumes: a specified stroke length that is right to 0.5 mm; break-away friction and supply as specified; chambers
+//! filled by a precharge, so that the expected force is right to a quarter. If the supply falls, the expected force is
+//! overestimated, and the piston rests pressed by less than 3 Fb.
 //!
 //! Config [`AxisModel`]; no state of its own: PRESS and REST are those of `standstill`. Update [`Predictive::seat`].
 
@@ -36,17 +37,17 @@ use crate::tuning::{
     SEATED_WITHIN, STILL_SPEED,
 };
 
-/// A piston at the end stop that is its target.
+/// A piston at an end stop that is its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Seat {
-    /// To be pressed against it, mN.
+    /// It is to be pressed against the stop with this force, mN.
     Press(i32),
-    /// Pressed against it: it may rest.
+    /// It is pressed against the stop and may rest.
     Seated,
 }
 
 impl Predictive {
-    /// The seat at the reference; `None` if that is no end stop, or the piston is not there yet.
+    /// The seat at the reference; `None` if the reference is no end stop, or the piston is not there yet.
     pub(super) fn seat(&self, model: &AxisModel, input: &JointInput) -> Option<Seat> {
         let reference = input.reference.raw();
         let motion = &self.observer.motion;

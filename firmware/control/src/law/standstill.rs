@@ -1,4 +1,4 @@
-//! Standstill: when the valves stay shut, a state machine.
+//! Standstill: a state machine that decides when the valves stay shut.
 //!
 //! ```text
 //!           in the band and slow, or friction stops it there   for more than 6 periods
@@ -11,50 +11,51 @@
 //!         the seat ends
 //! ```
 //!
-//! Worked out once a period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The
-//! valves are shut in CATCH, PAUSE and REST. All but REST and PRESS follow from the period alone: CATCH, if the piston
-//! is caught; if not, PAUSE, if one is under way; otherwise SERVO.
+//! Updated once per period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The valves
+//! are shut in CATCH, PAUSE and REST. All states but REST and PRESS follow from the period alone: CATCH if the piston
+//! is caught; otherwise PAUSE if one is under way; otherwise SERVO.
 //!
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (|e| − band) < m v²/2 <
-//!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v; counted on within 12 bands of the target and while F_s is at
+//!   F_s (|e| + band), F_s = 0.85 Fc − (F + load) sgn v. This is used within 12 bands of the target and while F_s is at
 //!   least Fc/4.
-//! * **Patience** counts the periods within 24 bands of a target that rests, and down again otherwise; not in REST. It
-//!   is over after 100 (0.4 s). Then a heavy piston is asked for half the acceleration (`inverse_dynamics`); the
-//!   friction that is fed forward fades, between 132 and 260 periods; and from 220 on band and slow speed grow, up to
-//!   2.4 times at 400, the band to 0.4 mm at most. Each target more than one band from the last one begins with all of
-//!   its patience.
-//! * **Pause.** Where patience is over, the law waits with the valves shut each time the piston enters the band at 40
-//!   mm/s at most, for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB), 25
-//!   to 250 periods: no limit cycle lasts. The pause ends before that when the piston is faster than 40 mm/s, or more
-//!   than 2 mm off, with a new target, or when the reference moves; a period counts for eight while the piston stands
-//!   (|v| < 3 mm/s) beside the band. It goes on counting in CATCH. REST and PRESS do not count: what is left of it goes on
-//!   after them, but not after a seat that was reached, which clears pause and patience.
+//! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
+//!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
+//!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
+//!   the slow speed grow, up to 2.4 times at 400, the band to 0.4 mm at most. Each target more than one band from the
+//!   last one starts with full patience.
+//! * **Pause.** Once patience is over, each time the piston enters the band at no more than 40 mm/s the law waits with
+//!   the valves shut, for one oscillation of the mass on the air, T_o = 2π √(m / k_air), k_air = n p (AA²/VA + AB²/VB),
+//!   25 to 250 periods: no limit cycle lasts. The pause ends early when the piston is faster than 40 mm/s or more than
+//!   2 mm off, with a new target, or when the reference moves. A period counts as eight while the piston stands (|v| <
+//!   3 mm/s) beside the band. The pause continues to count in CATCH, but not in REST and PRESS: what is left of it
+//!   resumes after them, except after a seat that was reached, which clears pause and patience.
 //! * **Release.** REST ends
-//!   - at once, when the reference moves (faster than 1 mm/s), with the patience of the third case;
-//!   - at once, when it has gone more than one band from the target of this rest, if the stroke measured is also out of
-//!     the band of release there. A new target so near that it is not, ends no rest: it becomes the target of it;
-//!   - without a new target, in the fifth period in a row out of the band of release. Then patience goes on from 100
-//!     periods at least.
+//!   - at once, when the reference moves (faster than 1 mm/s), with patience as in the third case;
+//!   - at once, when the reference has moved more than one band from the target of this rest, if the measured stroke is
+//!     also outside the band of release of the new target. If it is not outside, the new target does not end the rest
+//!     but becomes its target;
+//!   - without a new target, in the fifth consecutive period outside the band of release. Patience then continues from
+//!     at least 100 periods.
 //!
-//!   The band of release is the present band and one of the axis data more, but at most 0.45 mm or, where that is more,
-//!   the present band and half of that of the axis data. If the axis data's release is more, it counts, but not for a
-//!   new target.
-//! * A reference that moves faster than 1 mm/s is never rested at: SERVO.
+//!   The band of release is the present band plus one band of the axis data, but at most 0.45 mm or, where that is
+//!   more, the present band plus half a band of the axis data. If the axis data's own release is larger, it applies
+//!   instead, but not for a new target.
+//! * A reference that moves faster than 1 mm/s always means SERVO, never rest.
 //!
 //! e: error of the estimated stroke, mm; v: speed, mm/s; F, load, Fc: pressure force, load and Coulomb friction, mN; m:
 //! mass in use, kg; n = 1.2; p: mean of supply and atmosphere, Pa; VA, VB: volume of each chamber at mid stroke, m³;
-//! AA, AB: areas, m²; k_air: N/m; T_o: s. "The band", also in the stopping distance, is the present one,
-//! which patience widens; the 24 bands, and the one band of a new target, are those of the axis data (0.12 mm on the
-//! bench). Times are in periods of four ticks: 4 ms with ticks of 1 ms.
+//! AA, AB: areas, m²; k_air: N/m; T_o: s. "The band", also in the stopping distance, is the present one, which patience
+//! widens; the 24 bands, and the one band of a new target, are those of the axis data (0.12 mm on the bench). Times are
+//! in periods of four ticks: 4 ms with ticks of 1 ms.
 //!
-//! Assumes: friction of at least 0.85 of the specified one, where it is counted on; that shut valves hold the air, so
-//! that a piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a
-//! piston at rest stays there: nothing of it asks for air. One on its way may lack the force to arrive: it stays in
-//! SERVO, its band widens no further than 2.4 times, and supervision sees the error. REST learns nothing about the
-//! force: a load that grows beyond friction moves the piston out of the band of release, and SERVO acts again, with the
-//! ramp as it was.
+//! Assumes: where friction is relied on, at least 0.85 of the specified value; that shut valves hold the air, so that a
+//! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
+//! rest stays there, because rest needs no air. A piston on its way may lack the force to arrive: it stays in SERVO,
+//! its band widens by no more than 2.4 times, and supervision sees the error. REST learns nothing about the force: a
+//! load that grows beyond friction moves the piston out of the band of release, and SERVO acts again, with the ramp as
+//! it was.
 //!
-//! Source: hysteresis of a friction-locked actuator (Hodgson et al. 2012 shut all valves in a band, too); patience and
+//! Source: hysteresis of a friction-locked actuator (Hodgson et al. 2012 also shut all valves in a band); patience and
 //! pause are our own, found by search against limit cycles (`docs/decisions/0038-control-as-observer-and-law.md`).
 //!
 //! Config [`AxisModel`], state [`Standstill`], update [`Standstill::update`].
@@ -71,7 +72,7 @@ use crate::tuning::{
     WIDENS_SHIFT,
 };
 
-/// Periods in which the band widens by one.
+/// Periods in which the band widens by its own width.
 const WIDENS_STEP: i32 = 1 << WIDENS_SHIFT;
 
 /// What the standstill logic has decided.
@@ -80,7 +81,7 @@ pub(super) enum State {
     /// The position servo acts.
     #[default]
     Servo,
-    /// Valves shut for what is left of an oscillation.
+    /// Valves shut for the rest of an oscillation.
     Pause,
     /// Valves shut: friction stops the piston.
     Catch,
@@ -90,28 +91,28 @@ pub(super) enum State {
     Press,
 }
 
-/// Rest at a target, and how long it has been tried.
+/// Rest at a target, and how long it has been attempted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Standstill {
     state: State,
     /// Raw mm.
     target: i32,
-    /// The target has changed, and the piston has not come to rest at the new one.
+    /// The target has changed, and the piston has not yet come to rest at the new one.
     aimed: bool,
     /// Periods near the target without coming to rest: patience is over beyond [`PATIENCE`].
     near: u16,
-    /// In the band in the last period.
+    /// The piston was in the band in the last period.
     inside: bool,
     /// Periods in [`State::Catch`].
     caught: u16,
-    /// What is left of the pause under way, periods; 0 without one.
+    /// Periods left of the pause under way; 0 without one.
     pause: u16,
     /// Periods outside the band of release.
     outside: u16,
 }
 
 impl Standstill {
-    /// As somebody else drives: the next target is one only beside `stroke`, raw mm.
+    /// State while somebody else drives: only a target away from `stroke`, raw mm, is a new one.
     pub(super) fn at(stroke: i32) -> Self {
         Self {
             target: stroke,
@@ -129,12 +130,12 @@ impl Standstill {
         matches!(self.state, State::Pause | State::Catch | State::Rest)
     }
 
-    /// Whether it rests at the present target.
+    /// Whether the piston rests at the present target.
     pub(super) const fn holds(&self) -> bool {
         self.is_at_rest() && !self.aimed
     }
 
-    /// Whether it has been near its target without coming to rest for longer than patience allows.
+    /// Whether the piston has been near its target without coming to rest for longer than patience allows.
     pub(super) const fn patience_is_over(&self) -> bool {
         self.near > PATIENCE
     }
@@ -144,7 +145,7 @@ impl Standstill {
         self.near > NEAR_PERIODS
     }
 
-    /// Takes over the reference; gives whether it is another target: more than one band from the last one.
+    /// Takes over the reference. Returns whether it is a new target: more than one band from the last one.
     pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
         let other = reference.saturating_sub(self.target).saturating_abs() > model.band;
         if other {
@@ -182,7 +183,7 @@ impl Standstill {
                 return;
             }
             self.caught = 0;
-            // One that has left its place has had its patience; a new target is tried with a new one.
+            // A piston that has left its place has used up its patience; a new target gets a fresh one.
             if !self.aimed {
                 self.near = self.near.max(PATIENCE);
             }
@@ -199,7 +200,7 @@ impl Standstill {
             .reference
             .saturating_sub(now.motion.stroke)
             .saturating_abs();
-        // A band of at most 5 mm, below 2^19, times up to 24: all of it fits.
+        // A band is at most 5 mm, below 2^19; times up to 24 all of it fits.
         self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
             self.near.wrapping_add(1).min(patience_most())
         } else {
@@ -226,7 +227,7 @@ impl Standstill {
         }
     }
 
-    /// Whether a piston at rest stays so.
+    /// Whether a resting piston stays at rest.
     fn stays(&mut self, model: &AxisModel, now: &Approach, reference_rests: bool) -> bool {
         let band = self.band(model);
         let beyond = model.band.wrapping_mul(RELEASE_BEYOND_SIXTEENTHS) >> 4;
@@ -236,7 +237,8 @@ impl Standstill {
             .wrapping_shr(4)
             .wrapping_add(band)
             .min(RELEASE_WIDEST.max(band.wrapping_add(beyond)));
-        // The ground pushes a standing joint to and fro. A target that has moved is another matter.
+        // The ground pushes a standing joint to and fro, so its release may be wide. A new target is a different
+        // matter.
         let release = if self.aimed {
             release
         } else {
@@ -249,15 +251,15 @@ impl Standstill {
             return true;
         }
         self.outside = self.outside.wrapping_add(1);
-        // A new target is no noise.
+        // A new target is not noise.
         reference_rests && !self.aimed && self.outside < RELEASE_PERIODS
     }
 
-    /// Act and wait. Where acting alone has not brought the piston to rest for long,
-    /// each gentle entry into the band is followed by a pause with the valves shut, about one
-    /// oscillation on the air of the chambers: a piston that oscillates on it, or on the bristles of
-    /// its friction, comes to rest by itself, and every pulse meant to help would keep it
-    /// going. One that leaves, because the forces on it are not in balance, is not waited for.
+    /// Alternates between acting and waiting. Where acting alone has not brought the piston to rest for a long time,
+    /// each gentle entry into the band is followed by a pause with the valves shut, of about one oscillation on the air
+    /// of the chambers. A piston that oscillates on that air, or on the bristles of its friction, comes to rest by
+    /// itself, and every pulse meant to help would keep it going. A piston that leaves because the forces on it are not
+    /// in balance is not waited for.
     fn wait(&mut self, model: &AxisModel, now: &Approach, speed: i32, error: i32, inside: bool) {
         let entered = inside && !self.inside;
         self.inside = inside;
@@ -280,7 +282,7 @@ impl Standstill {
         i32::from(self.near.saturating_sub(PATIENCE))
     }
 
-    /// What is added to `base`, up to 1.4 times it, where patience is over for long.
+    /// What is added to `base`, up to 1.4 times it, long after patience is over.
     fn widened(&self, base: i32) -> i32 {
         let beyond = self.beyond().wrapping_sub(WIDENS_AFTER);
         let beyond = beyond.max(0);
@@ -296,8 +298,8 @@ impl Standstill {
             .min(BAND_WIDEST.max(narrow))
     }
 
-    /// What is fed forward for friction that is less than told makes a relay: where
-    /// the piston does not come to rest, it fades.
+    /// Feeding forward more than the real friction makes a relay, so friction fades where the piston does not come to
+    /// rest.
     pub(super) fn faded(&self, friction: i32) -> i32 {
         let left = (FADES_AFTER + WIDENS_STEP)
             .saturating_sub(self.beyond())
@@ -306,7 +308,7 @@ impl Standstill {
     }
 }
 
-/// Periods near a target that are counted.
+/// Largest count of periods near a target.
 fn patience_most() -> u16 {
     if is_without(Part::Patience) {
         PATIENCE
@@ -315,7 +317,7 @@ fn patience_most() -> u16 {
     }
 }
 
-/// Periods of an oscillation of a mass (kg × 2^16) on the air of both chambers, 25…250.
+/// Periods of one oscillation of a mass (kg × 2^16) on the air of both chambers, 25…250.
 #[inline]
 fn oscillation(model: &AxisModel, mass: i32) -> u16 {
     let square_8 = mul_shr_sat(mass, model.oscillation, 16);
@@ -323,7 +325,7 @@ fn oscillation(model: &AxisModel, mass: i32) -> u16 {
     periods.clamp(OSCILLATION_PERIODS_MIN, OSCILLATION_PERIODS_MAX) as u16
 }
 
-/// How the piston comes to its target.
+/// How the piston approaches its target.
 pub(super) struct Approach<'a> {
     /// Raw mm.
     pub(super) reference: i32,
@@ -340,9 +342,8 @@ pub(super) struct Approach<'a> {
 }
 
 impl Approach<'_> {
-    /// Whether friction alone stops the piston within the band, if the valves shut:
-    /// the distance is the kinetic energy over what friction has left beside the
-    /// forces that act.
+    /// Whether friction alone stops the piston within the band if the valves shut. The stopping distance is the kinetic
+    /// energy divided by the friction that the acting forces leave.
     #[inline]
     fn stops_within(&self, model: &AxisModel, band: i32) -> bool {
         let speed = self.motion.speed.wrapping_shr(8);

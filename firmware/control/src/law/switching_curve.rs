@@ -1,4 +1,4 @@
-//! Proximate time-optimal switching curve: the speed towards a target, by the distance that is left.
+//! Proximate time-optimal switching curve: the speed towards a target as a function of the remaining distance.
 //!
 //! ```text
 //! e_l  = a_b / k²                            where straight line and parabola meet, with one slope
@@ -20,26 +20,26 @@
 //! `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm. `inverse_dynamics` may lower
 //! a_b under a load.
 //!
-//! **Half is enough.** A piston that stands off its target by e is asked to move by the force m D k e
-//! (`inverse_dynamics`), with friction and ramp beside it. Two halves meet on its way to the valves: `allocation` gives
-//! half of a force to each chamber, and `pulse_planner` sends a pulse for more than half of what the shortest opening
-//! makes. So the least force that makes a pulse is ½ F_1 / ½ = F_1, not ½ F_1 (in balance at mid stroke 0.9
-//! to 1.25 F_1, by the other valve and the rod). Where the condition holds, all of the
-//! acceleration makes a pulse from one band on, and half of it from two bands on: there a piston at rest is released,
-//! too, and the band in which it may rest grows to 2.4 bands (`standstill`). More than that only drives a heavy piston
-//! on: `inverse_dynamics` takes half of it where patience is over. Where the condition does not hold, which is for
-//! light pistons, half of it would make no pulse within two bands.
+//! **Half is enough.** A piston that stands off its target by e is moved by the force m D k e (`inverse_dynamics`),
+//! plus friction and ramp. Two halves meet on the way to the valves: `allocation` gives half of a force to each
+//! chamber, and `pulse_planner` sends a pulse for more than half of what the shortest opening makes. So the least force
+//! that makes a pulse is ½ F_1 / ½ = F_1, not ½ F_1 (in balance at mid stroke 0.9 to 1.25 F_1, depending on the other
+//! valve and the rod). Where the condition holds, the full acceleration makes a pulse from one band on, and half of it
+//! from two bands on; at two bands a piston at rest is also released, and the band in which it may rest grows to 2.4
+//! bands (`standstill`). More than that only keeps a heavy piston moving, so `inverse_dynamics` takes half of it where
+//! patience is over. Where the condition does not hold, as for light pistons, half of it would make no pulse within two
+//! bands.
 //!
-//! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot
-//! removes the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve
-//! serves 1 and 400 mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are
-//! searched ([`crate::tuning`]). Within the limits of k and a_b, e_l does not depend on the mass.
+//! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot removes
+//! the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve serves 1 and 400
+//! mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are searched
+//! ([`crate::tuning`]). Within the limits of k and a_b, e_l does not depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as specified, the mass that is in use; and that a force can be built up
-//! within about a dead time, which the nimble mass stands for. If the supply falls, the curve stays as it is: the force
-//! that it asks for comes later or not at all, and the piston falls behind it or runs past the target.
+//! Assumes: dead time, supply and conductance as specified; the mass in use; and that a force can be built up within
+//! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that
+//! it demands comes later or not at all, and the piston falls behind the curve or overshoots the target.
 //!
-//! Config [`AxisModel`] and [`SpeedGains`], which is made anew with each mass that is learnt; no state; update
+//! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each newly learnt mass; no state; update
 //! [`SpeedGains::speed`].
 
 use crate::ablation::{Part, is_without};
@@ -47,7 +47,7 @@ use crate::axis::AxisModel;
 use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root, within};
 use crate::tuning::{MASS_MIN, SLOPE_LEAST};
 
-/// What of the law follows from the moving mass; worked out when that changes.
+/// The part of the law that depends on the moving mass; recomputed when the mass changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct SpeedGains {
     /// Slope of the straight line k, 1/s × 2^8.
@@ -58,12 +58,12 @@ pub(super) struct SpeedGains {
     pub(super) brake: i32,
     /// 1/(2 k²), s² × 2^32.
     linear: i32,
-    /// Half of the acceleration is enough near the target: it makes a pulse from two rest bands on.
+    /// Half of the acceleration is enough near the target: it still makes a pulse from two rest bands on.
     pub(super) half_is_enough: bool,
 }
 
 impl SpeedGains {
-    /// For a mass in kg × 2^16.
+    /// For this mass, kg × 2^16.
     pub(super) fn new(model: &AxisModel, mass: i32) -> Self {
         let mass = mass.max(MASS_MIN);
         let share = if mass > model.nimble_mass {
@@ -77,7 +77,8 @@ impl SpeedGains {
         // 2^32 / (2 k²) with k × 2^8, below 2^16: 2^47 / k².
         let square = slope.cast_unsigned().wrapping_mul(slope.cast_unsigned());
         let damping = mul_shr(model.damping, share, 16);
-        // Below 256/s and 680/s: 2^18/s². Of 200 kg times 12 below 2^30 mN/mm, and of a band of 5 mm below 2^33 mN.
+        // Below 256/s and 680/s: 2^18/s². Times 200 kg and 12 it is below 2^30 mN/mm, and times a band of 5 mm below
+        // 2^33 mN.
         let stiffness = mul_shr(slope, damping, 16);
         let stiffness = i64::from(mass)
             .wrapping_mul(stiffness.into())
@@ -89,23 +90,23 @@ impl SpeedGains {
             slope,
             damping,
             half_is_enough: edge > i64::from(model.pulse_force),
-            // Below 2^18 mm/s², 27 g: the curve takes it × 2^13.
+            // Below 2^18 mm/s², 27 g: the curve uses it × 2^13.
             brake: mul_shr(model.brake, mul_shr(share, share, 16), 16).min((1 << 18) - 1),
             linear: quotient(1 << 47, square, 0),
         }
     }
 
-    /// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8, for a
-    /// deceleration of at most `brake` (mm/s²).
+    /// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8, for a deceleration of at most
+    /// `brake` (mm/s²).
     pub(super) fn speed(&self, error: i32, brake: i32, top: i32) -> (i32, i32) {
-        // Half of e_l: a_b / (2 k²), mm/s² × s² × 2^32 to raw mm.
+        // Half of e_l, a_b / (2 k²): from mm/s² × s² × 2^32 to raw mm.
         let half = mul_shr_sat(brake, self.linear, 16);
         let size = error.saturating_abs();
         if size <= half.saturating_mul(2) || is_without(Part::Parabola) {
             let line = mul_shr_sat(self.slope, error, 8);
             return (within(line, top), self.slope);
         }
-        // (32 v)² = 2 a_b e × 2^10, e raw: × 2^11 / 2^16.
+        // (32 v)² = 2 a_b e × 2^10; with raw e: × 2^11 / 2^16.
         let square = i64::from(brake)
             .wrapping_mul(i64::from(size.saturating_sub(half)))
             .wrapping_shr(5);
@@ -135,8 +136,8 @@ mod tests {
     use crate::axis::AxisData;
     use wheeleg_units::{Micros, PositionMm};
 
-    /// Against the formulas of the text, from a tenth of a millimetre to the whole stroke; and the line
-    /// meets the parabola without a step in speed or slope.
+    /// Compares with the documented formulas, from a tenth of a millimetre to the whole stroke; the line meets the
+    /// parabola without a step in speed or slope.
     #[test]
     fn the_curve_is_a_line_and_a_parabola_that_meet_smoothly() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
@@ -191,7 +192,7 @@ mod tests {
         }
     }
 
-    /// From the mass on at which an error of the band asks for the finest pulse, by the formula of the text.
+    /// Half is enough from the mass at which an error of one band demands the finest pulse, by the documented formula.
     #[test]
     fn half_is_enough_where_an_error_of_the_band_asks_for_more_than_the_finest_pulse() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
@@ -214,7 +215,7 @@ mod tests {
         assert!(enough.iter().all(|cases| *cases > 1), "{enough:?}");
     }
 
-    /// One slope a second at least: half of 1/k² has to fit 2^-32 s².
+    /// At least 1/s, because half of 1/k² has to fit 2^-32 s².
     #[test]
     fn the_slope_of_the_heaviest_mass_fits_its_format() {
         let data = AxisData {
@@ -229,8 +230,7 @@ mod tests {
         assert_eq!(speed, 1 << 10, "a millimetre a second for a millimetre");
     }
 
-    /// A light piston behind large and fast valves: brake × 2^13 must fit 32 bits, or the
-    /// curve would turn its sign.
+    /// A light piston behind large and fast valves: brake × 2^13 must fit 32 bits, or the curve would change its sign.
     #[test]
     fn the_brake_of_the_lightest_and_fastest_axis_fits_its_format() {
         let data = AxisData {
@@ -248,7 +248,7 @@ mod tests {
         };
         let model = AxisModel::new(&data, Micros(1000)).expect("in range");
         assert!(model.brake > 1 << 18, "{}", model.brake);
-        // The largest that still fits times 2^13.
+        // The largest value that still fits when multiplied by 2^13.
         let gains = SpeedGains::new(&model, model.mass);
         assert_eq!(gains.brake, i32::MAX >> 13);
     }

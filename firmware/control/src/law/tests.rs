@@ -1,4 +1,4 @@
-//! Who decides about the valves, what the law asks for, and what it keeps.
+//! Who commands the valves, what the law demands, and what it keeps.
 
 use super::*;
 extern crate std;
@@ -19,7 +19,7 @@ fn input(measured_mm: i16, reference_mm: i16) -> JointInput {
     }
 }
 
-/// A law in the middle of a move, after so many ticks.
+/// A law in the middle of a move, after this many ticks.
 fn moving(model: &AxisModel, ticks: u32) -> Predictive {
     let mut law = Predictive::new(model);
     for tick in 0..ticks {
@@ -29,7 +29,7 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
     law
 }
 
-/// Every bit that the law keeps is in its `Hash`: any that is flipped changes the sum.
+/// Every bit of the law's state is in its `Hash`: flipping any of them changes the sum.
 #[test]
 fn the_hash_covers_what_is_kept() {
     use core::hash::{Hash, Hasher};
@@ -76,7 +76,7 @@ fn the_hash_covers_what_is_kept() {
     }
 }
 
-/// A reference that moves is followed, not rested at.
+/// A moving reference is followed; the piston does not rest at it.
 #[test]
 fn a_moving_reference_is_not_rested_at() {
     let model = model();
@@ -93,10 +93,10 @@ fn a_moving_reference_is_not_rested_at() {
     }
 }
 
-/// After a stop in the middle of a move nothing of its force is left.
+/// After a stop in the middle of a move nothing is left of its force.
 #[test]
 fn a_move_after_a_stop_does_not_begin_with_the_force_of_the_one_before() {
-    // Moved by hand, as no force moves a piston: nothing is to be learnt from it.
+    // Moved by hand, as no force moves a piston, so that nothing can be learnt from it.
     let data = AxisData {
         learns_mass: false,
         ..AxisData::default()
@@ -115,8 +115,8 @@ fn a_move_after_a_stop_does_not_begin_with_the_force_of_the_one_before() {
     }
 }
 
-/// However slow the valves are to shut, the law begins no pulse of a chamber before those of
-/// somebody else have had their time for it.
+/// However slow the valves are to shut, the law begins no pulse of a chamber before those that somebody else sent have
+/// had their time to shut.
 #[test]
 fn a_law_that_takes_over_waits_until_the_valves_have_shut() {
     for valve_off in [2000, 6000, 20_000] {
@@ -134,7 +134,7 @@ fn a_law_that_takes_over_waits_until_the_valves_have_shut() {
                 law.observe(&model, PositionMm::from_int(90));
                 law.external_on_times(&[1000, 0, 0, 1000]);
             }
-            // The coils are on in the tick that begins; what is given is sent a tick later.
+            // The coils are on in the tick that begins; what is returned is sent a tick later.
             let mut first = None;
             for tick in 1..80 {
                 let [fill_a, _, _, vent_b] = law.drive(&model, &input(90, 170)).on;
@@ -153,8 +153,8 @@ fn a_law_that_takes_over_waits_until_the_valves_have_shut() {
     }
 }
 
-/// What somebody else sends is counted once, whatever the strokes in which that began and ended, also
-/// where the law takes over in the midst of it.
+/// What somebody else sends is counted once, whatever the strokes at which it began and ended, and also if the law
+/// takes over in the middle of it.
 #[test]
 fn what_somebody_else_sends_is_counted_once() {
     let model = model();
@@ -172,7 +172,7 @@ fn what_somebody_else_sends_is_counted_once() {
                 law.drive(&model, &input(90, 90));
                 assert!(law.drives || tick < 4, "{before} {ticks}");
             }
-            // Choked: of C ρ0 R T p_s a share of the volume, n times as much in pressure.
+            // Choked: pressure rises at n C ρ0 R T p_s over the volume.
             let length = f64::from(model.length_a(90 << 16)) / 65_536.0;
             let flow = f64::from(model.choked_speed_a) / 65_536.0;
             let open_s = f64::from(ticks) * 600e-6;
@@ -184,7 +184,7 @@ fn what_somebody_else_sends_is_counted_once() {
     }
 }
 
-/// A plan that is cut counts as far as it was sent, tick by tick.
+/// A plan that is cut short counts as far as it was sent, tick by tick.
 #[test]
 fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
     let model = model();
@@ -194,9 +194,9 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
         [a.fill, a.vent, b.fill, b.vent]
     };
     let mut opened = 0;
-    // From the begin of periods in which the law is busy.
+    // Starts at the beginning of periods in which the law is busy.
     for period in 20..60 {
-        // The first tick of a period has been given by the last of the one before.
+        // The last tick of the period before has already returned the first tick of this one.
         let mut begun = Predictive::new(&model);
         let mut first = [0; 4];
         for tick in 0..4 * period {
@@ -207,7 +207,7 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
         let begin = begun.begin;
         for sent_ticks in 0..4 {
             let mut law = begun.clone();
-            // The same valves, told tick by tick.
+            // The same valves, reported tick by tick.
             let mut told = tracks(&law);
             let mut given = first;
             for tick in 0..=sent_ticks {
@@ -229,7 +229,7 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
                 assert!(!cut.coil(), "{period} {sent_ticks} {valve}");
                 let mut from = start.wrapping_sub(times.period as u32);
                 if observed {
-                    // The period has been passed.
+                    // The period is over.
                     told.passes(from, times.period);
                     from = start;
                 }
@@ -246,7 +246,7 @@ fn a_plan_that_is_cut_counts_as_far_as_it_was_sent() {
     assert!(opened > 100_000, "{opened}");
 }
 
-/// A tick whose on-times were not sent is not counted.
+/// A tick whose on-times were not sent does not count.
 #[test]
 fn what_was_planned_but_stopped_does_not_count() {
     let model = model();
@@ -263,7 +263,7 @@ fn what_was_planned_but_stopped_does_not_count() {
     }
 }
 
-/// A law that takes over plans nothing before it has wanted a force.
+/// A law that takes over plans nothing before it has demanded a force.
 #[test]
 fn the_first_plan_follows_a_force_that_was_wanted() {
     let model = model();
@@ -279,12 +279,12 @@ fn the_first_plan_follows_a_force_that_was_wanted() {
                 first = Some(tick);
             }
         }
-        // A period at most until it wants, and the rest of that.
+        // At most one period until it demands a force, and the rest of that period.
         assert!(first.is_some_and(|tick| tick <= 7), "{observed}: {first:?}");
     }
 }
 
-/// A precharged axis; its piston at a stroke (1/10 mm) and speed, with so much force (N) expected.
+/// A precharged axis whose piston is at this stroke (1/10 mm) and speed, with this expected force (N).
 fn at_a_stop(tenths: i32, speed_mm_s: i32, force_n: i32) -> (AxisModel, Predictive) {
     let data = AxisData {
         precharged: true,
@@ -300,7 +300,7 @@ fn at_a_stop(tenths: i32, speed_mm_s: i32, force_n: i32) -> (AxisModel, Predicti
     (model, law)
 }
 
-/// Seated is a slow piston near an end stop that is its target, once three times the break-away force presses it.
+/// A slow piston near an end stop that is its target is seated once three times the break-away force presses it.
 #[test]
 fn a_seat_has_its_target_zone_speed_and_force() {
     let seat = |reference: i32, stroke: i32, speed: i32, force: i32| {

@@ -1,27 +1,29 @@
-//! Identification of a move: the mass, and where within their bounds the pressures were, by least squares.
+//! Identification from a move: the mass, and where within their bounds the pressures were, by least squares.
 //!
-//! While the piston slides one way, the impulse of the estimated force is linear in what the model does not know:
+//! While the piston slides in one direction, the impulse of the estimated force is linear in what the model does not
+//! know:
 //!
 //! ```text
 //! J(i) = Σ (F − d v) = m (v(i) − v₀)/T + c i − uA Σ wA + uB Σ wB        i: periods since the piston slides
 //!   wA = AA (pA⁺ − pA⁻)      width of the bounds, as a force        u: error of the pressure as a share of it
 //! ```
 //!
-//! J in mN · periods, w in mN, u within ±1, the rest as in [`super::mass`]: c is Coulomb friction less load. The air's
-//! error fades as a chamber is filled, is vented or grows, in the same way as the widths; that distinguishes it from
-//! mass and load. Normal equations of the four unknowns, summed in every move, with a ridge that holds the shares at
-//! zero where the move reveals little.
+//! J in mN · periods, w in mN, u within ±1, the rest as in [`super::mass`]: c is Coulomb friction less load. The
+//! pressure error fades as a chamber is filled, is vented or grows, in the same way as the width of its bounds; that
+//! distinguishes it from mass and load. The normal equations of the four unknowns are summed in every move, with a
+//! ridge that keeps the shares at zero where the move reveals little.
 //!
-//! Solved once, when a move has ended that tells a mass ([`super::mass`]) and in which the bounds were far apart. Its
-//! mass replaces the one by three instants; the pressures are corrected by u times the width of their bounds, within
-//! these, and an eighth of the width on either side stays in doubt ([`super::pressure::Chamber::correct`]). Equations
-//! that do not tell the unknowns apart leave the mass by three instants, and the pressures.
+//! They are solved once, when a move has ended that determines a mass ([`super::mass`]) and in which the bounds were
+//! far apart. The resulting mass replaces the one from three instants. The pressures are corrected by u times the width
+//! of their bounds, within these, and remain uncertain by an eighth of the width on either side
+//! ([`super::pressure::Chamber::correct`]). If the equations cannot separate the unknowns, the mass from three instants
+//! and the pressures stay.
 //!
 //! Source: Ljung, System Identification, ch. 7; ridge: Hoerl and Kennard 1970.
 //!
-//! Assumes: load and friction that are constant in the move, so none that ends in a cushion; bounds that hold the true
-//! pressures. If the supply has fallen, they may not ([`super::pressure`]), and what is found is limited to them. At a
-//! standstill nothing is learnt: then a pressure cannot be distinguished from a load (Pandian et al. 2002).
+//! Assumes: load and friction constant over the move, so not a move that ends in a cushion; bounds that contain the
+//! true pressures. If the supply has fallen, they may not ([`super::pressure`]), and the result is limited to them. At
+//! standstill nothing is learnt: there a pressure cannot be distinguished from a load (Pandian et al. 2002).
 //!
 //! Config [`AxisModel`], state [`Regression`], updates [`Regression::add`] and [`Regression::solve`].
 
@@ -29,7 +31,7 @@ use crate::axis::AxisModel;
 use crate::math::mul_shr_sat;
 use crate::tuning::{AIR_RESIDUAL, AIR_SHARE_SHIFT};
 
-/// Mass, constant force, errors of both pressures; and the impulse beside them.
+/// Mass, constant force, errors of both pressures; the impulse is the right-hand side.
 const UNKNOWNS: usize = 4;
 /// Bits of a normalised equation.
 const BITS: i32 = 28;
@@ -38,7 +40,7 @@ const FRACTION: u32 = 20;
 
 type Rows = [[i64; UNKNOWNS + 1]; UNKNOWNS];
 
-/// The sums of one move, of which the upper triangle is used. Forces are shares of the largest, × 2^12.
+/// The sums of one move; only the upper triangle is used. Forces are shares of the largest, × 2^12.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Regression {
     impulse: i32,
@@ -46,7 +48,7 @@ pub(crate) struct Regression {
     sums: Rows,
 }
 
-/// What a move tells.
+/// What a move reveals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Identified {
     /// kg × 2^16.
@@ -64,7 +66,7 @@ fn shifted(value: i64, shift: i32) -> i64 {
     }
 }
 
-/// Bits of a size.
+/// Bits of the absolute value.
 const fn bits(value: i64) -> i32 {
     64_i32.wrapping_sub(value.unsigned_abs().leading_zeros() as i32)
 }
@@ -75,8 +77,9 @@ fn share(model: &AxisModel, force: i32) -> i32 {
 }
 
 impl Regression {
-    /// A period in which the force but for friction was `used` and the bounds of the pressures were `widths` apart, mN;
-    /// `gained` is the speed since the begin, raw mm/s, and `periods` their number since then.
+    /// Adds a period in which the force less viscous friction was `used` and the bounds of the pressures were `widths`
+    /// apart, mN. `gained` is the speed gained since the start, raw mm/s, and `periods` the number of periods since
+    /// then.
     pub(crate) fn add(
         &mut self,
         model: &AxisModel,
@@ -90,7 +93,7 @@ impl Regression {
             *sum = sum.saturating_add(share(model, width));
         }
         let [a, b] = self.widths;
-        // Speeds in quarters of a mm/s. All below 2^23, products below 2^46, of at most 250 periods.
+        // Speeds in quarters of a mm/s. All are below 2^23 and products below 2^46, for at most 250 periods.
         let row = [
             i64::from(gained.wrapping_shr(14)),
             i64::from(periods),
@@ -105,7 +108,7 @@ impl Regression {
         }
     }
 
-    /// Mean of both widths together over `periods`, as a share of the largest force × 2^12.
+    /// Sum of both widths, averaged over `periods`, as a share of the largest force × 2^12.
     pub(crate) fn width(&self, periods: u16) -> i32 {
         let [a, b] = self.widths;
         a.saturating_add(b)
@@ -113,14 +116,14 @@ impl Regression {
             .unwrap_or(0)
     }
 
-    /// The unknowns; `None` where the equations do not tell them apart.
+    /// The unknowns; `None` if the equations cannot separate them.
     #[cold]
     pub(crate) fn solve(&self, model: &AxisModel) -> Option<Identified> {
         let (rows, scales, scale) = self.normalised()?;
         let [mass, _, a, b] = solution(rows)?;
         let [mass_scale, _, a_scale, b_scale] = scales;
         let mass = shifted(mass, scale.wrapping_sub(mass_scale));
-        // Shares of the largest force × 2^12 over quarters of a mm/s, × 2^20 to kg × 2^16.
+        // From shares of the largest force × 2^12 over quarters of a mm/s, × 2^20, to kg × 2^16.
         let mass = mass
             .saturating_mul(i64::from(model.force_out))
             .wrapping_shr(12)
@@ -136,8 +139,8 @@ impl Regression {
         })
     }
 
-    /// The equations with the ridge, each unknown scaled by a power of two so that its own sum has 27 or 28 bits; the
-    /// powers, and that of the impulse.
+    /// The equations with the ridge, each unknown scaled by a power of two so that its own sum has 27 or 28 bits; also
+    /// the exponents of these scales and that of the impulse.
     fn normalised(&self) -> Option<(Rows, [i32; UNKNOWNS], i32)> {
         let mut rows = self.sums;
         let ridge = AIR_RESIDUAL
@@ -159,7 +162,7 @@ impl Regression {
                 *value = shifted(*value, own.wrapping_add(other).wrapping_neg());
             }
         }
-        // The lower triangle is that of the upper one.
+        // The lower triangle mirrors the upper one.
         let upper = rows;
         for (index, row) in (0..).zip(rows.iter_mut()) {
             for (value, from) in row.iter_mut().zip(upper).take(index) {
@@ -206,8 +209,8 @@ mod tests {
     use crate::axis::AxisData;
     use wheeleg_units::Micros;
 
-    /// A move of 300 ms with this mass, and with pressures that are wrong by these shares of bounds that close as the
-    /// chambers are filled and vented; 12 N of load and friction.
+    /// A move of 300 ms with this mass, with pressures that are wrong by these shares of bounds that close as the
+    /// chambers are filled and vented, and with 12 N of load and friction.
     fn moved(model: &AxisModel, mass_kg: f64, shares: [f64; 2]) -> Identified {
         let mut regression = Regression::default();
         let (mut speed, mut a_n, mut b_n) = (20.0, 180.0, 150.0);
@@ -233,7 +236,7 @@ mod tests {
                 let found = moved(&model, mass_kg, shares);
                 let learnt = f64::from(found.mass) / 65_536.0;
                 let context = format_args!("{mass_kg} {shares:?}: {learnt} {:?}", found.shares);
-                // The ridge takes a part of the shares, and the mass some of that.
+                // The ridge takes part of the shares, and the mass takes some of that.
                 assert!((learnt - mass_kg).abs() < 0.1 * mass_kg + 0.5, "{context}");
                 for (share, told) in found.shares.into_iter().zip(shares) {
                     assert!(
@@ -245,8 +248,8 @@ mod tests {
         }
     }
 
-    /// The larger the residual that is expected, and the less the pressures are likely to be off, the less they are
-    /// corrected: here an error of 0.6 and 0.7 of the bounds' widths.
+    /// The larger the expected residual, and the smaller the likely pressure errors, the less the pressures are
+    /// corrected; here errors of 0.6 and 0.7 of the widths of the bounds.
     #[test]
     fn the_ridge_is_that_of_the_table() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");
@@ -255,12 +258,12 @@ mod tests {
         let bare = regression.sums;
         let (rows, scales, _) = regression.normalised().expect("rows");
         let ridge = shifted(rows[2][2], 2 * scales[2]) - bare[2][2];
-        // 0.37 of the largest force × 2^12, over one half, squared.
+        // 0.37 of the largest force × 2^12, divided by one half, squared.
         let exact = (0.3662 * 4096.0 * 2.0_f64).powi(2);
         assert!((ridge as f64 / exact - 1.0).abs() < 0.01, "{ridge} {exact}");
     }
 
-    /// Of nothing nothing follows.
+    /// No data, no result.
     #[test]
     fn equations_without_a_solution_tell_nothing() {
         let model = AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default");

@@ -1,7 +1,7 @@
 //! Mass estimator: the moving mass, from the impulse of one move.
 //!
-//! While the piston slides one way, friction and load are constant but for the
-//! viscous part, and the impulse of the known forces is
+//! While the piston slides in one direction, friction and load are constant but for the viscous part, and the impulse
+//! of the known forces is
 //!
 //! ```text
 //! J(i) = Σ (F − d v) = m (v(i) − v₀)/T + c i          i: periods since the piston slides; T: period, s
@@ -9,33 +9,34 @@
 //! ```
 //!
 //! F: pressure force, mN; d: viscous friction, mN s/mm; v: speed, mm/s; m: mass, kg (× 2^16); c: Coulomb friction less
-//! load, mN; J in mN · periods. Three instants of the move tell m from c: where it begins to slide, where it is
+//! load, mN; J in mN · periods. Three instants of the move separate m from c: where it begins to slide, where it is
 //! fastest, and where it ends. What lies on the straight line from the first to the last is due to c; what the fastest
 //! has above that line is due to m, in J as in v. Source: Newton's second law, integrated; the derivation is this
 //! project's.
 //!
-//! **A move** begins when |v| is above 20 mm/s. It ends when |v| is not any more, when v has changed its sign, or after
-//! 1 s; a piston that is then still as fast begins another. Moves count whoever drives. It tells a mass if it took at least 80 ms, was 200 mm/s fast, and 100 mm/s above the line; otherwise nothing
+//! **A move** begins when |v| rises above 20 mm/s. It ends when |v| no longer exceeds that, when v has changed its
+//! sign, or after 1 s; a piston that is then still as fast begins another. Moves count whoever drives. A move
+//! determines a mass if it took at least 80 ms, reached 200 mm/s, and was 100 mm/s above the line; otherwise nothing
 //! changes.
 //!
-//! Where the bounds of the pressures are far apart in such a move (in the mean by more than a quarter of the largest
-//! extending force), as after a power-up with air that nobody knows, the force is wrong by more than the mass needs: there the
-//! mass comes with the pressures from [`super::identification`].
+//! If the bounds of the pressures are far apart in such a move (on average by more than a quarter of the largest
+//! extending force), as after a power-up with unknown air, the force is not accurate enough for the mass. Then the mass
+//! comes, together with the pressures, from [`super::identification`].
 //!
-//! **Doubt.** The peak above the line is a small difference of large impulses, and in a long move at nearly one speed a
-//! viscous friction or a pressure that is a little off passes for a mass of a quarter of the true one. A mass below the
-//! least that can be (0.6 of that specified: rod and carriage stay) is therefore ignored, with the pressures found
-//! beside it, until the next move that tells a mass tells it, too; then that bound is taken. Believed at once, it makes
-//! the next move overshoot. The most that is taken is 12 times that specified.
+//! **Doubt.** The peak above the line is a small difference of large impulses. In a long move at nearly constant speed
+//! a small error of viscous friction or pressure can make the mass appear as a quarter of the true one. A mass below
+//! the plausible minimum (0.6 of the specified one: rod and carriage always remain) is therefore ignored, with the
+//! pressures found beside it, until the next move that determines a mass confirms it; then the minimum is used.
+//! Believed at once, it would make the next move overshoot. The maximum is 12 times the specified mass.
 //!
 //! **Cushion and end stop** are not known here, other than in [`super::motion`]. A move that ends in one has been
-//! braked by an impulse that J lacks: so J line at the fastest is too high by a share of it, and the mass comes out too
-//! small. The same bound and doubt are all that holds against it.
+//! braked by an impulse that J lacks: J line at the fastest is too high by a share of it, and the mass comes out too
+//! small. Only the same bound and doubt guard against this.
 //!
-//! Assumes: the load does not come or go in the move; axes for which it does switch it off
-//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction and supply as specified, within what doubt makes up for.
-//! If the supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J
-//! line: no more than the two bounds let through.
+//! Assumes: the load does not change during the move; axes for which it does switch learning off
+//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction and supply as specified, within what doubt covers. If the
+//! supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J line: no
+//! more than the two bounds let through.
 //!
 //! Config [`AxisModel`], state [`MassEstimator`], update [`MassEstimator::update`].
 
@@ -51,11 +52,11 @@ use crate::tuning::{
 /// An instant of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 struct Instant {
-    /// Periods since the first.
+    /// Periods since the first instant.
     periods: u16,
     /// Raw mm/s.
     speed: i32,
-    /// Impulse since the first, 16 mN × periods.
+    /// Impulse since the first instant, 16 mN × periods.
     impulse: i32,
 }
 
@@ -67,13 +68,14 @@ pub struct MassEstimator {
     fastest: Instant,
     last: Instant,
     regression: Regression,
-    /// The last move that told a mass told less than can be.
+    /// The last move that determined a mass gave less than the plausible minimum.
     doubted: bool,
 }
 
 impl MassEstimator {
-    /// One period that ends at `speed` (raw mm/s), with the pressure force `force` in it and with the `widths` of the
-    /// bounds of both pressures as forces, mN. Gives what a move that has ended with it tells, if it does.
+    /// One period that ends at `speed` (raw mm/s), with the mean pressure force `force` and with the `widths` of the
+    /// bounds of both pressures as forces, mN. If a move has ended with it, returns what that move reveals, if
+    /// anything.
     pub(crate) fn update(
         &mut self,
         model: &AxisModel,
@@ -92,7 +94,7 @@ impl MassEstimator {
         self.last = Instant {
             periods: self.last.periods.wrapping_add(1),
             speed,
-            // Forces below 2^24 mN (100 mm of bore at 2.1 MPa) in 16 mN, of up to 2^8 periods.
+            // Forces below 2^24 mN (100 mm bore at 2.1 MPa), in 16 mN, over up to 2^8 periods.
             impulse: self.last.impulse.wrapping_add(used.wrapping_shr(4)),
         };
         let gained = speed.saturating_sub(self.first);
@@ -118,7 +120,7 @@ impl MassEstimator {
         let told = model.mass;
         let least = mul_shr_sat(told, MASS_LEARNT_LEAST, 16);
         let most = told.saturating_mul(MASS_LEARNT_MOST);
-        // Less than can be: that is doubted until the next move tells it, too.
+        // Below the minimum: doubted until the next move confirms it.
         self.doubted = found.mass < least && !ended.doubted;
         if self.doubted {
             return None;
@@ -129,7 +131,7 @@ impl MassEstimator {
         })
     }
 
-    /// The mass by three instants, if it can be told.
+    /// The mass from three instants, if the move determines it.
     #[cold]
     fn mass(&self, model: &AxisModel) -> Option<i32> {
         let Self {
@@ -175,12 +177,12 @@ mod tests {
     use std::vec::Vec;
     use wheeleg_units::Micros;
 
-    /// A mass under a known force, with friction and a load: up to speed, and down again.
+    /// A mass under a known force, with friction and a load: accelerates, then brakes.
     fn moved(model: &AxisModel, mass_kg: f64, sign: f64, load: f64) -> Option<f64> {
         moved_again(&mut MassEstimator::default(), model, mass_kg, sign, load)
     }
 
-    /// The same, after moves before it.
+    /// The same, after other moves.
     fn moved_again(
         estimator: &mut MassEstimator,
         model: &AxisModel,
@@ -190,9 +192,9 @@ mod tests {
     ) -> Option<f64> {
         let mut speed = 0.0_f64;
         for period in 0..75 {
-            // mm/s a period.
+            // mm/s per period.
             let acceleration = if period < 30 { 12.0 } else { -10.4 };
-            // The force of the period that ends at the speed.
+            // The force of the period that ends at this speed.
             speed = f64::max(speed + acceleration, 0.0);
             let viscous = speed * f64::from(model.viscous) / 256e3;
             let force = acceleration * mass_kg / 4.0 + 10.0 + viscous;
@@ -206,7 +208,7 @@ mod tests {
         None
     }
 
-    /// One that believes whatever the next move tells: the last one told too little.
+    /// An estimator that believes whatever the next move reveals, since the last one gave too little.
     fn doubting() -> MassEstimator {
         MassEstimator {
             doubted: true,
@@ -229,8 +231,8 @@ mod tests {
         }
     }
 
-    /// With bounds that are a quarter of the largest force apart in the mean the air is identified, too; with less the three
-    /// instants tell the mass, and the pressures are left.
+    /// With bounds a quarter of the largest force apart on average the air is identified, too. With less, the three
+    /// instants determine the mass, and the pressures stay.
     #[test]
     fn a_move_with_unknown_air_tells_its_mass_and_the_air() {
         let model = model();
@@ -240,7 +242,7 @@ mod tests {
             let mut speed = 0.0_f64;
             (0..75).find_map(|period| {
                 speed = f64::max(speed + if period < 30 { 12.0 } else { -10.4 }, 0.0);
-                // The estimate of A is too low by half a width that closes.
+                // The estimate of A is too low by half of a width that closes.
                 let left = (f64::from(width) * (1.0 - f64::from(period) / 75.0)) as i32 * 2;
                 let force = if period < 30 { 4_500 } else { -3_900 } + 10_000 - left / 2;
                 let raw = (speed * 65_536.0) as i32;
@@ -260,8 +262,9 @@ mod tests {
         assert!((learnt / (12.0 * told) - 1.0).abs() < 1e-3, "{learnt}");
     }
 
-    /// A mass of a fifteenth of that specified is ignored in the first move that tells it, and bounded in the second; with
-    /// one between that can be, doubt begins anew. A move too short to tell a mass changes nothing.
+    /// A mass of a fifteenth of the specified one is ignored in the first move that yields it, and bounded in the
+    /// second. After a plausible mass in between, doubt starts again. A move too short to determine a mass changes
+    /// nothing.
     #[test]
     fn a_mass_below_the_least_is_believed_when_it_is_told_again() {
         let model = model();
@@ -285,7 +288,7 @@ mod tests {
         assert!(is_least(again), "after one that told nothing");
     }
 
-    /// The peak that is just fast enough, and long enough, tells a mass; one below does not.
+    /// A peak just fast and long enough determines a mass; one below does not.
     #[test]
     fn what_tells_nothing_is_left() {
         let model = model();
@@ -305,7 +308,7 @@ mod tests {
         assert_eq!(told(&[100, 300, 500, 300, 0]), 0, "too short");
         assert_eq!((told(&triangle(190, 60)), told(&triangle(215, 60))), (0, 1));
         assert_eq!((told(&triangle(400, 18)), told(&triangle(400, 26))), (0, 1));
-        // Begun at speed, it has less above the line from its begin to its end: 100 mm/s are enough.
+        // A move that begins at speed has less above the line from start to end: 100 mm/s are enough.
         let mut enough = [0; 2];
         for first in 21..290 {
             let rise: Vec<i32> = (first..300).step_by(4).collect();
@@ -326,7 +329,7 @@ mod tests {
         );
     }
 
-    /// One that still slides a second after its begin is taken as far as it went.
+    /// A piston still sliding a second after the start is evaluated up to there.
     #[test]
     fn a_move_without_end_is_judged_after_a_second() {
         let model = model();
@@ -337,11 +340,11 @@ mod tests {
                 .update(&model, speed << 16, 20_000, [0; 2])
                 .is_some()
         });
-        // The first only begins it: 250 periods of 4 ms after that.
+        // The first period only starts the move; 250 periods of 4 ms follow.
         assert_eq!(period, Some(250));
     }
 
-    /// What lies between 19 and 21 mm/s is the end of a slide.
+    /// The limit between sliding and not sliding lies between 19 and 21 mm/s.
     #[test]
     fn a_move_begins_and_ends_with_sliding() {
         let model = model();

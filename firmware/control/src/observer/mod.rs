@@ -1,39 +1,42 @@
-//! The observer: pressures, motion, load and mass of an axis with one potentiometer.
+//! The observer: estimates pressures, motion, load and mass of an axis with one potentiometer.
 //!
 //! | file | what it estimates | from |
 //! |---|---|---|
-//! | [`valve_delay`] | for how long each valve is open at its chamber | on-times |
+//! | [`valve_delay`] | how long each valve is open as seen by its chamber | on-times |
 //! | [`flow`] | flow through an open valve, ISO 6358 | pressures |
 //! | [`pressure`] | pressure of a chamber, and its bounds | openings, motion |
 //! | [`motion`] | stroke, speed, load | pressure force, measured stroke |
 //! | `trajectory` | where the piston goes in the dead time | motion |
 //! | [`mass`] | moving mass, from three instants of a move | pressure force, speed |
-//! | `identification` | mass and pressures from one move, where those are not known | the same, bounds |
+//! | `identification` | mass and pressures from one move, where these are unknown | the same, bounds |
 //!
-//! All of it once in a period of [`PERIOD_TICKS`] ticks, by [`Observer::update`], in this order:
+//! [`Observer::update`] does all of this once per period of [`PERIOD_TICKS`] ticks, in this order:
 //!
-//! 1. Where the piston was in this period: `trajectory`, as foreseen at the end of the last one.
-//! 2. Chamber A, then B: what was sent becomes openings (`valve_delay`), these become flow (`flow`), and that the
-//!    pressure at the moment, the expected one at the end of the dead time, and the bounds (`pressure`).
+//! 1. Where the piston was in this period: `trajectory`, as predicted at the end of the last one.
+//! 2. Chamber A, then B: what was sent becomes openings (`valve_delay`), these become flow (`flow`), and flow gives the
+//!    pressure at the moment, the expected pressure at the end of the dead time, and the bounds (`pressure`).
 //! 3. The pressure force, and its mean over the period.
-//! 4. `motion`: stroke and speed predicted with that mean, then corrected with the measured stroke; with them the load.
+//! 4. `motion`: stroke and speed are predicted with that mean, then corrected with the measured stroke, and the load
+//!    with them.
 //! 5. `trajectory` of the next period.
-//! 6. `mass`, where the axis learns it: one period more of the move under way. Where it has ended, mass and, by
-//!    `identification`, pressures are corrected; the load gives back what the pressures had wrong.
+//! 6. `mass`, if the axis learns it: adds one period of the move under way. When the move has ended, the mass and, by
+//!    `identification`, the pressures are corrected; the load gives back the error that it had absorbed from the
+//!    pressures.
 //!
-//! The law in [`crate::law`] reads it; its `handover` tells it what others send, and what was cut. All estimates hold at the **moment** of the period: between its last two
-//! ticks, whose strokes are averaged, 2.5 ticks after its begin. The expected pressures hold at the end of the dead
-//! time.
+//! The law in [`crate::law`] reads the observer; its `handover` tells the observer what others send, and what was cut.
+//! All estimates hold at the **moment** of the period: between its last two ticks, whose strokes are averaged, 2.5
+//! ticks after the period begins. The expected pressures hold at the end of the dead time.
 //!
 //! Stroke and speed are raw I16F16 mm and mm/s, pressures 1/256 Pa absolute, forces and load mN, accelerations mm/s²,
 //! masses kg × 2^16, times µs or s × 2^32, shares × 2^16 unless stated. All are `i32`. Chamber A extends the piston;
 //! positive forces and speeds extend.
 //!
-//! If the supply falls, nothing here notices. A chamber that is filled is taken for fuller than it is, which shows as
-//! load while the piston slides and not at all while it stands ([`pressure`], [`motion`], [`mass`] say what follows).
+//! If the supply falls, nothing here notices. The pressure of a chamber that is filled is overestimated, which appears
+//! as load while the piston slides and not at all while it stands ([`pressure`], [`motion`], [`mass`] say what
+//! follows).
 //!
-//! Tests stand at the end of each file. State [`Observer`]. A board makes a new one, at rest and with unknown air,
-//! after a sensor's fault, damaged memory and with other axis data.
+//! Tests are at the end of each file. State [`Observer`]. A board makes a new one, at rest and with unknown air, after
+//! a sensor fault, after damaged memory, and for new axis data.
 
 pub mod flow;
 mod identification;
@@ -63,14 +66,14 @@ pub struct Observer {
     pub(crate) motion: Motion,
     /// Pressure force at the moment, mN.
     pub(crate) force: i32,
-    /// What follows from the mass, as specified or learnt.
+    /// Quantities that follow from the mass, as specified or learnt.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
     trajectory: PeriodTrajectory,
 }
 
 impl Observer {
-    /// At rest, with chambers that count as at `pressures` but may be anywhere between the atmosphere and the
+    /// At rest. The chambers are assumed to be at `pressures`, but may be anywhere between the atmosphere and the
     /// supply.
     #[must_use]
     pub(crate) fn new(model: &AxisModel, pressures: Pressures) -> Self {
@@ -86,7 +89,7 @@ impl Observer {
         }
     }
 
-    /// The first stroke that is measured (raw mm) is where the piston stands.
+    /// Takes the first measured stroke (raw mm) as the piston's position.
     pub(crate) const fn start_at(&mut self, stroke: i32) {
         self.motion.stroke = stroke;
         self.trajectory = PeriodTrajectory::at(stroke);
@@ -101,7 +104,7 @@ impl Observer {
         }
     }
 
-    /// Pressures at the end of the dead time, with the pulses that are under way.
+    /// Pressures at the end of the dead time, including the pulses under way.
     #[must_use]
     pub const fn expected(&self) -> Pressures {
         Pressures {
@@ -110,7 +113,7 @@ impl Observer {
         }
     }
 
-    /// Where the piston is at the end of the dead time at its present speed, raw mm.
+    /// Where the piston will be at the end of the dead time at its present speed, raw mm.
     pub(crate) fn end_of_dead_time(&self, model: &AxisModel) -> i32 {
         let ahead = mul_shr(self.motion.speed, model.dead_time, 32);
         self.motion
@@ -120,14 +123,14 @@ impl Observer {
             .min(model.stroke)
     }
 
-    /// By how much the pressure force can be wrong, mN.
+    /// Largest error of the pressure force, mN.
     #[must_use]
     pub fn uncertainty(&self, model: &AxisModel) -> i32 {
         let [a, b] = self.widths(model);
         a.saturating_add(b)
     }
 
-    /// Widths of the bounds of A and of B as forces, mN.
+    /// Widths of the bounds of A and B as forces, mN.
     fn widths(&self, model: &AxisModel) -> [i32; 2] {
         let [[low_a, high_a], [low_b, high_b]] = self.bounds();
         [
@@ -136,7 +139,7 @@ impl Observer {
         ]
     }
 
-    /// Bounds of the pressures of A and of B, lowest and highest.
+    /// Bounds of the pressures of A and B, lowest and highest.
     #[must_use]
     pub const fn bounds(&self) -> [[i32; 2]; 2] {
         [self.a.bounds, self.b.bounds]
@@ -148,8 +151,8 @@ impl Observer {
         &self.motion
     }
 
-    /// One period, with the on-times that were planned for it and those that others made in it, and with
-    /// the stroke at its moment, raw mm. Gives a mass that was learnt in it, kg × 2^16.
+    /// One period, with the on-times planned for it, those that others made in it, and the stroke at its moment, raw
+    /// mm. Returns a mass that was learnt in it, kg × 2^16.
     pub(crate) fn update(
         &mut self,
         model: &AxisModel,
@@ -197,7 +200,7 @@ impl Observer {
         if share_a | share_b != 0 {
             self.a.correct(share_a);
             self.b.correct(share_b);
-            // The load had taken what the pressures had wrong.
+            // The load had absorbed the error of the pressures.
             let corrected = model.pressure_force(self.pressures());
             let wrong = corrected.saturating_sub(self.force);
             self.motion.load = self.motion.load.saturating_sub(wrong);

@@ -10,29 +10,29 @@
 //!           load += c m (1 − θ)³ ε / T²                     not while stuck, nor on the way into a cushion
 //! ```
 //!
-//! Source: gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff,
-//! Fundamentals of Kalman Filtering, ch. 7), which has one parameter, θ. The load takes what the pressures
-//! have wrong, too, so only a share c of its gain is used, and the filter is slower than its θ says: of its
-//! three poles the slow one is 0.81 a period, 19 ms.
+//! Source: gains of the fading-memory polynomial filter of degree 2 (Morrison 1969; Zarchan and Musoff, Fundamentals of
+//! Kalman Filtering, ch. 7), which has one parameter, θ. The load also absorbs pressure errors, so only a share c of
+//! its gain is used, and the filter is slower than θ suggests: the slow one of its three poles is 0.81 per period, 19
+//! ms.
 //!
 //! | | unit | |
 //! |---|---|---|
 //! | x, v | mm, mm/s | stroke, speed; positive extends |
-//! | F, load | mN | pressure force; force from outside and what the model does not know |
-//! | Fc, Fb | mN | Coulomb and break-away friction, as specified; the observer counts 0.92 of Fc |
+//! | F, load | mN | pressure force; external force plus model error |
+//! | Fc, Fb | mN | Coulomb and break-away friction, as specified; the observer uses 0.92 of Fc |
 //! | d | mN s/mm (N s/m) | viscous friction, as specified |
 //! | m | kg | mass, as specified or learnt |
 //! | T | s | period |
 //!
-//! ε counts up to ±8 mm, the load up to the largest force of the supply. **Pressed against an end stop** is a piston
-//! within a millimetre of it with F + load toward it, unless it comes back from it at 20 mm/s or more. **In a cushion**
-//! is one within 6 mm of an end, on its way there: what brakes it there is no load. **Stuck ends** with the period in
-//! which its condition does not hold.
+//! ε is limited to ±8 mm, the load to the largest force that the supply can deliver. A piston is **pressed against an
+//! end stop** within a millimetre of it if F + load points towards it, unless it comes back from it at 20 mm/s or more.
+//! It is **in a cushion** within 6 mm of an end on its way there: what brakes it there is not load. **Stuck ends** with
+//! the first period in which its condition does not hold.
 //!
-//! Assumes: a load that is constant but for corrections, the mass of the estimator beside it, friction between half and
-//! twice the specified one. With these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as
-//! load. If the supply falls, F is wrong by what the filled chamber lacks; the load takes that off again, within some
-//! 20 ms of sliding. Of a piston that is stuck the load stays what it was: F + load is then wrong until it slides.
+//! Assumes: a load that is constant but for corrections, the mass of the estimator, friction between half and twice the
+//! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load. If
+//! the supply falls, F is wrong by what the filled chamber lacks; the load cancels that within some 20 ms of sliding.
+//! While the piston is stuck the load stays as it was: F + load is then wrong until it slides.
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 
@@ -44,7 +44,7 @@ use crate::tuning::{
     STUCK_SPEED,
 };
 
-/// What of the observer follows from the moving mass; worked out when that changes.
+/// The part of the observer that depends on the moving mass; recomputed when the mass changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Inertia {
     /// Mass, kg × 2^16.
@@ -53,14 +53,14 @@ pub struct Inertia {
     pub per_force: i32,
     /// Load per innovation, mN/mm.
     pub load_gain: i32,
-    /// Speed that Coulomb friction takes off in a period, raw mm/s.
+    /// Speed lost to Coulomb friction in a period, raw mm/s.
     pub coulomb_speed: i32,
-    /// Speed that it takes off in the dead time, raw mm/s.
+    /// Speed lost to it in the dead time, raw mm/s.
     pub coulomb_speed_ahead: i32,
 }
 
 impl Inertia {
-    /// For a mass in kg × 2^16.
+    /// For this mass, kg × 2^16.
     #[must_use]
     pub fn new(model: &AxisModel, mass: i32) -> Self {
         let mass = mass.max(MASS_MIN);
@@ -70,15 +70,14 @@ impl Inertia {
         Self {
             mass,
             per_force,
-            // Below 2^27: times an innovation it fits.
+            // Below 2^27, so that its product with an innovation fits.
             load_gain: mul_shr(model.observe_load, mass, 16).min((1 << 27) - 1),
             coulomb_speed: mul_shr_sat(friction, model.period, 16),
             coulomb_speed_ahead: mul_shr_sat(friction, model.dead_time, 16),
         }
     }
 
-    /// Acceleration of a force in mN, mm/s², within ±2^21 (213 g): what it gains in 8 ms fits
-    /// raw mm/s.
+    /// Acceleration by a force in mN: mm/s², within ±2^21 (213 g), so that the speed gained in 8 ms fits raw mm/s.
     #[inline]
     #[must_use]
     pub fn acceleration(&self, force: i32) -> i32 {
@@ -87,36 +86,36 @@ impl Inertia {
     }
 }
 
-/// Estimated motion, of the moment of a period.
+/// Estimated motion at the moment of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Motion {
     /// Stroke, raw mm.
     pub stroke: i32,
     /// Speed, raw mm/s.
     pub speed: i32,
-    /// Force from outside and what the model does not know, mN, positive extends.
+    /// External force plus model error, mN, positive extends.
     pub load: i32,
     /// Speed gained in the last period, raw mm/s.
     pub gained: i32,
-    /// Held by its friction.
+    /// Held by friction.
     pub stuck: bool,
 }
 
-/// What is left of a speed that loses `taken` to friction, which turns nothing round.
+/// What is left of a speed that loses `taken` to friction, which never reverses the motion.
 #[inline]
 pub(crate) fn after_coulomb(speed: i32, taken: i32) -> i32 {
     speed.saturating_sub(within(speed, taken))
 }
 
 impl Motion {
-    /// Within a millimetre of an end stop.
+    /// Whether the piston is within a millimetre of an end stop.
     #[must_use]
     pub fn at_stop(&self, model: &AxisModel) -> bool {
         self.stroke < STOP_ZONE || self.stroke > model.stroke.saturating_sub(STOP_ZONE)
     }
 
-    /// Within a millimetre of an end stop, with a `target` (raw mm) more than one behind it; or, for a
-    /// piston with which `patience_is_over` there, less than one before it.
+    /// Whether the piston is within a millimetre of an end stop and `target` (raw mm) is more than a millimetre beyond
+    /// it or, if `patience_is_over`, beyond it or less than a millimetre before it.
     #[inline]
     #[must_use]
     pub fn at_end_stop(&self, model: &AxisModel, target: i32, patience_is_over: bool) -> bool {
@@ -130,17 +129,17 @@ impl Motion {
             || (self.stroke > far && target > model.stroke.saturating_sub(zone))
     }
 
-    /// One period, in which the chambers made `force` in the mean.
+    /// Predicts one period, in which the chambers made the mean force `force`.
     #[inline]
     pub fn predict(&mut self, model: &AxisModel, inertia: &Inertia, force: i32) {
         let drive = force.saturating_add(self.load);
-        // Pressed against an end stop, the stop takes what is left of the force.
+        // When pressed against an end stop, the stop takes the rest of the force.
         let against_stop = if drive > 0 {
             self.stroke > model.stroke.saturating_sub(STOP_ZONE)
         } else {
             self.stroke < STOP_ZONE
         };
-        // A rebound from it is over within the period.
+        // A rebound from the stop is over within the period.
         self.stuck = if against_stop {
             (self.speed ^ drive) >= 0 || self.speed.wrapping_abs() < REBOUND_SPEED
         } else {
@@ -163,7 +162,7 @@ impl Motion {
     /// Corrects with the stroke measured at the moment.
     #[inline]
     pub fn correct(&mut self, model: &AxisModel, inertia: &Inertia, measured: i32) {
-        // Below 2^19; the shares below 2^24: what follows fits.
+        // The innovation is below 2^19 and the gains below 2^24, so the following products fit.
         let innovation = within(measured.saturating_sub(self.stroke), INNOVATION_MAX);
         self.stroke = self
             .stroke
@@ -171,7 +170,7 @@ impl Motion {
         self.speed = self
             .speed
             .saturating_add(mul_shr(innovation, model.observe_speed, 16));
-        // Near an end the cushion brakes: that is no load.
+        // Near an end the cushion brakes: that is not load.
         let cushioned = if self.speed > 0 {
             self.stroke > model.stroke.saturating_sub(CUSHION)
         } else {
@@ -221,7 +220,7 @@ mod tests {
                 );
             }
         }
-        // One of 3.9 mm/s is stuck, and is slowed to less in a period; one of 4.1 slides.
+        // A piston at 3.9 mm/s is stuck and is slowed further in a period; one at 4.1 mm/s slides.
         let after = |tenths: i32| {
             let mut motion = at(90, 0);
             motion.speed = (tenths << 16) / 10;
@@ -233,7 +232,7 @@ mod tests {
         assert!(!after(41).0);
     }
 
-    /// A force of 30 N on 3 kg: what is left beside 0.92 of 10 N, and what is viscous, accelerates.
+    /// A force of 30 N on 3 kg: what exceeds 0.92 of 10 N and viscous friction accelerates.
     #[test]
     fn a_sliding_piston_loses_speed_to_friction() {
         let model = model();
@@ -245,7 +244,7 @@ mod tests {
             let exact = (30.0 - 0.92 * 10.0 - 40.0 * 0.1) / 3.0 * 4.0;
             assert!((gained / exact - 1.0).abs() < 0.01, "{gained} {exact}");
         }
-        // Friction turns nothing round.
+        // Friction never reverses the motion.
         let mut motion = at(90, 5);
         motion.predict(&model, &inertia, -16_000);
         motion.predict(&model, &inertia, 0);
@@ -255,8 +254,8 @@ mod tests {
         );
     }
 
-    /// Within a millimetre of an end stop, pressed against it, a piston stands, and rebounds of up to 20 mm/s
-    /// are over; in the cushion before it braking is no load.
+    /// Within a millimetre of an end stop and pressed against it a piston stands, and rebounds of up to 20 mm/s are
+    /// over. In the cushion before the stop, braking is not load.
     #[test]
     fn an_end_stop_holds_a_piston_and_its_cushion_is_no_load() {
         let model = model();
@@ -281,7 +280,7 @@ mod tests {
         assert_eq!((load(5, -200), load(175, 200)), (0, 0));
     }
 
-    /// A stroke that jumps by the whole stroke counts as 8 mm.
+    /// A jump by the whole stroke counts as 8 mm.
     #[test]
     fn a_stroke_that_cannot_be_moves_the_estimate_by_little() {
         let model = model();
@@ -295,7 +294,7 @@ mod tests {
         assert_ne!(after(7), after(8));
     }
 
-    /// 0.02 kg: the inverse of less would not fit 2^30.
+    /// 0.02 kg: the inverse of a smaller mass would not fit 2^30.
     #[test]
     fn no_mass_counts_as_less_than_the_least_that_may_be_told() {
         let told = |mass_kg: f64| {

@@ -1,4 +1,4 @@
-//! Pressure observer: ISO 6358 flow into a polytropic chamber, with the bounds of what is known.
+//! Pressure observer: ISO 6358 flow into a polytropic chamber, with bounds on the pressure.
 //!
 //! ```text
 //! Δp = n (K p_s ψ(p̄/p_s) t_fill − K p̄ ψ(p_a/p̄) t_vent − p v T) / L         K = C ρ0 R T0 / A
@@ -11,30 +11,31 @@
 //! | p, p_s, p_a | Pa | pressure of the chamber at the last moment, of the supply, of the atmosphere, absolute |
 //! | p⁻, p⁺ | Pa | bounds of p: at first p_a and p_s |
 //! | p expected | Pa | pressure at the end of the dead time |
-//! | t_fill, t_vent | s | for how long each valve was open at the chamber in the period |
+//! | t_fill, t_vent | s | how long each valve was open in the period, as seen by the chamber |
 //! | T | s | the period |
 //! | v | mm/s | speed of the piston, positive where the chamber grows |
 //! | L | mm | volume of the chamber with its line over its area A |
-//! | K | mm/s | choked speed: that of the piston at which an open outlet holds the pressure; T0 = 293 K, C and ρ0 as in [`super::flow`] |
+//! | K | mm/s | choked speed: the piston speed at which an open outlet holds the pressure; T0 = 293 K, C and ρ0 as in [`super::flow`] |
 //! | ψ | 1 | flow over choked flow, [`super::flow`] |
 //! | n | 1 | polytropic exponent, 1.2: between isothermal (1) and adiabatic (1.4) |
 //!
 //! Source: chamber of Bobrow and McDonell 1998 and Pandian et al. 2002; flow of ISO 6358-1.
 //!
-//! Open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber ends at the supply and a
-//! venting one at the atmosphere, whatever was assumed before. The flow is monotone in p, so both bounds keep their
-//! order, and their distance says how far the estimate can be off. The estimate itself is not held within them: its
-//! flow is that at p̄, so it may lie beside them by the error of a step. Only the identification of a move uses the
-//! bounds ([`super::mass`] by their distance, `identification`); they hold as long as the assumptions do.
+//! The observer is open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber ends at the
+//! supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone in p, so both bounds
+//! keep their order, and their distance says how far the estimate can be off. The estimate itself is not held within
+//! them: its flow is that at p̄, so it may lie outside them by the error of a step. Only the identification of a move
+//! uses the bounds ([`super::mass`] their distance, and `identification`); they hold as long as the assumptions do.
 //!
-//! Assumes: supply and atmosphere as specified, tight seals, no flow but through the valves. If the supply is lower, a
-//! chamber that is filled ends below the estimate, and below p⁻, too: the bounds hold no longer. Venting brings
-//! both back.
+//! Assumes: supply and atmosphere as specified, tight seals, no flow except through the valves. If the supply is lower,
+//! a chamber that is filled ends below the estimate, and below p⁻, too: the bounds no longer hold. Venting restores
+//! both.
 //!
-//! One explicit step a period and chamber from moment to moment, with the mean length and speed of that time; then one
-//! over the dead time, with the pulses that are under way and the speed of the moment, for the expected pressure; and
-//! one for each bound. No step goes beyond what valves and motion can do: while a fill valve is open or is to open, the
-//! supply; while a vent valve is, the atmosphere; else half the atmosphere and 2.1 MPa. So a chamber however small is stable.
+//! Per period and chamber there is one explicit step from moment to moment, with the mean length and speed of that
+//! time; then one over the dead time, with the pulses under way and the speed at the moment, for the expected pressure;
+//! and one for each bound. No step goes beyond what valves and motion can do: up to the supply while a fill valve is
+//! open or about to open, down to the atmosphere while a vent valve is, and otherwise half the atmosphere and 2.1 MPa.
+//! So even the smallest chamber is stable.
 //!
 //! Config [`AxisModel`], state [`Chamber`], update [`Chamber::update`].
 
@@ -58,41 +59,41 @@ pub struct Pressures {
 pub(crate) struct Period {
     /// When it begins.
     pub(crate) begin: u32,
-    /// When the next one begins, up to which the coils are decided.
+    /// When the next one begins, up to which the coils have been decided.
     pub(crate) next: u32,
-    /// The moment for which pressures and motion are worked out: [`AxisModel::moment`] after the begin.
+    /// The moment at which pressures and motion are estimated: [`AxisModel::moment`] after the beginning.
     pub(crate) moment: u32,
 }
 
-/// A chamber's geometry, and what the piston does to it.
+/// A chamber's geometry, and how the piston changes it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChamberMotion {
     /// Choked speed K, raw mm/s.
     pub(crate) choked_speed: i32,
-    /// Length of the chamber in the middle of the period that ends at the moment, and where the
-    /// dead time ends, raw mm.
+    /// Length of the chamber in the middle of the period that ends at the moment, and at the end of the dead time, raw
+    /// mm.
     pub(crate) lengths: [i32; 2],
     /// Speed at which the chamber shrinks, in that period and in the dead time, raw mm/s.
     pub(crate) speeds: [i32; 2],
 }
 
-/// What the valves of a chamber sent, and for how long something else had them open.
+/// What was sent to the valves of a chamber, and how long something else had them open.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sent {
-    /// On-times of the period from its begin, µs: fill, vent.
+    /// On-times of the period from its beginning, µs: fill, vent.
     pub(crate) plan: [u16; 2],
     /// Openings that others made in it, without their delays, µs: fill, vent.
     pub(crate) external: [u16; 2],
 }
 
-/// Pulses under way and pressure of one chamber.
+/// Pressure and pulses under way of one chamber.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Chamber {
     pub(crate) fill: ValveTrack,
     pub(crate) vent: ValveTrack,
     /// Pressure at the moment, 1/256 Pa.
     pub(crate) pressure: i32,
-    /// The same at the end of the dead time, with what has been committed to by then.
+    /// The same at the end of the dead time, including what has been committed by then.
     pub(crate) expected: i32,
     /// Bounds p⁻ and p⁺ of the pressure at the moment.
     pub(crate) bounds: [i32; 2],
@@ -133,7 +134,7 @@ impl Chamber {
                 times,
             );
             if external > 0 {
-                // Nobody knows when its coil fell.
+                // It is not known when its coil went off.
                 track.shuts(period.next);
             }
             let seen = track.passes(from, times.period).wrapping_add(external);
@@ -149,7 +150,7 @@ impl Chamber {
         let n_per_length = model.exponent_per_length(length);
         let both = [open[0] | committed[0], open[1] | committed[1]];
         let limits = limits(model, both);
-        // At the mean pressure of the two steps: the end of the second was foreseen a period ago.
+        // At the mean pressure of the two steps; the end of the second was predicted a period ago.
         let mean = self.pressure.saturating_add(self.expected) >> 1;
         let powers = Powers::at(model, motion.choked_speed, mean, both);
         let step = |p: i32, powers: &Powers, open, speed, span, n_per_length| {
@@ -180,8 +181,8 @@ impl Chamber {
         });
     }
 
-    /// A move has told that the pressure was wrong by this share (× 2^16) of the width of its bounds. From now on these
-    /// are what is left in doubt.
+    /// A move has revealed that the pressure was wrong by this share (× 2^16) of the width of its bounds. The new
+    /// bounds describe the remaining uncertainty.
     pub(crate) fn correct(&mut self, share: i32) {
         let [low, high] = self.bounds;
         let width = high.saturating_sub(low);
@@ -197,8 +198,8 @@ impl Chamber {
         ];
     }
 
-    /// Everything that others have sent is over with the tick that ends at `end`: `plan` is what of
-    /// the period that began at `begin` was sent, fill and vent, µs.
+    /// Everything that others have sent is over with the tick that ends at `end`. `plan` is what was sent of the period
+    /// that began at `begin`, fill and vent, µs.
     pub(crate) fn release(&mut self, model: &AxisModel, begin: u32, end: u32, plan: [u16; 2]) {
         let span = end.wrapping_sub(begin) as i32;
         for (track, on) in [&mut self.fill, &mut self.vent].into_iter().zip(plan) {
@@ -217,7 +218,7 @@ struct Powers {
 }
 
 impl Powers {
-    /// Of those that are `open` at all, at `pressure`.
+    /// Powers at `pressure` of the valves that are `open` at all.
     fn at(model: &AxisModel, choked_speed: i32, pressure: i32, [fill, vent]: [i32; 2]) -> Self {
         Self {
             fill: if fill > 0 {
@@ -233,9 +234,8 @@ impl Powers {
         }
     }
 
-    /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs,
-    /// and with the piston giving the power `compression` for `span` µs, in a chamber of
-    /// `n_per_length` ([`AxisModel::exponent_per_length`]).
+    /// Change of pressure in 1/256 Pa with the valves open for `fill` and `vent` µs and with the piston delivering the
+    /// power `compression` for `span` µs, in a chamber of `n_per_length` ([`AxisModel::exponent_per_length`]).
     fn change(
         &self,
         [fill, vent]: [i32; 2],
@@ -244,7 +244,7 @@ impl Powers {
         n_per_length: i32,
     ) -> i32 {
         let product = |power: i32, us: i32| i64::from(power).wrapping_mul(i64::from(us));
-        // Powers below 2^28, times below 2^18: 2^24 Pa mm/s µs below 2^31.
+        // Powers below 2^28, times below 2^18: in 2^24 Pa mm/s µs below 2^31.
         let work = product(self.fill, fill)
             .wrapping_sub(product(self.vent, vent))
             .wrapping_add(product(compression, span))
@@ -255,9 +255,9 @@ impl Powers {
     }
 }
 
-/// Limits of a pressure while valves are open, or are to be. None fills beyond the supply or
-/// vents below the atmosphere, however long a step is for a small chamber; and a vacuum of more than
-/// half of that needs a motion of its own.
+/// Limits of a pressure while valves are open or about to open. No valve fills beyond the supply or vents below the
+/// atmosphere, however long a step is for a small chamber; and no motion is assumed to pull the pressure below half the
+/// atmosphere.
 const fn limits(model: &AxisModel, [fill, vent]: [i32; 2]) -> [i32; 2] {
     [
         if vent > 0 {
@@ -269,7 +269,7 @@ const fn limits(model: &AxisModel, [fill, vent]: [i32; 2]) -> [i32; 2] {
     ]
 }
 
-/// `p` within them.
+/// `p` within these limits.
 fn within_limits(p: i32, [least, most]: [i32; 2]) -> i32 {
     p.max(least).min(most)
 }
@@ -291,8 +291,8 @@ impl AxisModel {
             .saturating_add(self.dead_length_b)
     }
 
-    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm:
-    /// so that a work of 2^24 Pa mm/s µs, times it, is 2^-18 Pa.
+    /// n / L of a chamber of `length` (raw mm), × 1.048576 × 2^22 / mm: a work of 2^24 Pa mm/s µs times this is in
+    /// 2^-18 Pa.
     #[inline]
     #[must_use]
     pub(crate) fn exponent_per_length(&self, length: i32) -> i32 {
@@ -300,7 +300,7 @@ impl AxisModel {
         self.exponent.checked_div(short).unwrap_or(0)
     }
 
-    /// Power over area of an open fill valve of this choked speed (raw mm/s) into a chamber at `pressure`: K p_s ψ.
+    /// Power over area of an open fill valve with this choked speed (raw mm/s) into a chamber at `pressure`: K p_s ψ.
     #[inline]
     pub(crate) fn fill_power(&self, choked_speed: i32, pressure: i32) -> i32 {
         self.curve.power(self.supply, pressure, choked_speed)
@@ -332,7 +332,7 @@ mod tests {
         AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
     }
 
-    /// What follows of a chamber in so many periods, with valves open for these times in each of them.
+    /// State of a chamber after this many periods, with valves open for these times in each of them.
     fn followed(
         model: &AxisModel,
         mut chamber: Chamber,
@@ -356,7 +356,7 @@ mod tests {
         chamber
     }
 
-    /// A piston that stands in mid-stroke.
+    /// A piston that stands at mid stroke.
     fn at_rest(model: &AxisModel) -> ChamberMotion {
         ChamberMotion {
             choked_speed: model.choked_speed_a,
@@ -365,8 +365,8 @@ mod tests {
         }
     }
 
-    /// Wherever the pressure was, filling ends at the supply and venting at the atmosphere; the bounds hold it
-    /// between them all the way, and close.
+    /// Whatever the pressure was, filling ends at the supply and venting at the atmosphere; the bounds contain it all
+    /// the way, and close.
     #[test]
     fn errors_of_the_pressure_die_out_and_the_bounds_close() {
         let model = model();
@@ -400,7 +400,7 @@ mod tests {
         );
     }
 
-    /// Bounds, and the pressure, of a chamber that is shut while the piston makes it shorter at this speed for 2 s.
+    /// A chamber, with its bounds, that is shut while the piston compresses it at this speed for 2 s.
     fn compressed(speed_mm_s: i32) -> Chamber {
         let model = model();
         let chamber = Chamber::new(model.mean, [model.ambient, model.supply]);
@@ -412,7 +412,7 @@ mod tests {
         followed(&model, chamber, &motion, [0; 2], 500)
     }
 
-    /// 2.1 MPa: the power of that at the fastest speed of the format is below 2^28, as those of the valves.
+    /// 2.1 MPa: at the fastest speed of the format its power is below 2^28, like those of the valves.
     #[test]
     fn air_that_is_compressed_ends_at_a_pressure_that_fits() {
         let chamber = compressed(500);
@@ -438,7 +438,7 @@ mod tests {
         }
     }
 
-    /// By a quarter of the width, of which an eighth on each side is left in doubt; and never out of the bounds.
+    /// Corrected by a quarter of the width, leaving an eighth on each side uncertain, and never beyond the bounds.
     #[test]
     fn a_pressure_is_corrected_within_its_bounds() {
         let model = model();
@@ -458,7 +458,7 @@ mod tests {
         assert_eq!(chamber.bounds[0], model.ambient);
     }
 
-    /// n/L of a chamber without dead volume is that of 4 mm.
+    /// n/L of a chamber without dead volume is that of a length of 4 mm.
     #[test]
     fn a_chamber_is_never_shorter_than_its_line() {
         let model = AxisModel::new(

@@ -5,15 +5,16 @@
 //! end    = middle + (v + Δv/2) T/2 + v T_d     where the pulses of the next period act
 //! ```
 //!
-//! x: stroke, mm; v: speed, mm/s, both of the moment; Δv: what it gained in the last period; T: period, T_d: dead time,
-//! s. Source: this project, decision 7; a Taylor series of the motion, cut off.
+//! x: stroke, mm; v: speed, mm/s, both at the moment; Δv: speed gained in the last period; T: period, T_d: dead time,
+//! s. Source: this project, decision 7; a truncated Taylor series of the motion.
 //!
-//! Where the end would be beyond an end stop, it is the stop, and the speed in the dead time counts as 0.
+//! If the end would be beyond an end stop, it is the stop, and the speed in the dead time is taken as 0.
 //!
-//! Assumes: the acceleration of the last period for one more, and constant speed beyond: it is not counted on for
-//! longer, because the air that is squeezed pushes back, the more the shorter a chamber is. The supply is not used.
+//! Assumes: the acceleration of the last period for one more, and constant speed after that. The acceleration is not
+//! extrapolated further, because the compressed air pushes back, the more the shorter a chamber is. The supply is not
+//! used.
 //!
-//! Config [`AxisModel`]; made anew in each period ([`PeriodTrajectory::of`]) from the corrected motion, used in the
+//! Config [`AxisModel`]; computed in each period ([`PeriodTrajectory::of`]) from the corrected motion, and used in the
 //! next.
 
 use super::motion::Motion;
@@ -29,7 +30,7 @@ pub(crate) struct PeriodTrajectory {
     pub(crate) speed: i32,
     /// Stroke at the end of the dead time after it, raw mm.
     pub(crate) end: i32,
-    /// Speed in that, raw mm/s; 0 if that would end beyond an end stop.
+    /// Speed during that dead time, raw mm/s; 0 if it would end beyond an end stop.
     pub(crate) ahead: i32,
 }
 
@@ -44,8 +45,7 @@ impl PeriodTrajectory {
         }
     }
 
-    /// Where the present speed takes the piston: not beyond an end stop, where air would be
-    /// squeezed that is not there.
+    /// Where the present speed takes the piston, but not beyond an end stop, where there is no air to be compressed.
     pub(crate) fn of(model: &AxisModel, motion: &Motion) -> Self {
         let speed = motion.speed.saturating_add(motion.gained >> 1);
         let half = mul_shr(speed, model.period >> 1, 32);

@@ -7,18 +7,19 @@
 //! opening            = on-time − t_on + t_off
 //! ```
 //!
-//! A pure dead time for each direction, and the wave's travel time through the line at the speed of sound.
-//! Source: data sheets of on/off valves, "response time" (SMC series VQ100, Festo series MHE2). Whole µs, on the
+//! A pure dead time for each direction, plus the wave's travel time through the line at the speed of sound. Source:
+//! data sheets of on/off valves, "response time" (SMC series VQ100, Festo series MHE2). Whole µs, applied to the
 //! on-times that are sent.
 //!
-//! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data is
-//! for what they differ by. A valve that is open, or shut, and nothing between; no more than four changes of one valve
-//! under way. A supply that falls changes nothing here: times are counted, not air.
+//! Assumes: delays as specified, the same in every pulse, at every pressure and voltage; the margin of the axis data
+//! covers their variation. A valve is either open or shut, and at most four changes of one valve are under way. A
+//! falling supply changes nothing here: times are counted, not air.
 //!
-//! Nothing here finds a delay: it is axis data. A search at start-up (`host-sim/studies/src/axis_sim/delay_probe.rs`,
-//! in `wheeleg compare` and `tune`) sends a fill valve pulses that grow by 50 µs until the piston moves: the shortest
-//! that moves it is t_on. t_off cannot be seen so; it is taken to differ from its data sheet by the same factor. What
-//! does not move, after a second search with empty chambers, keeps the data sheet's.
+//! Nothing here measures a delay: it is axis data. A search at start-up
+//! (`host-sim/studies/src/axis_sim/delay_probe.rs`, in `wheeleg compare` and `tune`) sends a fill valve pulses that
+//! grow by 50 µs until the piston moves: the shortest pulse that moves it is t_on. t_off cannot be seen in this way; it
+//! is assumed to differ from its data sheet by the same factor. If the piston does not move, even in a second search
+//! with empty chambers, the data-sheet values are kept.
 //!
 //! Config [`ValveTimes`], state [`ValveTrack`], updates [`ValveTrack::energise`] and [`ValveTrack::passes`].
 
@@ -30,17 +31,17 @@ const EDGES: usize = 4;
 pub struct ValveTimes {
     /// Control tick.
     pub tick: i32,
-    /// Period: between two computations of the law.
+    /// Period between two computations of the law.
     pub period: i32,
     /// Coil on to open, 0…50 000.
     pub on: i32,
     /// Coil off to shut, 0…50 000.
     pub off: i32,
-    /// Wave's way through the line, 0…20 000.
+    /// Travel time of the wave through the line, 0…20 000.
     pub line: i32,
-    /// Shortest pulse that is sent: t_on and a margin.
+    /// Shortest pulse that is sent: t_on plus a margin.
     pub shortest_pulse: i32,
-    /// Shortest gap that is left: t_off and a margin.
+    /// Shortest gap that is left: t_off plus a margin.
     pub shortest_gap: i32,
 }
 
@@ -54,21 +55,20 @@ impl ValveTimes {
     }
 }
 
-/// One valve as followed from its coil. Times are moments of a clock in µs that wraps
-/// after 71 minutes: a valve that has been shut for just that long (35 minutes from its
-/// start) begins its next pulse late, by the shortest gap at most; one energised for just that
-/// long stays so for the shortest pulse.
+/// One valve, tracked from its coil. Times are moments of a clock in µs that wraps after 71 minutes. A valve that has
+/// been shut for exactly that long (35 minutes from its start) begins its next pulse late, by the shortest gap at most;
+/// one energised for exactly that long stays on for the shortest pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ValveTrack {
-    /// The coil is on, at the end of what has been decided.
+    /// The coil is on at the end of what has been decided.
     coil: bool,
     /// The chamber sees the valve open.
     open: bool,
-    /// Changes that the chamber has not seen yet.
+    /// Number of changes that the chamber has not seen yet.
     pending: u8,
-    /// The moment of each, oldest first; beyond `pending` without meaning.
+    /// The moment of each, oldest first; entries beyond `pending` have no meaning.
     edges: [u32; EDGES],
-    /// When the coil changed.
+    /// When the coil last changed.
     changed: u32,
 }
 
@@ -79,7 +79,7 @@ impl Default for ValveTrack {
 }
 
 impl ValveTrack {
-    /// Shut for a long time, on a clock that begins at 0.
+    /// Shut for a long time, on a clock that starts at 0.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -97,14 +97,14 @@ impl ValveTrack {
         self.coil
     }
 
-    /// For how long the coil has been as it is at the moment `at`, µs.
+    /// How long the coil has been in its present state at the moment `at`, µs.
     #[inline]
     #[must_use]
     pub const fn elapsed(&self, at: u32) -> u32 {
         at.wrapping_sub(self.changed)
     }
 
-    /// The coil changes at the moment `at`.
+    /// Switches the coil at the moment `at`.
     fn change(&mut self, at: u32, times: &ValveTimes) {
         let elapsed = self.elapsed(at);
         let (took, delay) = if self.coil {
@@ -115,19 +115,19 @@ impl ValveTrack {
         self.coil = !self.coil;
         self.changed = at;
         if elapsed < took as u32 && self.pending > 0 {
-            // Called back before it moved: the change under way does not happen.
+            // Reversed before the valve moved: the change under way does not happen.
             self.pending = self.pending.wrapping_sub(1);
         } else if let Some(next) = self.edges.get_mut(usize::from(self.pending)) {
             *next = at.wrapping_add(delay.wrapping_add(times.line) as u32);
             self.pending = self.pending.wrapping_add(1);
         } else {
-            // More changes than a line can hold: only the end is known.
+            // More changes than can be stored: only the final state is known.
             self.pending = 0;
             self.open = self.coil;
         }
     }
 
-    /// Takes the on-time of the `span` µs that begin `now`: `on` µs from there.
+    /// Takes the on-time for the `span` µs that begin at `now`: on for `on` µs from there.
     #[inline]
     pub fn energise(&mut self, now: u32, on: i32, span: i32, times: &ValveTimes) {
         if on > 0 && !self.coil {
@@ -144,8 +144,8 @@ impl ValveTrack {
         self.changed = at;
     }
 
-    /// For how long the chamber sees the valve open within `span` µs from the moment `from`,
-    /// up to which all changes have passed.
+    /// How long the chamber sees the valve open within `span` µs from the moment `from`, up to which all changes have
+    /// been processed.
     #[inline]
     pub fn passes(&mut self, from: u32, span: i32) -> i32 {
         let (mut seen, mut since) = (0_i32, 0_i32);
@@ -169,9 +169,9 @@ impl ValveTrack {
         seen
     }
 
-    /// For how long the chamber will still see the valve open after the moment `from`, up to
-    /// which all changes have passed, if its coil falls as soon after `next`, up to which it
-    /// is decided, as the shortest pulse allows, µs.
+    /// How long, µs, the chamber will still see the valve open after the moment `from`, up to which all changes have
+    /// been processed. The coil has been decided up to `next`, and goes off as soon after that as the shortest pulse
+    /// allows.
     #[inline]
     #[must_use]
     pub fn committed(&self, from: u32, next: u32, times: &ValveTimes) -> i32 {
@@ -180,7 +180,7 @@ impl ValveTrack {
             let left = (times.shortest_pulse as u32).saturating_sub(valve.elapsed(next));
             valve.change(next.wrapping_add(left), times);
         }
-        // All that is under way passes in twice the longest delays.
+        // Everything under way passes within twice the longest delays.
         valve.passes(from, 1 << 18)
     }
 }
@@ -200,7 +200,7 @@ mod tests {
         shortest_gap: 2350,
     };
 
-    /// A tick with an on-time; gives for how long the valve was open in it.
+    /// A tick with an on-time; returns how long the valve was open in it.
     fn tick(track: &mut ValveTrack, now: u32, on: i32) -> i32 {
         track.energise(now, on, 1000, &TIMES);
         track.passes(now, 1000)
@@ -255,7 +255,7 @@ mod tests {
         assert_eq!(opened, 11_000 - 4400);
     }
 
-    /// On-time of the 4 ms from `next` for what is left of the shortest pulse.
+    /// On-time, in the 4 ms from `next`, for the rest of the shortest pulse.
     fn rest_of_pulse(track: &ValveTrack, next: u32) -> i32 {
         if !track.coil {
             return 0;
@@ -264,7 +264,7 @@ mod tests {
         left.clamp(0, 4000) as i32
     }
 
-    /// What is seen open from `now` on if nothing is asked for any more.
+    /// How long it is seen open from `now` on if nothing more is demanded.
     fn rest_of(track: &mut ValveTrack, mut now: u32) -> i32 {
         let mut seen = 0;
         for _ in 0..20 {
@@ -277,8 +277,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is sent, the end state follows the coil, and what was
-        /// committed is what the chamber then sees.
+        /// Whatever is sent, the final state follows the coil, and the chamber then sees what was committed.
         #[test]
         fn commitment_is_kept(
             ticks in proptest::collection::vec(0_i32..=1000, 1..80),
@@ -295,7 +294,7 @@ mod tests {
             prop_assert!(!track.coil && !track.open);
         }
 
-        /// The same for a law that decides a period ahead and looks from before its begin.
+        /// The same for a law that decides a period ahead and looks from before the period begins.
         #[test]
         fn commitment_of_periods_is_kept(
             periods in proptest::collection::vec(0_i32..=6000, 1..40), before in 0_u32..=3000,

@@ -6,16 +6,14 @@
 //! ST52F510 data sheet p. 56–58; DATASHEET). Up to 4 inputs, up to 16 sets per
 //! input.
 //!
-//! * [`Partition`]: the sets of one input, with slopes worked out at compile time.
-//! * [`GridRules`]: two inputs and a full table of rules. When at most two
-//!   neighbouring sets of each input are active at a time, which is found out
-//!   at compile time, only the four rules that can fire are evaluated;
-//!   otherwise all are. The result is the same, bit for bit.
+//! * [`Partition`]: the sets of one input, with slopes computed at compile time.
+//! * [`GridRules`]: two inputs and a full table of rules. If at most two neighbouring sets of each input are active at
+//!   a time, which is determined at compile time, only the four rules that can fire are evaluated; otherwise all are.
+//!   The result is the same, bit for bit.
 //! * [`RuleList`]: up to four inputs and a free list of rules.
 //!
-//! Tables are plain `const` data that a user can replace; what is wrong with
-//! one is reported by a `Result`, which a `const` item turns into a
-//! compilation error.
+//! Tables are plain `const` data that a user can replace. An invalid table is reported by a `Result`, which a `const`
+//! item turns into a compilation error.
 //!
 //! ```
 //! use wheeleg_control::paper::fuzzy::{GridRules, Partition};
@@ -46,7 +44,7 @@
 //! assert_eq!(GAP.len(), 2);
 //! ```
 //!
-//! and one unit more of either side does:
+//! One unit more on either side closes it:
 //!
 //! ```
 //! use wheeleg_control::paper::fuzzy::{Partition, Triangle};
@@ -62,12 +60,10 @@
 //!
 //! # Numbers
 //!
-//! Inputs, vertices and consequents are `i16` in a domain that the table
-//! chooses (8-bit tables use −128…127 or 0…255). Membership is an integer
-//! 0…`levels`; [`FULL_LEVELS`] by default, [`CHIP_LEVELS`] for the 4 bits of the
-//! chip. A membership is rounded to nearest and within ±1 level of the exact
-//! value; the weighted mean is rounded to nearest, ties away from zero, so a
-//! table with odd symmetry gives an output with odd symmetry. `Σ ωᵢ = 0` gives 0.
+//! Inputs, vertices and consequents are `i16` in a domain that the table chooses (8-bit tables use −128…127 or 0…255).
+//! Membership is an integer 0…`levels`; [`FULL_LEVELS`] by default, [`CHIP_LEVELS`] for the 4 bits of the chip. A
+//! membership is rounded to nearest and is within ±1 level of the exact value. The weighted mean is rounded to nearest,
+//! ties away from zero, so a table with odd symmetry gives an output with odd symmetry. `Σ ωᵢ = 0` gives 0.
 
 mod grid;
 mod list;
@@ -115,13 +111,13 @@ const fn mean_i32(numerator: i32, denominator: i32) -> i16 {
         numerator.saturating_add(half)
     };
     match biased.checked_div(denominator) {
-        // A mean of numbers of 16 bits is one.
+        // A mean of 16-bit numbers fits 16 bits.
         Some(mean) => mean as i16,
         None => 0,
     }
 }
 
-/// As [`mean_i32`], wide.
+/// As [`mean_i32`], with 64 bits.
 const fn mean_i64(numerator: i64, denominator: i64) -> i16 {
     if denominator <= 0 {
         return 0;

@@ -1,4 +1,4 @@
-//! The paper's law: fuzzy inference, its rules, and the velocity that they need.
+//! The paper's law: fuzzy inference, its rules, and the velocity estimate that they need.
 
 pub mod fuzzy;
 pub mod rules;

@@ -1,17 +1,14 @@
 //! The rule bases shipped with the joint law.
 //!
-//! The paper does not print its rules; these are ASSUMED, designed as said
-//! below, and can be replaced: they are plain data.
+//! The paper does not print its rules; these are ASSUMED, designed as described below. They are plain data and can be
+//! replaced.
 //!
-//! Both are odd (turning the sign of both inputs turns the sign of the
-//! output), and give zero at zero, so the correction alone can not make an
-//! offset. The tables rise or stay level in each input; between the vertices,
-//! AND = minimum lets the surface dip by up to 1.6 % of full scale. Tests hold
-//! them to all of that.
+//! Both are odd (reversing the sign of both inputs reverses the sign of the output) and give zero at zero, so the
+//! correction alone can not cause an offset. The tables are non-decreasing in each input; between the vertices, AND =
+//! minimum lets the surface dip by up to 1.6 % of full scale. Tests check all of this.
 //!
-//! Sets are NB NM NS ZE PS PM PB with vertices at ±1, ±0.5, ±0.2 and 0 of full
-//! scale: closer together near zero, where the piston is to come to rest.
-//! Neighbours cross at half membership, so at most four rules fire.
+//! Sets are NB NM NS ZE PS PM PB with vertices at ±1, ±0.5, ±0.2 and 0 of full scale: closer together near zero, where
+//! the piston is to come to rest. Neighbours cross at half membership, so at most four rules fire.
 //!
 //! Evaluated in `paper/fuzzy`: w_r = min(μ_i(a), μ_j(b)), output = Σ w_r c_r / Σ w_r.
 
@@ -22,12 +19,10 @@ pub const VERTICES: [i16; 7] = [-32_767, -16_384, -6_554, 0, 6_554, 16_384, 32_7
 
 /// PD-type correction, rows e, columns ė, per mille of full output.
 ///
-/// Read along a row for damping: ė = reference velocity − velocity is negative
-/// while the piston runs ahead of its reference, and the output brakes. Near
-/// the target (ZE) the brake is at its hardest; far from it (PB) it is
-/// almost off, because there the piston should be moving. Down the middle column
-/// the correction stiffens small errors more than large ones, which counters
-/// static friction without raising Kp.
+/// A row shows the damping: ė = reference velocity − velocity is negative while the piston runs ahead of its reference,
+/// and the output brakes. Near the target (ZE) the brake is strongest; far from it (PB) it is almost off, because there
+/// the piston should be moving. The middle column shows that the correction stiffens small errors more than large ones,
+/// which counters static friction without raising Kp.
 pub const PD_PER_MILLE: [[i16; 7]; 7] = [
     [-1000, -1000, -600, -300, -150, 0, 100],
     [-1000, -900, -550, -250, 0, 250, 500],
@@ -40,9 +35,8 @@ pub const PD_PER_MILLE: [[i16; 7]; 7] = [
 
 /// ID-type correction, rows ∫e, columns ė, per mille of full output.
 ///
-/// Nearly the sum of an integral term (±1 at full scale) and a damping term
-/// (±0.6), cut at ±1: the integral must stay close to linear, or the loop gain
-/// would change while it hunts for the duty that balances load and friction.
+/// Nearly the sum of an integral term (±1 at full scale) and a damping term (±0.6), limited to ±1. The integral must
+/// stay close to linear, or the loop gain would change while it searches for the duty that balances load and friction.
 pub const ID_PER_MILLE: [[i16; 7]; 7] = [
     [-1000, -1000, -1000, -1000, -760, -600, -400],
     [-1000, -900, -740, -500, -260, -100, 100],
@@ -62,7 +56,7 @@ pub const ID: GridRules<7, 7> = compiled(ID_PER_MILLE);
 /// A rule base on [`VERTICES`] from per-mille consequents.
 ///
 /// # Errors
-/// None for this partition; the type is that of the parts.
+/// None for this partition; the type is that of the functions used.
 pub const fn from_per_mille(table: [[i16; 7]; 7]) -> Result<GridRules<7, 7>, FuzzyError> {
     let partition = match Partition::fan(VERTICES) {
         Ok(partition) => partition,
@@ -93,7 +87,7 @@ const fn full_scale(table: [[i16; 7]; 7]) -> [[i16; 7]; 7] {
     scaled
 }
 
-/// For `const` items only: a faulty table stops the compilation.
+/// For `const` items only: an invalid table stops the compilation.
 #[allow(
     clippy::panic,
     reason = "called in `const` items alone: stops the compilation"

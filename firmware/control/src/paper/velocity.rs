@@ -1,16 +1,14 @@
 //! Velocity from positions, by linear regression over a long window.
 //!
-//! One step of a 12-bit converter over 180 mm is 0.044 mm: its backward
-//! difference at 1 kHz jumps by 44 mm/s. The slope of the least-squares line
-//! through the last N samples,
+//! One step of a 12-bit converter over 180 mm is 0.044 mm: its backward difference at 1 kHz jumps by 44 mm/s. The slope
+//! of the least-squares line through the last N samples,
 //!
 //! ```text
 //! v = 6 fs Σ (2k − (N − 1)) y_k / (N (N² − 1)),  k = 0 (oldest) … N − 1 (newest)
 //! ```
 //!
-//! is the estimate with the least noise among all windows of N samples.
-//! Two sums of integers are carried from tick to tick, exactly: there is no
-//! drift, and the cost does not depend on N.
+//! is the estimate with the least noise among all windows of N samples. Two integer sums are carried from tick to tick,
+//! exactly: there is no drift, and the cost does not depend on N.
 //!
 //! | N | delay at 1 kHz | noise, mm/s per mm of white position noise |
 //! |---|---|---|
@@ -19,10 +17,9 @@
 //! | 32 | 15.5 ms | 19 |
 //! | 64 | 31.5 ms | 6.8 |
 //!
-//! Delay is (N − 1)/2 ticks: on a ramp the estimate is exact once the window is
-//! full, on a parabola it is the true velocity of that much earlier. Noise gain
-//! is √(12 / (N (N² − 1))) × fs. A step of one converter step gives a transient
-//! of at most 1.5 × step × fs / N.
+//! The delay is (N − 1)/2 ticks. On a ramp the estimate is exact once the window is full; on a parabola it is the true
+//! velocity that much earlier. The noise gain is √(12 / (N (N² − 1))) × fs. A step of one converter step gives a
+//! transient of at most 1.5 × step × fs / N.
 //!
 //! Not modelled: unequal sample spacing. A missed tick is a fault of the board.
 //!
@@ -36,8 +33,8 @@ pub const MAX_WINDOW: u8 = 64;
 
 const CAPACITY: usize = MAX_WINDOW as usize;
 
-/// Fractional bits of the scale factor are chosen so that it has this many
-/// significant bits: a relative error of at most 2^-24.
+/// The fractional bits of the scale factor are chosen so that it has this many significant bits: a relative error of at
+/// most 2^-24.
 const SCALE_BITS: u32 = 24;
 
 /// The window: its length and the factor from the sum to raw mm/s.
@@ -114,16 +111,16 @@ impl VelocityWindow {
     }
 }
 
-/// The last positions and their sums.
+/// The last positions and two sums of them.
 ///
-/// Its `Hash` is for sealing memory: places beyond the window count for nothing.
+/// Its `Hash` is for sealing memory; places beyond the window are excluded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VelocityEstimator {
-    /// A ring in the first `length` places.
+    /// A ring buffer in the first `length` places.
     samples: [i32; CAPACITY],
     /// Samples of the window; 0 before the first sample.
     length: u8,
-    /// Place of the oldest sample, which the next one takes.
+    /// Place of the oldest sample, which the next one replaces.
     oldest: u8,
     /// Σ y.
     total: i64,
@@ -155,11 +152,11 @@ impl VelocityEstimator {
         *self = Self::new();
     }
 
-    /// Takes the position of this tick and gives the velocity, saturating.
+    /// Takes the position of this tick and returns the velocity, saturating.
     ///
     /// `window` must be the same from call to call; after another one, call
     /// [`VelocityEstimator::reset`]. Never panics.
-    // One copy, compiled for speed: inlined, it would be where it is called.
+    // Exists once, compiled for speed; inlined, it would be compiled like its caller.
     #[inline(never)]
     pub fn update(&mut self, window: &VelocityWindow, position: PositionMm) -> VelocityMmS {
         let sample = position.raw();
@@ -179,8 +176,8 @@ impl VelocityEstimator {
         let next = self.oldest.wrapping_add(1);
         self.oldest = if next < self.length { next } else { 0 };
         let oldest = i64::from(oldest);
-        // Every k falls by one, so that every sample loses twice its value; the oldest
-        // leaves with −(N − 1) and loses nothing, the newest comes with N − 1.
+        // Every k falls by one, so every sample loses twice its value. The oldest leaves with −(N − 1) and loses
+        // nothing; the newest enters with N − 1. |total| < 2^37, |slope| < 2^43.
         // |total| < 2^37, |slope| < 2^43.
         let length = i32::from(length);
         let above = i64::from(length.wrapping_add(1));
@@ -198,7 +195,7 @@ impl VelocityEstimator {
 impl core::hash::Hash for VelocityEstimator {
     #[inline]
     fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here.
+        // Destructured, so that a new field cannot be forgotten here.
         let Self {
             samples,
             length,

@@ -7,7 +7,7 @@
 //!
 //! X is the position error in counts, MC the motor command, limited to 8 bits.
 //!
-//! Source: HCTL-1100 data sheet, filter equations (DATASHEET). That the limited command is fed back is ASSUMED, for the
+//! Source: HCTL-1100 data sheet, filter equations (DATASHEET). Feeding back the limited command is ASSUMED, for the
 //! reason given at `FilterMemory`.
 
 use super::types::LeadFilter;
@@ -25,11 +25,10 @@ const PORT_MIN: i32 = -(128 << FRACTION);
 /// MC_n = (K/4) X_n − (A/256)(K/4) X_{n−1} − (B/256) MC_{n−1}
 /// ```
 ///
-/// in units of 1/1024: K (256 X_n − A X_{n−1}) is exact, only the feedback is
-/// rounded. The fed-back MC is the one limited to the port. The data sheet
-/// does not say; with the unlimited one, a large step (K/4 = 16 on 1000 counts)
-/// would come back a quarter as large with the opposite sign, and throw the
-/// motor into full reverse in the sample after.
+/// in units of 1/1024: K (256 X_n − A X_{n−1}) is exact, only the feedback is rounded. The MC that is fed back is
+/// limited to the port. The data sheet does not specify this; with the unlimited one, a large step (K/4 = 16 on 1000
+/// counts) would come back a quarter as large with the opposite sign, and drive the motor into full reverse in the next
+/// sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct FilterMemory {
     error: i32,
@@ -48,7 +47,7 @@ impl FilterMemory {
     #[inline]
     pub(super) fn update(&mut self, filter: LeadFilter, error: i32) -> MotorCommand {
         let [zero, pole, gain] = [filter.zero, filter.pole, filter.gain].map(i32::from);
-        // Two products of 32 bits: errors of 24 bits, factors of 16.
+        // Two products of 32 bits: errors have 24 bits, factors 16.
         let newest = i64::from(error).wrapping_mul(i64::from(gain.wrapping_shl(8)));
         let last = i64::from(self.error).wrapping_mul(i64::from(zero.wrapping_mul(gain)));
         // The command is within the port's range, 2^17, and its factor below 2^8.
@@ -82,7 +81,7 @@ impl FilterMemory {
     }
 }
 
-/// To the 8-bit port, saturating.
+/// Limits to the 8-bit port, saturating.
 #[inline]
 fn to_port(command: i32) -> i8 {
     command.clamp(-128, 127) as i8

@@ -1,14 +1,13 @@
-//! Wheel control as the HCTL-1100 does it, behind a typed interface.
+//! Wheel control as in the HCTL-1100, behind a typed interface.
 //!
-//! What a user of the chip relies on is kept (HCTL-1100 data sheet pp. 14–35,
-//! DATASHEET; [`WheelController`] lists it); registers, commutator, bus timing and multi-chip
-//! synchronisation are left out. Positions are 24 bits and wrap.
+//! What a user of the chip relies on is kept (HCTL-1100 data sheet pp. 14–35, DATASHEET; [`WheelController`] lists it).
+//! Registers, commutator, bus timing and multi-chip synchronisation are left out. Positions have 24 bits and wrap.
 //!
 //! * [`LeadFilter`] and its arithmetic: `wheel/filter.rs`.
 //! * Trapezoidal profile and velocity ramp: `wheel/profile.rs`.
 //! * Modes, flags, output port: `wheel/controller.rs`.
 //!
-//! The chip's word lengths and rounding are not in its data sheet. Ours:
+//! The chip's word lengths and rounding are not in its data sheet. Those used here:
 //!
 //! | quantity | format | rounding |
 //! |---|---|---|
@@ -18,7 +17,7 @@
 //! | profile position | 24.8, wraps | exact |
 //! | profile velocity | 7.8 with sign | exact |
 //!
-//! "Nearest" has ties away from zero throughout.
+//! "Nearest" means ties away from zero throughout.
 
 mod controller;
 mod filter;

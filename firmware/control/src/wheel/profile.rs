@@ -6,7 +6,7 @@
 //! ramp      v_n = v_{n−1} towards the command by at most a;   x_n = x_{n−1} + v_n
 //! ```
 //!
-//! Source: modes of the HCTL-1100 (DATASHEET); its sequence of points is not published, and this one is DERIVED.
+//! Source: modes of the HCTL-1100 (DATASHEET). Its sequence of points is not published; this one is DERIVED.
 //!
 //! Positions in 1/256 count, velocities in 1/256 count per sample,
 //! accelerations in 1/256 count per sample².
@@ -18,21 +18,19 @@ const FRACTION: u32 = 8;
 
 /// A trapezoidal move, sample by sample.
 ///
-/// From rest at the start, velocity rises by at most the acceleration per
-/// sample, stays at the maximum, and falls so as to end exactly on the final
-/// position: a triangle when the way is too short for the maximum. In each
-/// sample the profile goes as fast as still allows a stop in steps of the
-/// acceleration, so no profile within these limits is faster by a whole sample.
-/// The chip's own sequence of points is not in its data sheet; shape, limits and
-/// end agree with it.
+/// From rest, velocity rises by at most the acceleration per sample, stays at the maximum, and falls so as to end
+/// exactly on the final position; if the distance is too short for the maximum, the profile is a triangle. In each
+/// sample the profile is as fast as a stop in steps of the acceleration still allows, so no profile within these limits
+/// is faster by a whole sample. The chip's own sequence of points is not in its data sheet; shape, limits and end agree
+/// with it.
 ///
-/// The way is the shorter one around the 24-bit circle, at most 7FFFFFH counts.
+/// The direction is the shorter one around the 24-bit circle, at most 7FFFFFH counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Profile {
-    /// Where the next point is measured from.
+    /// The position from which the next point is measured.
     target: WheelCount,
     forward: bool,
-    /// Way left, 1/256 count.
+    /// Remaining distance, 1/256 count.
     remaining: u32,
     velocity: u32,
     maximum: u32,
@@ -40,9 +38,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// A move from `start` to `target` with the maximum velocity in counts per
-    /// sample (1…127) and the acceleration in 1/256 count per sample² (1…32 767);
-    /// values outside are taken as the nearest.
+    /// A move from `start` to `target` with the maximum velocity in counts per sample (1…127) and the acceleration in
+    /// 1/256 count per sample² (1…32 767); values outside these ranges are limited to them.
     #[must_use]
     pub const fn new(
         start: WheelCount,
@@ -92,13 +89,13 @@ impl Profile {
         }
     }
 
-    /// The next point, to whole counts: the way left is rounded to nearest.
-    /// Stays on the final position once there. Never panics.
+    /// The next point, to whole counts: the remaining distance is rounded to nearest. Stays on the final position once
+    /// there. Never panics.
     #[inline]
     pub fn advance(&mut self) -> WheelCount {
         self.velocity = self.choose().min(self.remaining);
         self.remaining = self.remaining.saturating_sub(self.velocity);
-        // remaining <= 2^31: half a count more still fits a `u32`.
+        // remaining <= 2^31: another half count still fits a `u32`.
         let left = self
             .remaining
             .wrapping_add(1 << (FRACTION - 1))
@@ -110,15 +107,13 @@ impl Profile {
         })
     }
 
-    /// The largest velocity for this sample: at most v + a and the maximum, and
-    /// such that the way left allows one sample at it and then a stop in steps
-    /// of a.
+    /// The largest velocity for this sample: at most v + a and the maximum, and such that the remaining distance allows
+    /// one sample at it and then a stop in steps of a.
     ///
-    /// One sample at w and the stop after it, w + (w − a) + (w − 2a) + … while
-    /// positive, cover (n + 1) w − a n (n + 1)/2 with n = ⌊w/a⌋. That rises with w,
-    /// so the largest w of a given n is (way + a n (n + 1)/2) / (n + 1), if
-    /// that is at least n a, that is, if the way is at least a n (n + 1)/2. Since
-    /// v − a always allows the stop, the search ends after at most three n.
+    /// One sample at w and the stop after it, w + (w − a) + (w − 2a) + … while positive, cover (n + 1) w − a n (n +
+    /// 1)/2 with n = ⌊w/a⌋. That rises with w, so the largest w for a given n is (way + a n (n + 1)/2) / (n + 1),
+    /// provided that it is at least n a, that is, that the way is at least a n (n + 1)/2. Since v − a always allows the
+    /// stop, the search ends after at most three n.
     #[inline]
     fn choose(&self) -> u32 {
         // All terms below 2^31: v < 2^15 + 2^15, n a <= v, way <= 2^31.
@@ -135,7 +130,7 @@ impl Profile {
                 let best = way.checked_div(n.wrapping_add(1)).unwrap_or(0);
                 return best.min(high);
             }
-            // The way of one n less; that of n = 0 is zero.
+            // The distance for n − 1; for n = 0 it is zero.
             stop = stop.wrapping_sub(a.wrapping_mul(n));
             n = n.wrapping_sub(1);
         }
@@ -143,8 +138,8 @@ impl Profile {
     }
 }
 
-/// A velocity that follows its command at a bounded acceleration, and the
-/// position that it generates (integral velocity mode).
+/// A velocity that follows its command with bounded acceleration, and the position that it generates (integral velocity
+/// mode).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ramp {
     position: WheelCount,
@@ -177,9 +172,8 @@ impl Ramp {
         self.velocity
     }
 
-    /// One sample towards `command` counts per sample at
-    /// `acceleration_raw`/256 counts per sample². Gives the next position, which
-    /// wraps. Never panics.
+    /// One sample towards `command` counts per sample at `acceleration_raw`/256 counts per sample². Returns the next
+    /// position, which wraps. Never panics.
     #[inline]
     pub fn advance(&mut self, command: i8, acceleration_raw: u16) -> WheelCount {
         let target = i32::from(command).wrapping_shl(FRACTION);

@@ -7,7 +7,7 @@ use wheeleg_units::WheelCount;
 /// Velocity of proportional velocity mode: I12F4 counts per sample, ±2048.
 pub type WheelVelocity = FixedI16<U4>;
 
-/// Acceleration: U8F8 counts per sample², of which 0…127.996 is allowed.
+/// Acceleration: U8F8 counts per sample²; 0…127.996 is allowed.
 pub type WheelAcceleration = FixedU16<U8>;
 
 /// Operating mode (HCTL-1100 data sheet p. 31–35).
@@ -19,7 +19,7 @@ pub enum WheelMode {
     Idle,
     /// Position control: 24-bit command − 24-bit actual through the filter.
     Position,
-    /// Proportional velocity: gain alone on the velocity error.
+    /// Proportional velocity: only the gain acts, on the velocity error.
     ProportionalVelocity,
     /// Trapezoidal profile in progress; ends by itself in [`WheelMode::Position`].
     Trapezoidal,
@@ -62,8 +62,7 @@ impl Default for SampleTimer {
 }
 
 impl SampleTimer {
-    /// Sample time in nanoseconds, rounded to nearest, for a clock of
-    /// `clock_hz`; zero for a clock of zero.
+    /// Sample time in nanoseconds, rounded to nearest, for a clock of `clock_hz`; zero for a clock of zero.
     #[must_use]
     pub const fn period_ns(self, clock_hz: u32) -> u64 {
         let clocks = (self.0 as u64).wrapping_add(1).wrapping_mul(16);
@@ -94,10 +93,10 @@ impl SampleTimer {
 pub struct WheelInput {
     /// Encoder position.
     pub actual: WheelCount,
-    /// LIMIT input active: to idle at once, motor command zero. The pin itself
-    /// is active low; `true` means it is triggered.
+    /// LIMIT input active: goes to idle at once, motor command zero. The pin itself is active low; `true` means that it
+    /// is triggered.
     pub limit: bool,
-    /// STOP input active: in integral velocity mode, ramp to a standstill and hold.
+    /// STOP input active: in integral velocity mode, ramps to a standstill and holds.
     pub stop: bool,
 }
 
@@ -119,7 +118,7 @@ pub struct WheelOutput {
     pub error: i32,
     /// Change of the actual position since the last sample, counts.
     pub velocity: i32,
-    /// What stands out about this sample.
+    /// Status flags of this sample.
     pub status: WheelStatus,
 }
 
@@ -139,7 +138,7 @@ pub struct WheelStatus {
     pub pwm_saturated: bool,
 }
 
-/// Why a request was refused. Nothing has changed then.
+/// Why a request was refused; then nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum WheelError {
@@ -169,7 +168,7 @@ pub enum WheelError {
 /// A typed request to the controller: what the bus commands map to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WheelCommand {
-    /// Soft reset: as after power-on, parameters included.
+    /// Soft reset: as after power-on, including the parameters.
     Reset,
     /// To INIT/IDLE: motor command zero, filter memory cleared.
     Idle,
@@ -188,9 +187,9 @@ pub enum WheelCommand {
     MaximumVelocity(u8),
     /// Final position of trapezoidal mode.
     FinalPosition(WheelCount),
-    /// Filter parameters; at any time.
+    /// Filter parameters; allowed at any time.
     Filter(LeadFilter),
-    /// Sample timer; acts after the present sample.
+    /// Sample timer; takes effect after the present sample.
     SampleTimer(SampleTimer),
     /// Blanking after a change of sign.
     SignReversalInhibit(bool),

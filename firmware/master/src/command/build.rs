@@ -13,7 +13,7 @@ use crate::layer1::foot::FootShape;
 use crate::layer1::params::{GaitParams, ParamError, Pattern};
 use crate::layer1::walk::{WalkOrder, WalkPattern};
 
-/// A value for the argument of this name.
+/// A value for the argument with this name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Given<'a> {
     /// Name of the argument.
@@ -25,7 +25,7 @@ pub struct Given<'a> {
 /// Why the arguments do not make a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArgumentError<'a> {
-    /// The command has no argument of this name.
+    /// The command has no argument with this name.
     Unknown {
         /// The command.
         code: CommandCode,
@@ -42,7 +42,7 @@ pub enum ArgumentError<'a> {
         /// Which.
         &'static Argument,
     ),
-    /// A value is of another kind than its argument.
+    /// A value is of the wrong kind for its argument.
     WrongKind(
         /// Which.
         &'static Argument,
@@ -185,7 +185,7 @@ impl Command {
     }
 }
 
-/// The given arguments, known to belong to the command, each at most once.
+/// The given arguments, checked to belong to the command, each at most once.
 struct Arguments<'a>(&'a [Given<'a>]);
 
 impl<'a> Arguments<'a> {

@@ -1,4 +1,4 @@
-//! The page `docs/reference/commands.md`, written from the table of commands.
+//! The page `docs/reference/commands.md`, generated from the table of commands.
 
 use core::fmt;
 

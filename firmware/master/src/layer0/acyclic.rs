@@ -5,12 +5,12 @@ use wheeleg_protocol::{Address, Message};
 
 use crate::dispatcher::Ticket;
 
-/// Requests that can wait. Arming needs [`ARMING_JOBS`], a stop 8, a clear 16.
+/// Number of requests that can wait. Arming needs [`ARMING_JOBS`], a stop 8, a clear 16.
 pub const JOBS: usize = 32;
 
-/// Requests that arming makes: one to each joint, four to each wheel.
+/// Number of requests for arming: one to each joint, four to each wheel.
 pub const ARMING_JOBS: usize = 14;
-/// Requests that change the profile of both wheels.
+/// Number of requests that change the profile of both wheels.
 pub const PROFILE_JOBS: usize = 4;
 
 /// Why a request is made; decides what its answer means.
@@ -18,10 +18,9 @@ pub const PROFILE_JOBS: usize = 4;
 pub enum Purpose {
     /// Enumeration.
     Identify,
-    /// A question of the master's own ([`super::questions`]).
+    /// A question that the master itself asks ([`super::questions`]).
     Report,
-    /// A look whether a board that stored its parameters is still the one that was
-    /// asked to.
+    /// Checks whether a board that stored its parameters is still the one that was asked to.
     Saved(
         /// Whom to answer.
         Ticket,
@@ -53,19 +52,19 @@ impl Purpose {
 /// A request that waits or is under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Node asked.
+    /// Node that is asked.
     pub to: Address,
     /// Request.
     pub message: Message,
-    /// For whom it is made.
+    /// Why, and for whom, it is made.
     pub purpose: Purpose,
-    /// Latest time at which it may leave the queue, µs: requests wait while a silent board is asked again,
-    /// and a command that moves an axis must not come long after it was wanted.
+    /// Latest time at which it may leave the queue, µs. Requests wait while a silent board is asked again, and a
+    /// command that moves an axis must not arrive long after it was wanted.
     pub until_us: u64,
 }
 
 impl Job {
-    /// One that may wait.
+    /// A request without a time limit.
     #[must_use]
     pub const fn new(to: Address, message: Message, purpose: Purpose) -> Self {
         Self {
@@ -98,7 +97,7 @@ impl Jobs {
         self.queue.len().saturating_add(count) <= self.queue.capacity()
     }
 
-    /// Adds a request. `false` if the queue is full; then nothing changed.
+    /// Adds a request. Returns `false` if the queue is full; then nothing has changed.
     pub fn push(&mut self, job: Job) -> bool {
         self.queue.push_back(job).is_ok()
     }
@@ -121,7 +120,7 @@ impl Jobs {
                 return;
             };
             if !unwanted(&job) {
-                // There is room: it has just been removed.
+                // There is room: the job has just been removed.
                 let _fits = self.push(job);
             } else if let Some(ticket) = job.purpose.ticket() {
                 dropped(ticket);
@@ -135,13 +134,13 @@ impl Jobs {
         self.drop_where(|_| true, dropped);
     }
 
-    /// Asks every node the same, with nobody waiting for it: first those that are `alive` (a silent one would
-    /// delay the others through its retries).
+    /// Sends every node the same request, with nobody waiting for the answers: first to those that are `alive`, because
+    /// a silent node would delay the others through its retries.
     pub fn ask_all(&mut self, message: Message, alive: impl Fn(usize) -> bool) {
         for wanted in [true, false] {
             for to in Address::nodes() {
                 if to.slot().is_some_and(|index| alive(index) == wanted) {
-                    // Eight of them fit the queue, which the caller has cleared.
+                    // Eight requests fit the queue, which the caller has cleared.
                     let _fits = self.push(Job::new(to, message, Purpose::Stop));
                 }
             }

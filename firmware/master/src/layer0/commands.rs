@@ -38,7 +38,7 @@ impl Layer0 {
         now_us: u64,
         events: &mut Events,
     ) -> Result<bool, Refusal> {
-        // The control may have ended since the door.
+        // Control may have ended since the command was accepted.
         self.may_command(accepted.ticket.client, &accepted.command)?;
         match accepted.command {
             Command::Arm => self.begin_arming(accepted),
@@ -208,7 +208,7 @@ impl Layer0 {
         }
     }
 
-    /// Whether the user may lead single axes.
+    /// Whether the user may command single axes.
     fn may_lead(&self) -> Result<(), Refusal> {
         if self.hold.is_some() || self.frozen.is_some() {
             Err(Refusal::Latched)
@@ -221,7 +221,7 @@ impl Layer0 {
         }
     }
 
-    /// A stop of one axis ends every motion; the others keep their place.
+    /// A stop of one axis ends every motion; the others keep their position.
     fn freeze_if_armed(&mut self) {
         if self.power == Power::Armed && self.frozen.is_none() {
             self.freeze();
@@ -257,7 +257,7 @@ impl Layer0 {
         if self.has_no_air() {
             return Err(Refusal::NoAir);
         }
-        // All or nothing: some nodes armed on their own would be no answer.
+        // All or nothing: arming only some nodes is not acceptable.
         if !self.jobs.has_room(ARMING_JOBS) {
             return Err(Refusal::Busy);
         }
@@ -277,7 +277,7 @@ impl Layer0 {
             let setup = wheel_setup.iter().filter(|_| to.is_wheel());
             for message in setup.chain(core::iter::once(&arm)) {
                 let job = Job::new(to, *message, Purpose::Group);
-                // They fit: see above.
+                // They fit, as checked above.
                 left = left.saturating_add(u8::from(self.jobs.push(job)));
             }
         }
@@ -292,8 +292,8 @@ impl Layer0 {
         Ok(false)
     }
 
-    /// Messages that set the speed and acceleration of a wheel board's profiles; if its references are
-    /// streamed, the speed that these never exceed.
+    /// Messages that set the speed and acceleration of a wheel board's profiles or, if its references are streamed, the
+    /// speed that these never exceed.
     fn profile_messages(&self) -> [Message; 2] {
         let push = self.push.speed_mm_s;
         let speed = match self.config.wheel_drive {
@@ -309,14 +309,13 @@ impl Layer0 {
         ]
     }
 
-    /// Takes over the profile that layer 1 wants for its pushes. Armed wheels get it at once, the others when
-    /// they arm.
+    /// Adopts the profile that layer 1 wants for its pushes. Armed wheels get it at once, the others when they arm.
     pub(super) fn shape_pushes(&mut self, push: PushProfile) {
         if push == self.push {
             return;
         }
         let tell = self.power == Power::Armed;
-        // Not now is not never: layer 1 asks again in every cycle.
+        // This is only a delay: layer 1 asks again in every cycle.
         if tell && !self.jobs.has_room(PROFILE_JOBS) {
             return;
         }
@@ -326,7 +325,7 @@ impl Layer0 {
         }
         for to in Address::nodes().filter(|node| node.is_wheel()) {
             for message in self.profile_messages() {
-                // They fit: see above.
+                // They fit, as checked above.
                 let _fits = self.jobs.push(Job::new(to, message, Purpose::Profile));
             }
         }
@@ -341,7 +340,7 @@ impl Layer0 {
         let mut left = 0_u8;
         for message in requests {
             for to in Address::nodes() {
-                // A node that was never heard cannot be asked.
+                // A node that is not alive cannot be asked.
                 if to.slot().is_none_or(|index| !self.liveness.alive(index)) {
                     continue;
                 }

@@ -20,8 +20,7 @@ use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Set
 use crate::telemetry::Record;
 
 impl Layer0 {
-    /// Ends the running cycle at `now_us`: supervision, odometry, feet. Gives its
-    /// record and the feedback for layer 1.
+    /// Ends the running cycle at `now_us`: supervision, odometry, feet. Returns its record and layer 1's feedback.
     pub fn finish_cycle(&mut self, now_us: u64, events: &mut Events) -> (Record, Feedback) {
         self.supervise(now_us, events);
         self.sense_feet(now_us, events);
@@ -67,8 +66,8 @@ impl Layer0 {
         (record, feedback)
     }
 
-    /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there are any, and returns the
-    /// bytes of SYNC.
+    /// Starts a cycle at `now_us` with the newest set-points of layer 1, if there are any, and returns the bytes of
+    /// SYNC.
     pub fn start_cycle(&mut self, now_us: u64, setpoints: Option<Setpoints>) -> TxBytes {
         let setpoints = setpoints.filter(|setpoints| setpoints.permit == self.permit);
         match setpoints.filter(|_| self.orphan.given_up.is_none()) {
@@ -117,7 +116,7 @@ impl Layer0 {
         }
     }
 
-    /// Layer 1 has given nothing for this cycle. A walk goes on by its behaviours.
+    /// Layer 1 has provided nothing for this cycle. A walk is carried on by the behaviours.
     fn miss(&mut self) {
         self.stale_cycles = self.stale_cycles.saturating_add(1);
         if self.setpoints.walk.is_some() && self.power == Power::Armed {
@@ -156,7 +155,7 @@ impl Layer0 {
                 (Some(joint), _) => self.wire_joint(joint),
                 // No reference: the axis keeps its position.
                 (None, Some(reply)) => WireJoint {
-                    // A measured one can lie beyond an end by noise.
+                    // Because of noise a measured stroke may lie beyond an end.
                     reference: in_stroke(reply.joint_position()),
                     velocity: VelocityMmS::ZERO.to_wire(),
                     next: None,
@@ -232,7 +231,7 @@ impl Layer0 {
         }
     }
 
-    /// Whether layer 1 has given the references of this cycle.
+    /// Whether layer 1 has provided the references of this cycle.
     fn fresh(&self) -> bool {
         self.stale_cycles == 0
     }
@@ -278,7 +277,7 @@ impl Layer0 {
             if let Some(foot) = self.feet.get_mut(side.index()) {
                 *foot = Some(now);
             }
-            // A leg that carries nothing is in its swing.
+            // A leg that carries no load is swinging.
             let vertical = self.setpoints.joints.get(side.joint(Cylinder::Vertical));
             let swings = vertical
                 .copied()
@@ -314,7 +313,7 @@ impl Layer0 {
         }
     }
 
-    /// Board inputs to switches in the leg's frame.
+    /// Converts board inputs to switches in the leg's frame.
     fn switches(&self, side: Side, inputs: InputBits) -> FootSwitches {
         let raw = inputs.raw() & InputBits::FOOT.raw();
         if side == Side::Right && self.config.switch_frame == SwitchFrame::Robot {
@@ -348,7 +347,7 @@ impl Layer0 {
             _ => return,
         };
         if has_started(before.as_ref(), &reply) {
-            // Its counter is 0: that is not motion.
+            // Its counter restarts at 0: that is not motion.
             self.odometry.rebase(side);
         }
         if let Some(count) = reply.wheel_position() {
@@ -357,8 +356,7 @@ impl Layer0 {
     }
 }
 
-/// Bytes of a message from the master. Empty only if it could not be encoded,
-/// which the sizes of all messages exclude.
+/// Bytes of a message from the master. Empty only if it could not be encoded, which the sizes of all messages rule out.
 pub(super) fn frame_of(message: &Message, destination: Address, sequence: u16) -> TxBytes {
     let mut out = [0_u8; MAX_ENCODED];
     let envelope = Envelope {

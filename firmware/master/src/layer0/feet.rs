@@ -15,12 +15,11 @@ use wheeleg_units::PositionMm;
 
 use crate::contact::FootSwitches;
 
-/// Switches of a foot.
+/// Number of switches of a foot.
 const SWITCHES: usize = 4;
-/// All of them.
+/// Bits of all switches.
 const ALL: u8 = 0x0F;
-/// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes
-/// to roll onto its sole.
+/// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes to roll onto its sole.
 const AGREE: u8 = 20;
 /// A swinging foot drawn up by this much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
@@ -31,10 +30,10 @@ const SWINGS: u8 = 2;
 /// Stances in which a switch must stay open.
 const STANCES: u8 = 2;
 
-/// One switch against the other three.
+/// One switch compared with the other three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct One {
-    /// Cycles of this swing, or of this stance, in which the others have agreed.
+    /// Cycles of this swing or stance in which the others have agreed.
     agreed: u8,
     /// Swings in which it stayed closed.
     closed: u8,
@@ -47,24 +46,24 @@ struct One {
 /// Motion of a foot, as far as it allows judging its switches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
-    /// Neither.
+    /// Neither of the two.
     #[default]
     Between,
     /// Clear of the ground.
     Air,
-    /// On it, all legs extended.
+    /// On the ground, all legs extended.
     Ground,
 }
 
-/// The switches of one foot, watched.
+/// Watch over the switches of one foot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FootWatch {
     last: Option<u8>,
     place: Place,
-    /// Stroke of b6 when the foot was not swinging last.
+    /// Stroke of b6 when the foot last was not swinging.
     stood: Option<PositionMm>,
     switches: [One; SWITCHES],
-    /// Switches for which this swing has counted.
+    /// Switches for which this swing has already been counted.
     counted: u8,
 }
 
@@ -73,7 +72,7 @@ pub struct FootWatch {
 pub struct Stuck {
     /// Its bit, in the leg's own frame.
     pub switch: FootSwitches,
-    /// It stays closed; otherwise open.
+    /// It stays closed; if false, it stays open.
     pub closed: bool,
 }
 
@@ -123,7 +122,7 @@ impl FootWatch {
                 _ => continue,
             };
             one.agreed = one.agreed.saturating_add(1);
-            // A foot that scrapes along something leaves its place and comes back to it.
+            // A foot that scrapes along something leaves its place and returns to it, so a swing counts only once.
             if one.agreed == AGREE && !(closed && self.counted & bit != 0) {
                 *count = count.saturating_add(1);
                 self.counted |= bit;
@@ -143,7 +142,7 @@ mod tests {
     use super::*;
     use crate::contact::{FRONT, INNER, OUTER, REAR};
 
-    /// A pattern, the stroke of b6 and for how many cycles.
+    /// A pattern, the stroke of b6, and the number of cycles.
     type Stretch = (u8, i16, u32);
 
     /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`.
@@ -178,7 +177,7 @@ mod tests {
                     stuck_switches(&[&[stand][..], &step[..1]].concat(), 180),
                     []
                 );
-                // Mended, and stuck again.
+                // Repaired, and stuck again.
                 let mended = [(0, 100, 50), (ALL, 180, 50)];
                 let again = [&walk[..], &mended, &walk, &step].concat();
                 assert_eq!(stuck_switches(&again, 180), [stuck, stuck]);
@@ -205,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_tilted_robot_has_no_stuck_switch() {
-        // Nose down: the rear of the sole never closes, the front closes long before the rest.
+        // Nose down: the rear of the sole never closes, and the front closes long before the rest.
         let step = [
             (0, 100, 100),
             (FRONT, 160, 40),

@@ -10,8 +10,8 @@ use crate::event::{Event, Events};
 use crate::finding::Finding;
 use crate::setpoint::NODES;
 
-/// Cycles for which a board may show that it is armed: its replies until it has heard the
-/// request to disarm, once repeated.
+/// Cycles for which a board may show that it is armed: its replies until it has received the request to disarm,
+/// including one repetition.
 const PATIENCE: u8 = 5;
 /// Cycles until it is asked again.
 const AGAIN: u8 = 100;
@@ -23,15 +23,14 @@ pub(super) struct LeftBehind([u8; NODES]);
 /// Action for a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Measure {
-    /// It is named, and asked to disarm.
+    /// It is reported, and asked to disarm.
     Name,
     /// It is asked again.
     Ask,
 }
 
 impl LeftBehind {
-    /// Takes whether the newest reply of node index 0..8 shows that it is armed; a missing reply shows
-    /// nothing.
+    /// Takes whether the newest reply of node index 0..8 shows that it is armed; a missing reply shows nothing.
     fn shows(&mut self, index: usize, armed: Option<bool>) -> Option<Measure> {
         let cycles = self.0.get_mut(index)?;
         if !armed? {
@@ -42,7 +41,7 @@ impl LeftBehind {
         match *cycles {
             PATIENCE => Some(Measure::Name),
             AGAIN => {
-                // Named once.
+                // It is reported only once.
                 *cycles = PATIENCE;
                 Some(Measure::Ask)
             }
@@ -52,12 +51,12 @@ impl LeftBehind {
 }
 
 impl Layer0 {
-    /// A cycle in which nobody is armed.
+    /// A cycle in which no board should be armed.
     pub(super) fn disarm_left_behind(&mut self, now_us: u64, events: &mut Events) {
         let disarms = |job: &Job| matches!(job.message, Message::Disarm(_));
         let under_way = self.in_flight.as_ref().is_some_and(disarms);
         if self.group.is_some() || under_way || self.jobs.iter().any(disarms) {
-            // They are just being asked.
+            // They are already being asked.
             return;
         }
         for to in Address::nodes() {

@@ -15,27 +15,25 @@ use crate::setpoint::NODES;
 const TIMING: SlotTiming = SlotTiming::DEFAULT;
 /// A reply on the line, delimiters included.
 const REPLY_BYTES: usize = Message::encoded_len(MessageType::SlotReply);
-/// Rubbish in a slot that is no accident: half a reply, bytes.
+/// Rubbish in a slot that cannot be accidental: half a reply, bytes.
 const SPOILT_SLOT: u32 = REPLY_BYTES as u32 / 2;
-/// Cycles in a row in which a slot is spoilt until it names its board; as many as
-/// make a board lost.
+/// Number of consecutive cycles in which a slot is spoilt before its board is named; as many as make a board lost.
 const SPOILT_CYCLES: u8 = 3;
-/// Rubbish in a cycle that no damage of the traffic explains: 40 % of the line. All
-/// replies and the longest answer make less than 500 bytes with 232 of replies in
-/// slots, and an answer is not repeated in the same cycle.
+/// Rubbish in a cycle that cannot be explained by damaged traffic: 40 % of the line. All replies and the longest answer
+/// are less than 500 bytes, 232 of them replies in slots, and an answer is not repeated in the same cycle.
 const BABBLE_BYTES: u32 = 400;
-/// Cycles in a row with this much rubbish.
+/// Number of consecutive cycles with this much rubbish.
 const BABBLE_CYCLES: u8 = 2;
-/// Cycles without after which the line is quiet.
+/// Number of cycles without it after which the line is quiet.
 const QUIET_CYCLES: u8 = 10;
 /// Bytes of a cycle in unrequested frames: 30 % of the line.
 const FLOOD_BYTES: u32 = 300;
-/// Cycles in a row with that many of them.
+/// Number of consecutive cycles with that many bytes.
 const FLOOD_CYCLES: u8 = 10;
-/// Errors that babble leaves at least in the counters of a board that hears it.
+/// Fewest errors that babble leaves in the counters of a board that hears it.
 const HEARD_ERRORS: u32 = 4;
 
-/// State of a condition that lasts: reported at its begin, and again after its end.
+/// State of a lasting condition: reported when it begins, and again after it has ended.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lasting {
     cycles: u8,
@@ -83,10 +81,10 @@ pub enum Found {
     Flood(Address),
 }
 
-/// Source of the rubbish in the slot of a board that is not heard.
+/// Cause of the rubbish in the slot of a board that is not heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spoilt {
-    /// Its own.
+    /// Its own reply alone.
     Own,
     /// Its own reply, and that of the board in the slot before.
     WithTheSlotBefore,
@@ -95,42 +93,42 @@ pub enum Spoilt {
 /// Watch over the line.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Bytes since the last sound frame.
+    /// Bytes since the last valid frame.
     open: u32,
-    /// Bytes of this cycle that belong to no sound frame.
+    /// Bytes of this cycle that belong to no valid frame.
     rubbish: u32,
-    /// The same by slot.
+    /// The same per slot.
     slots: [u32; NODES],
-    /// Bytes of this cycle in unrequested frames, by node.
+    /// Bytes of this cycle in unrequested frames, per node.
     unasked: [u32; NODES],
     spoilt: [u8; NODES],
-    /// Cycles in a row in which each node was not heard.
+    /// Number of consecutive cycles in which each node was not heard.
     silent: [u8; NODES],
     babble: Lasting,
     floods: [Lasting; NODES],
-    /// Errors that each node had counted before the babble, and after.
+    /// Errors that each node had counted before the babble, and after it.
     before: [Option<u32>; NODES],
     after: [Option<u32>; NODES],
     asks: bool,
 }
 
 impl Line {
-    /// A byte was heard.
+    /// A byte was received.
     #[inline]
     pub fn byte(&mut self) {
         self.open = self.open.saturating_add(1);
     }
 
-    /// It ended a sound frame of `encoded` bytes, delimiters included.
+    /// This byte ended a valid frame of `encoded` bytes, delimiters included.
     pub fn sound(&mut self, encoded: usize) {
-        // Its first delimiter may have been the last one of the frame before it.
+        // Its first delimiter may also have been the last one of the frame before it.
         let own = u32::try_from(encoded).unwrap_or(u32::MAX);
         self.rubbish = self.rubbish.saturating_add(self.open.saturating_sub(own));
         self.open = 0;
     }
 
-    /// A stretch of bytes without a sound frame ended `into_us` after the start of SYNC.
-    /// One that has the shape of a reply is a damaged reply, or two boards' at once.
+    /// A stretch of bytes without a valid frame ended `into_us` after the start of SYNC. A stretch with the shape of a
+    /// reply is a damaged reply, or those of two boards at once.
     pub fn stretch(&mut self, bytes: &[u8], into_us: u64) {
         let whole = bytes.len().abs_diff(REPLY_BYTES) <= 1;
         if whole && bytes.first() == Some(&0) && bytes.last() == Some(&0) {
@@ -144,7 +142,7 @@ impl Line {
         let sync = TIMING
             .frame_us(MessageType::Sync)
             .saturating_add(begin(first));
-        // A stretch that ends with its slot is within it.
+        // A stretch that ends with its slot is still within it.
         let into = into_us.saturating_sub(u64::from(sync).saturating_add(1));
         let slot = into.checked_div(u64::from(pitch));
         let slot = slot.and_then(|slot| usize::try_from(slot).ok());
@@ -153,15 +151,15 @@ impl Line {
         }
     }
 
-    /// A sound frame that was not requested.
+    /// A valid frame that was not requested.
     pub fn unasked(&mut self, from: Address, encoded: usize) {
         if let Some(bytes) = from.slot().and_then(|index| self.unasked.get_mut(index)) {
             *bytes = bytes.saturating_add(u32::try_from(encoded).unwrap_or(u32::MAX));
         }
     }
 
-    /// Ends a cycle; `replied` says which nodes were heard in it. Calls `found` for each condition that
-    /// begins or ends.
+    /// Ends a cycle; `replied` returns which nodes were heard in it. Calls `found` for each condition that begins or
+    /// ends.
     pub fn end_cycle(&mut self, replied: impl Fn(usize) -> bool, mut found: impl FnMut(Found)) {
         let rubbish = self.rubbish.saturating_add(core::mem::take(&mut self.open));
         self.rubbish = 0;
@@ -200,8 +198,8 @@ impl Line {
         }
     }
 
-    /// Who spoils the slot of node index 0..8, and no other, for as long as a board is given to answer, if
-    /// anybody does.
+    /// The cause, if only the slot of node index 0..8 has been spoilt, and for as long as it takes until a board counts
+    /// as lost.
     #[must_use]
     pub fn spoilt(&self, index: usize) -> Option<Spoilt> {
         let lasts = |cycles: &u8| *cycles >= SPOILT_CYCLES;
@@ -217,12 +215,12 @@ impl Line {
         })
     }
 
-    /// Takes the link record of node index 0..8. Returns the board that babbled, once, when all others have
-    /// counted rubbish since the babble began and it has not.
+    /// Takes the link record of node index 0..8. Returns the board that babbled, once, when all others have counted
+    /// rubbish since the babble began and it has not.
     pub fn heard(&mut self, index: usize, record: &LinkRecord) -> Option<Address> {
         let errors = record.errors();
         if self.babble.told {
-            // Not over, or just so: neither from before nor from after.
+            // Not over, or not known to be: the counts are neither from before nor from after.
             return None;
         }
         if !self.asks {
@@ -236,7 +234,7 @@ impl Line {
         }
         let mut deaf = None;
         for (index, (before, after)) in self.before.iter().zip(&self.after).enumerate() {
-            // One that was reset since has restarted its count: it proves nothing.
+            // A board that was reset meanwhile has restarted its count and proves nothing.
             let grown = (*after)?.checked_sub(before.unwrap_or(0))?;
             if grown < HEARD_ERRORS {
                 if deaf.is_some() {
@@ -302,7 +300,7 @@ mod tests {
             assert_eq!(cycles(&mut line, 30, 1000), [Found::Babble]);
             assert_eq!(cycles(&mut line, 20, 0), [Found::BabbleOver]);
             for index in 0..NODES {
-                // 3 more than before, and the fewest that count as heard.
+                // 3 more than before, and the smallest number that counts as heard.
                 let errors = if index == guilty { 10 } else { 11 };
                 let told = line.heard(index, &record(errors));
                 let last = index + 1 == NODES;
@@ -376,7 +374,7 @@ mod tests {
             line.spoilt(4)
         };
         assert_eq!(spoilt([3, 4]), Some(Spoilt::WithTheSlotBefore));
-        // The rest of a reply never gets into the slot before, or across one.
+        // The tail of a reply never reaches the slot before, or skips a slot.
         assert_eq!(spoilt([4, 5]), Some(Spoilt::Own));
         assert_eq!(spoilt([2, 4]), Some(Spoilt::Own));
     }

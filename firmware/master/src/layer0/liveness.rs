@@ -1,4 +1,4 @@
-//! Which nodes answer: three missed cycles in a row make a node lost.
+//! Which nodes answer: three consecutive missed cycles make a node lost.
 
 use wheeleg_protocol::link::NodeMonitor;
 
@@ -13,7 +13,7 @@ pub enum Change {
     Back,
 }
 
-/// One node: the protocol's count of misses, and whether it was ever there.
+/// One node: the protocol's count of misses, and whether the node was ever heard.
 #[derive(Clone, Copy, Debug, Default)]
 struct Presence {
     monitor: NodeMonitor,
@@ -21,16 +21,15 @@ struct Presence {
     alive: bool,
 }
 
-/// Presence of all nodes. A node that was never heard is not alive, and cannot
-/// be lost.
+/// Presence of all nodes. A node that was never heard is not alive, and cannot be lost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Liveness {
     nodes: [Presence; NODES],
 }
 
 impl Liveness {
-    /// A reply of node index 0..8. `false` if it echoes another cycle: a node
-    /// that repeats itself does not count as alive.
+    /// A reply of node index 0..8. Returns `false` if it echoes another cycle: a node that repeats itself does not
+    /// count as alive.
     pub fn on_reply(&mut self, index: usize, sync_echo: u8, cycle: u16) -> bool {
         let Some(node) = self.nodes.get_mut(index) else {
             return false;
@@ -41,7 +40,7 @@ impl Liveness {
         sync_echo == low
     }
 
-    /// Ends a cycle: counts misses, calls `report` for each change.
+    /// Ends a cycle: counts misses, and calls `report` for each change.
     pub fn end_cycle(&mut self, mut report: impl FnMut(usize, Change)) {
         for (index, node) in self.nodes.iter_mut().enumerate() {
             node.monitor.end_cycle();

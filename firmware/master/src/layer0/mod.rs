@@ -1,5 +1,5 @@
-//! Layer 0: bus cycle, node supervision, arming, reflexes. Knows nothing of
-//! gaits; keeps the robot safe when layer 1 stops.
+//! Layer 0: bus cycle, node supervision, arming, reflexes. It knows nothing of gaits, and keeps the robot safe when
+//! layer 1 stops.
 //!
 //! One bus cycle of 10 ms:
 //!
@@ -51,7 +51,7 @@ use reflex::Reflexes;
 use sums::Sums;
 use wheels::{DirectMove, WheelUnits, Wheels};
 
-/// Cycles without set-points from layer 1 after which all axes hold: 100 ms.
+/// Number of cycles without set-points from layer 1 after which all axes hold: 100 ms.
 pub const STALL_CYCLES: u16 = 10;
 
 /// Whether the axes are energised, as far as the master knows.
@@ -77,7 +77,7 @@ struct Group {
     kind: GroupKind,
     left: u8,
     failed: Option<Refusal>,
-    /// Cycles waited for the nodes to show the acknowledged state.
+    /// Number of cycles waited for the nodes to show the acknowledged state.
     waited: u8,
 }
 
@@ -94,7 +94,7 @@ pub struct Layer0 {
     liveness: Liveness,
     questions: Questions,
     line: Line,
-    /// Nodes that are missed while they store their parameters.
+    /// Nodes that are not heard because they are storing their parameters.
     stalled: [bool; NODES],
     odometry: Odometry,
     wheels: Wheels,
@@ -114,17 +114,17 @@ pub struct Layer0 {
     /// Profile of the wheels' pushes, as last sent to their boards.
     push: PushProfile,
     stale_cycles: u16,
-    /// Number of the permission to move: of all references that have not ended.
+    /// Number of the permission to move, which all references in force share.
     permit: u16,
     left_behind: LeftBehind,
     sums: Sums,
     /// Strokes at which all joints are kept after a stop.
     frozen: Option<[Option<PositionMm>; JOINTS]>,
-    /// References of the user, one joint at a time.
+    /// References by the user, for single joints.
     direct: [Option<PositionMm>; JOINTS],
     direct_travel: Option<DirectMove>,
     direct_segment: u16,
-    /// Holds of layer 1 that have ended them.
+    /// Count of layer 1's Hold commands, which end the user's references.
     holds: u8,
     feet: [Option<FootSwitches>; WHEELS],
     foot_watches: [FootWatch; WHEELS],
@@ -133,7 +133,7 @@ pub struct Layer0 {
 }
 
 impl Layer0 {
-    /// Disarmed; no node heard.
+    /// Disarmed; no node heard yet.
     #[must_use]
     pub fn new(config: MasterConfig) -> Self {
         Self {
@@ -186,13 +186,13 @@ impl Layer0 {
         }
     }
 
-    /// All axes armed and no stop latched.
+    /// Whether all axes are armed and no stop is latched.
     #[must_use]
     pub fn is_armed(&self) -> bool {
         self.power == Power::Armed && self.hold.is_none() && !self.emergency_stop
     }
 
-    /// Every node is identified, compatible and answers.
+    /// Whether every node is identified, compatible and answering.
     #[must_use]
     pub fn is_ready(&self) -> bool {
         self.nodes
@@ -224,7 +224,7 @@ impl Layer0 {
         &self.odometry
     }
 
-    /// Layer 1 has stopped, and has been given up: it will not answer its commands.
+    /// Whether layer 1 has stopped and has been given up: it will not answer its commands.
     #[must_use]
     pub const fn has_given_layer_one_up(&self) -> bool {
         self.stale_cycles >= STALL_CYCLES

@@ -12,15 +12,15 @@ pub enum Enumerated {
     /// Not answered yet.
     #[default]
     Unknown,
-    /// Fits.
+    /// It fits.
     Ready(Identity),
-    /// Speaks another version of the interface.
+    /// It uses another version of the interface.
     Schema(Identity),
-    /// Not the kind of board that belongs to its address, or the straps differ.
+    /// It is not the kind of board that belongs at its address, or the straps differ.
     Role(Identity),
-    /// Another board than the one that was commissioned here.
+    /// A different board from the one that was commissioned here.
     Foreign(Identity),
-    /// Two boards answer at this address: their unique ids.
+    /// Two boards answer at this address; these are their unique ids.
     DuplicateId([UniqueId; 2]),
 }
 
@@ -31,7 +31,7 @@ pub struct Node {
     pub enumerated: Enumerated,
     /// It did not answer the last request for its identity.
     pub identify_failed: bool,
-    /// Frames that it has counted since it started, when last asked.
+    /// Number of frames that it has counted since it started, when last asked.
     pub frames: Option<u32>,
     /// Its reply in the last cycle, if it answered.
     pub reply: Option<SlotReply>,
@@ -40,7 +40,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Unique id of the board, once it has given its identity.
+    /// Unique id of the board, once it has reported its identity.
     #[must_use]
     pub const fn unique_id(&self) -> Option<UniqueId> {
         match self.enumerated {
@@ -67,7 +67,7 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// No node known; `commissioned` is the board that belongs to each address.
+    /// No node known; `commissioned` is the board that belongs at each address.
     #[must_use]
     pub fn new(commissioned: [Option<UniqueId>; NODES]) -> Self {
         Self {
@@ -135,7 +135,7 @@ impl Nodes {
         }
     }
 
-    /// Stores a reply; nothing if the address is no node's.
+    /// Stores a reply; does nothing if the address is not that of a node.
     pub fn store(&mut self, from: Address, reply: SlotReply) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.reply = Some(reply);
@@ -151,7 +151,7 @@ impl Nodes {
         }
         let known = node.and_then(Node::unique_id);
         let result = if let Some(known) = known.filter(|known| *known != identity.unique_id) {
-            // Known and not lost since: this is another board.
+            // Known, and not lost since: this is another board.
             Enumerated::DuplicateId([known, identity.unique_id])
         } else if self
             .commissioned(from)
@@ -167,37 +167,37 @@ impl Nodes {
         result
     }
 
-    /// Takes the number of frames that a node has counted. True if it continues its count: a board that was
-    /// reset since restarts it.
+    /// Takes the number of frames that a node has counted. Returns true if it continues its count: a board that was
+    /// reset meanwhile restarts it.
     pub fn counted(&mut self, from: Address, frames: u32) -> bool {
         let node = from.slot().and_then(|index| self.nodes.get_mut(index));
         let before = node.and_then(|node| node.frames.replace(frames));
         before.is_some_and(|before| before <= frames)
     }
 
-    /// The count of a node is not compared any more: it has reported why it started.
+    /// Stops comparing the count of a node, because it has reported why it started.
     pub fn forget_count(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.frames = None;
         }
     }
 
-    /// A node did not answer the request for its identity: it is missing, or it and a duplicate spoil each
-    /// other's answers. It is asked in two ways by turns so that duplicates separate.
+    /// A node did not answer the request for its identity: it is missing, or it and a duplicate spoil each other's
+    /// answers. It is asked alternately in two ways, so that duplicates separate.
     pub fn identify_failed(&mut self, from: Address) {
         if let Some(node) = from.slot().and_then(|index| self.nodes.get_mut(index)) {
             node.identify_failed = !node.identify_failed;
         }
     }
 
-    /// Forgets the identity of a node (it was lost and may have been replaced or reset).
+    /// Forgets the identity of a node that was lost and may have been replaced or reset.
     pub fn forget(&mut self, index: usize) {
         if let Some(node) = self.nodes.get_mut(index) {
             *node = Node::default();
         }
     }
 
-    /// First node at or after index `from` (cyclically) that has not given its identity.
+    /// First node at or after index `from` (cyclically) that has not reported its identity.
     #[must_use]
     pub fn next_unknown(&self, from: usize) -> Option<Address> {
         let unknown = |(address, node): (Address, &Node)| {
@@ -207,8 +207,7 @@ impl Nodes {
         later.or_else(|| self.iter().find_map(unknown))
     }
 
-    /// Why the robot cannot be armed, if it cannot: the first node that is
-    /// missing, incompatible, misplaced or faulty.
+    /// Why the robot cannot be armed, if it cannot: the first node that is missing, incompatible, misplaced or faulty.
     #[must_use]
     pub fn bar_to_arming(&self, alive: impl Fn(usize) -> bool, master: u64) -> Option<Refusal> {
         (0..NODES).find_map(|index| {
@@ -282,7 +281,7 @@ impl Nodes {
     }
 }
 
-/// Whether the outputs of a board in this mode are its law's.
+/// Whether the law of a board controls its outputs in this mode.
 pub(super) const fn is_armed(mode: NodeMode) -> bool {
     matches!(mode, NodeMode::Armed | NodeMode::Tracking)
 }

@@ -55,8 +55,8 @@ impl WheelGeometry {
 
 /// Odometry of both wheels since start-up.
 ///
-/// Right as long as a wheel turns less than 2^23 counts (80 revolutions with 100
-/// encoder lines) between two replies; at 0.4 m/s that is 190 s.
+/// Correct as long as a wheel turns by less than 2^23 counts (80 revolutions with 100 encoder lines) between two
+/// replies; at 0.4 m/s that takes 190 s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Odometry {
     geometry: WheelGeometry,
@@ -89,8 +89,8 @@ impl Odometry {
         }
     }
 
-    /// Forgets the last count of a wheel: its next count is a new origin, and the distance so far is kept.
-    /// For a node that was reset.
+    /// Forgets the last count of a wheel that was reset: its next count is a new origin, and the distance so far is
+    /// kept.
     pub fn rebase(&mut self, side: Side) {
         if let Some(last) = self.last.get_mut(side.index()) {
             *last = None;
@@ -103,7 +103,7 @@ impl Odometry {
         self.last.iter().all(Option::is_some)
     }
 
-    /// Last count heard of one wheel.
+    /// Last count received from one wheel.
     #[must_use]
     pub fn raw(&self, side: Side) -> Option<WheelCount> {
         self.last.get(side.index()).copied().flatten()

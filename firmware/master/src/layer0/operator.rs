@@ -1,5 +1,5 @@
-//! The operator's lease of control: a person drives the robot only while it is known that they see it. The
-//! master itself notices when they are gone, not the network in front of it.
+//! The operator's lease of control: a person drives the robot only while they are known to see it. The master itself
+//! notices when they are gone, not the network in front of it.
 
 use super::{Layer0, Power};
 use crate::command::Command;
@@ -7,20 +7,20 @@ use crate::config::{OPERATOR_TIMEOUT_MAX_US, OPERATOR_TIMEOUT_MIN_US};
 use crate::dispatcher::Refusal;
 use crate::event::{Events, HoldReason};
 
-/// Client number of the operator who may hold control.
+/// Client number of the operator, who may hold control.
 pub const OPERATOR_CLIENT: u8 = 2;
-/// Client number of everybody else at the console: they may only stop.
+/// Client number of everybody else at the console, who may only stop.
 pub const STOP_CLIENT: u8 = 3;
-/// A lease that lives from one sight of the robot to the next.
+/// A lease that lasts from one view of the robot to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Lease {
     timeout_us: u64,
-    /// Newest master time that the holder has seen; `None`: the control is free.
+    /// Newest master time that the holder has seen; `None`: nobody has control.
     seen_us: Option<u64>,
 }
 
 impl Lease {
-    /// Free; lost after `timeout_us`, which is kept within [`OPERATOR_TIMEOUT_MIN_US`] and
+    /// Not held; lost after `timeout_us`, which is limited to [`OPERATOR_TIMEOUT_MIN_US`] and
     /// [`OPERATOR_TIMEOUT_MAX_US`].
     #[must_use]
     pub fn new(timeout_us: u32) -> Self {
@@ -32,20 +32,20 @@ impl Lease {
         }
     }
 
-    /// Whether the operator holds the control.
+    /// Whether the operator has control.
     #[must_use]
     pub const fn is_held(&self) -> bool {
         self.seen_us.is_some()
     }
 
-    /// Newest master time that the holder has seen, µs; `None`: the control is free.
+    /// Newest master time that the holder has seen, µs; `None`: nobody has control.
     #[must_use]
     pub const fn seen_us(&self) -> Option<u64> {
         self.seen_us
     }
 
-    /// The operator has seen the robot's state of `seen_us`. A view older than the newest one, or in the
-    /// future, has no effect.
+    /// The operator has seen the robot's state of time `seen_us`. A view older than the newest one, or in the future,
+    /// has no effect.
     pub fn beat(&mut self, seen_us: u64, now_us: u64) {
         if let Some(newest) = &mut self.seen_us
             && seen_us <= now_us
@@ -54,7 +54,7 @@ impl Lease {
         }
     }
 
-    /// Begins the lease. A holder that asks again has seen nothing more by that.
+    /// Begins the lease. A holder that asks again has not thereby seen anything new.
     fn take(&mut self, now_us: u64) {
         self.seen_us.get_or_insert(now_us);
     }
@@ -63,7 +63,7 @@ impl Lease {
         self.seen_us = None;
     }
 
-    /// Ends a lease whose holder has seen nothing new for too long; true if it ends now.
+    /// Ends a lease whose holder has seen nothing new for too long; returns true if it ends now.
     fn expire(&mut self, now_us: u64) -> bool {
         let lost = self
             .seen_us
@@ -76,7 +76,7 @@ impl Lease {
 }
 
 impl Layer0 {
-    /// The operator's lease, to look at.
+    /// The operator's lease, read-only.
     #[must_use]
     pub const fn lease(&self) -> &Lease {
         &self.lease
@@ -97,7 +97,7 @@ impl Layer0 {
         let may = match client {
             OPERATOR_CLIENT => takes || self.lease.is_held(),
             STOP_CLIENT => false,
-            // A scenario and a service tool beside it need no lease, and can hold none.
+            // A scenario, or a service tool beside it, needs no lease and can hold none.
             _ => !leases,
         };
         if may {
@@ -121,8 +121,8 @@ impl Layer0 {
         Ok(())
     }
 
-    /// Stops a robot whose operator is gone. True if they have just gone: then their commands must not run
-    /// any more either.
+    /// Stops a robot whose operator is gone. Returns true if they have just gone: then their commands must not be
+    /// executed any more, either.
     pub fn watch_operator(&mut self, now_us: u64, events: &mut Events) -> bool {
         let lost = self.lease.expire(now_us);
         if lost && self.power != Power::Disarmed {

@@ -1,10 +1,9 @@
 //! Diagnostic requests that the master sends in otherwise unused time: why a board failed or
 //! restarted, what it has received, what it has logged.
 //!
-//! They take one acyclic exchange in ten cycles, and one immediately after a fault. What boards have
-//! received is requested while the master itself receives broken frames; on an undisturbed line,
-//! where there is little to report, in every eighth round. The checksum of the parameters in force
-//! comes with it.
+//! They take one acyclic exchange in ten cycles, and one immediately after a fault. What boards have received is
+//! requested while the master itself receives broken frames, and on an undisturbed line, where there is little to
+//! report, only in every eighth round. The checksum of the parameters in force comes with it.
 
 use wheeleg_protocol::{Address, FaultReport, LinkReport, LogRead, Message, NodeMode, SlotReply};
 
@@ -14,9 +13,9 @@ use crate::setpoint::NODES;
 const PERIOD_CYCLES: u32 = 10;
 /// Questions of a round: link and log of every board.
 const ROUND: usize = 2 * NODES;
-/// Rounds without links between two with them on a sound line, 0.8 s each.
+/// On an undisturbed line, number of rounds without links between two rounds with them; a round takes 0.8 s.
 const QUIET_ROUNDS: u8 = 7;
-/// Time for which the boards keep recording, ms: three rounds of 1.6 s.
+/// Time for which the boards continue recording, ms: three rounds of 1.6 s.
 const LEASE_MS: u16 = 5_000;
 
 /// Open questions to one board.
@@ -25,7 +24,7 @@ struct Open {
     why: bool,
     link: bool,
     log: bool,
-    /// It was lost since it was last heard.
+    /// It was lost after it was last heard.
     lost: bool,
     /// Faults that its newest reply showed.
     faults: u16,
@@ -37,7 +36,7 @@ pub struct Questions {
     nodes: [Open; NODES],
     turn: usize,
     next_cycle: u32,
-    /// Broken frames that the master had heard when the last round began.
+    /// Broken frames that the master had received when the last round began.
     errors: u32,
     /// Rounds without link reports still to come; the present one has them if this is the full number.
     quiet: u8,
@@ -49,8 +48,8 @@ pub(super) fn has_started(before: Option<&SlotReply>, reply: &SlotReply) -> bool
 }
 
 impl Questions {
-    /// A reply of node index 0..8; `before` is the one before it, if the node has not
-    /// been lost since. A new fault is a question, and a start in operation.
+    /// A reply of node index 0..8; `before` is the previous one, unless the node has been lost since. A new fault, or a
+    /// start during operation, raises a question.
     pub fn on_reply(&mut self, index: usize, before: Option<&SlotReply>, reply: &SlotReply) {
         let Some(node) = self.nodes.get_mut(index) else {
             return;
@@ -61,7 +60,7 @@ impl Questions {
         node.faults = faults;
     }
 
-    /// Node index 0..8 is lost: when it is heard again, it is asked why.
+    /// Node index 0..8 is lost: it is asked for the reason when it is heard again.
     pub fn lost(&mut self, index: usize) {
         if let Some(node) = self.nodes.get_mut(index) {
             *node = Open {
@@ -78,14 +77,14 @@ impl Questions {
         }
     }
 
-    /// Node index 0..8 has more to log than was read.
+    /// Node index 0..8 has more log records than were read.
     pub fn log(&mut self, index: usize) {
         if let Some(node) = self.nodes.get_mut(index) {
             node.log = true;
         }
     }
 
-    /// Asks all nodes what they have heard.
+    /// Asks all nodes what they have received.
     pub fn links(&mut self) {
         for node in &mut self.nodes {
             node.link = true;
@@ -104,8 +103,8 @@ impl Questions {
         }
     }
 
-    /// The next question in cycle `cycle` to a node that is `alive`; it is then taken
-    /// as asked. `errors` are the broken frames that the master has heard.
+    /// The next question in cycle `cycle` to a node that is `alive`; it then counts as asked. `errors` is the number of
+    /// broken frames that the master has received.
     pub fn next(
         &mut self,
         cycle: u32,
@@ -137,7 +136,7 @@ impl Questions {
         errors: u32,
         alive: impl Fn(usize) -> bool,
     ) -> Option<(Address, Message)> {
-        // Half the counter's range ahead means: due.
+        // A next cycle more than half the counter's range ahead is in the past: it is due.
         if self.next_cycle.wrapping_sub(cycle) as i32 > 0 {
             return None;
         }
@@ -174,7 +173,7 @@ fn read_log() -> Message {
     LogRead { lease_ms: LEASE_MS }.into()
 }
 
-// A lease outlasts the round that renews it, with a lost answer or two.
+// A lease outlasts the round that renews it, even with a lost answer or two.
 const _: () = assert!(LEASE_MS as u32 > 2 * ROUND as u32 * PERIOD_CYCLES * 10);
 
 #[cfg(test)]
@@ -195,7 +194,7 @@ mod tests {
         }
     }
 
-    /// Questions of the cycles 0 to `cycles`, at most one a cycle.
+    /// Questions of the cycles 0 to `cycles`, at most one per cycle.
     fn asked(questions: &mut Questions, cycles: u32) -> Vec<(u8, Message)> {
         let next = |cycle| questions.next(cycle, 5, |_| true);
         let found: Vec<_> = (0..cycles).filter_map(next).collect();

@@ -11,11 +11,11 @@ use crate::setpoint::{Cylinder, JointSetpoint, Reflex, Setpoints, WHEELS};
 /// Progress of the lowering of one foot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Touch {
-    /// Reflex not asked for.
+    /// The reflex is not requested.
     #[default]
     Off,
-    /// Asked for; the switches have not been seen open since. A switch that is
-    /// stuck closed stays here, and the leg goes to its reference.
+    /// Requested, but the switches have not been seen open since. With a switch that is stuck closed the state stays
+    /// here, and the leg goes to its reference.
     Waiting,
     /// The switches have been open: the next closing counts.
     Open,
@@ -32,8 +32,8 @@ pub struct Reflexes {
 }
 
 impl Reflexes {
-    /// Takes note of a cycle; to be called once per cycle before [`Self::apply`].
-    /// `travel_um` is the mean travel of the wheels.
+    /// Observes a cycle; to be called once per cycle before [`Self::apply`]. `travel_um` is the mean travel of the
+    /// wheels.
     pub fn observe(&mut self, setpoints: &Setpoints, senses: &Senses, travel_um: i64) {
         let segment = setpoints.travel.map(|travel| travel.segment);
         if segment != self.segment {

@@ -17,12 +17,11 @@ use crate::finding::Finding;
 use crate::setpoint::NODES;
 
 impl Layer0 {
-    /// The request to send at `now_us`, if one is due and its answer will be in
-    /// before the next SYNC.
+    /// The request to send at `now_us`, if one is due and its answer will arrive before the next SYNC.
     pub fn next_acyclic(&mut self, now_us: u64, events: &mut Events) -> Option<TxBytes> {
         let into = now_us.saturating_sub(self.cycle_start_us);
         let into_us = u32::try_from(into).unwrap_or(CYCLE_US);
-        // Two rounds: the end of one request, and the start of the next.
+        // Two iterations: the end of one request, and the start of the next.
         for _ in 0..2 {
             match self.requester.poll(now_us) {
                 Step::Wait => return None,
@@ -47,8 +46,7 @@ impl Layer0 {
         None
     }
 
-    /// Waiting requests first, then the master's own questions; otherwise asks a
-    /// present node that is not known.
+    /// Waiting requests first, then the master's own questions; otherwise asks a present node that is not known.
     fn next_job(&mut self, now_us: u64, events: &mut Events) -> Option<Job> {
         while let Some(job) = self.jobs.pop() {
             match job.purpose.ticket() {
@@ -90,7 +88,7 @@ impl Layer0 {
         }
     }
 
-    /// Takes a frame from the bus that is not a slot reply. False if it was not requested.
+    /// Takes a frame from the bus that is not a slot reply. Returns false if it was not requested.
     fn on_answer(
         &mut self,
         envelope: Envelope,
@@ -100,7 +98,7 @@ impl Layer0 {
     ) -> bool {
         let Some(outcome) = self.requester.on_message(envelope, message) else {
             if let Message::Identity(_) = message {
-                // Nobody asked any more: a second board answers a question to one.
+                // It was not expected any more: a second board answers a question to one.
                 self.identified(envelope.source, Ok(*message), now_us, events);
             }
             self.counters.unexpected = self.counters.unexpected.wrapping_add(1);
@@ -131,10 +129,10 @@ impl Layer0 {
             Purpose::Identify => self.identified(job.to, result, now_us, events),
             Purpose::Report => self.reported(job.to, result, now_us, events),
             Purpose::Group => self.group_answer(result.err(), now_us, events),
-            // A node that does not brake is frozen by its set-point all the same;
-            // its own supervision stops it when it stops hearing SYNC.
+            // A node that does not brake is still frozen by its set-point; its own supervision stops it when it no
+            // longer receives SYNC.
             Purpose::Stop => {}
-            // A wheel that kept its old profile still arrives; its speed shows it.
+            // A wheel that has kept its old profile still arrives; its speed shows it.
             Purpose::Profile => {}
             Purpose::Saved(ticket) => self.saved(ticket, job.to, result, now_us, events),
             Purpose::User(ticket) => self.user_answer(ticket, job, result, now_us, events),
@@ -187,8 +185,8 @@ impl Layer0 {
         }
     }
 
-    /// The answer to a question of the master's own. An unanswered one is not repeated: a board that comes
-    /// back is asked again.
+    /// The answer to one of the master's own questions. An unanswered question is not repeated, because a board that
+    /// comes back is asked again.
     fn reported(
         &mut self,
         from: Address,
@@ -208,7 +206,7 @@ impl Layer0 {
                     ago_us,
                 };
                 events.push(now_us, diagnosis);
-                // Ask for the events before it.
+                // Ask for the events that led to it.
                 self.questions.log(index);
                 self.nodes.forget_count(from);
             }
@@ -231,7 +229,7 @@ impl Layer0 {
         }
     }
 
-    /// Takes a board's link record. True if it was not reset since the last one.
+    /// Takes a board's link record. Returns true if the board was not reset since the last one.
     fn heard(
         &mut self,
         from: Address,
@@ -257,8 +255,8 @@ impl Layer0 {
         went_on
     }
 
-    /// A board reports that it has stored its parameters. If it was reset meanwhile, it has not stored those
-    /// that it was sent.
+    /// A board reports that it has stored its parameters. If it was reset meanwhile, it has not stored those that were
+    /// sent to it.
     fn saved(
         &mut self,
         ticket: Ticket,
@@ -291,7 +289,7 @@ impl Layer0 {
                 self.abort_arming(now_us, events);
                 events.push(now_us, Event::Refused { ticket, reason });
             }
-            // Armed once the replies show it: see `confirm_arming`.
+            // Armed once the replies show it, see `confirm_arming`.
             (GroupKind::Arm, None) => {}
             _ if left > 0 => {}
             (_, Some(reason)) => {
@@ -306,8 +304,8 @@ impl Layer0 {
         }
     }
 
-    /// One node refused or stayed behind: the others are disarmed again. Other waiting jobs are dropped, and
-    /// their users notified.
+    /// One node refused or stayed behind: the others are disarmed again. Other waiting jobs are dropped, and their
+    /// users notified.
     pub(super) fn abort_arming(&mut self, now_us: u64, events: &mut Events) {
         self.power = Power::Disarmed;
         let reason = Refusal::Interrupted;
@@ -364,7 +362,7 @@ impl Layer0 {
             let envelope = Envelope::from(frame.header);
             let parsed = Message::parse(&frame);
             if envelope.source == Address::MASTER {
-                // Our own bytes, heard on the shared line.
+                // The master's own bytes, received from the shared line.
                 continue;
             }
             match parsed {

@@ -13,10 +13,9 @@ use crate::event::{Event, Events, HoldReason};
 use crate::finding::Finding;
 use crate::setpoint::Setpoints;
 
-/// Cycles that the nodes have to show a closed loop after the last of them
-/// acknowledged arming …
+/// Number of cycles in which the nodes have to show a closed loop after the last of them has acknowledged arming …
 const CONFIRM_CYCLES: u8 = 10;
-/// … and with a precharge, which joints end by themselves after 200 cycles.
+/// … and the same with a precharge, which joints end by themselves after 200 cycles.
 const FILL_CYCLES: u8 = 220;
 
 /// Index of the node with the supply-pressure switch: wheel board 7.
@@ -26,13 +25,13 @@ impl Layer0 {
     /// E-stop: the bit goes out with the next SYNC and stays until cleared.
     pub fn emergency_stop(&mut self, now_us: u64, events: &mut Events) {
         self.emergency_stop = true;
-        // If everything is held already: no waiting command may open a valve after the stop.
+        // Needed if everything is held already: no waiting command may open a valve after the stop.
         self.drop_openings(now_us, events);
         self.hold_all(HoldReason::EmergencyStop, now_us, events);
     }
 
-    /// Stops every axis. References freeze at the joints' positions in the next SYNC, wheels are withdrawn,
-    /// and every node is commanded to brake (E-stop: the bit in SYNC does it). The first reason stays until
+    /// Stops every axis. References freeze at the joints' positions in the next SYNC, wheel references are withdrawn,
+    /// and every node is commanded to brake (for an E-stop the bit in SYNC does this). The first reason stays until
     /// cleared.
     pub(crate) fn hold_all(&mut self, reason: HoldReason, now_us: u64, events: &mut Events) {
         if self.hold.is_some() && self.orphan.given_up.is_none() {
@@ -50,8 +49,8 @@ impl Layer0 {
         }
     }
 
-    /// Layer 1 has stopped. If it walked, the behaviours bring the robot to a stand and keep it there for a
-    /// while ([`CARRIED`]); otherwise all axes hold.
+    /// Layer 1 has stopped. If the robot was walking, the behaviours bring it to a stand and keep it there for a while
+    /// ([`CARRIED`]); otherwise all axes hold.
     fn give_up_layer_one(&mut self, now_us: u64, events: &mut Events) {
         let reason = HoldReason::LayerOneStalled;
         if self.hold.is_some() || self.setpoints.walk.is_none() {
@@ -103,7 +102,7 @@ impl Layer0 {
         }
     }
 
-    /// Keeps every joint at its last measured position and ends all references.
+    /// Freezes every joint at its last measured position and ends all references.
     pub(super) fn freeze(&mut self) {
         let mut strokes = [None; crate::setpoint::JOINTS];
         for (stroke, (_, node)) in strokes.iter_mut().zip(self.nodes.iter()) {
@@ -113,7 +112,7 @@ impl Layer0 {
         self.release();
     }
 
-    /// Ends all references; the wheels' next motion begins at their present positions.
+    /// Ends all references; the next motion of the wheels begins at their present positions.
     pub(super) fn release(&mut self) {
         self.direct = Default::default();
         self.direct_travel = None;
@@ -135,7 +134,7 @@ impl Layer0 {
         }
         group.waited = group.waited.saturating_add(1);
         let (ticket, waited) = (group.ticket, group.waited);
-        // A motion begun while a joint still fills would be caught up with in one jump.
+        // A motion that starts while a joint is still filling would be caught up in one jump.
         let fills = self.nodes.fills();
         let allowed = if fills { FILL_CYCLES } else { CONFIRM_CYCLES };
         if self.nodes.all_armed() && !fills {
@@ -152,7 +151,7 @@ impl Layer0 {
         }
     }
 
-    /// Whether the node at `address` is just storing its parameters.
+    /// Whether the node at `address` is currently storing its parameters.
     fn is_saving(&self, address: u8) -> bool {
         self.power == Power::Disarmed
             && self.in_flight.is_some_and(|job| {
@@ -160,8 +159,8 @@ impl Layer0 {
             })
     }
 
-    /// A save stalls the board for two or three cycles, at the master's own request: it counts as missing
-    /// only if it does not come back.
+    /// A save stalls the board for two or three cycles, at the master's own request: the board counts as missing only
+    /// if it does not come back.
     fn unless_saving(
         &mut self,
         index: usize,
@@ -184,7 +183,7 @@ impl Layer0 {
         }
     }
 
-    /// Checks the traffic of this cycle besides the requested frames.
+    /// Checks the traffic of this cycle apart from the requested frames.
     fn watch_line(&mut self, now_us: u64, events: &mut Events) {
         let (nodes, questions) = (&self.nodes, &mut self.questions);
         let replied = |index| nodes.get(index).is_some_and(|node| node.reply.is_some());
@@ -201,16 +200,16 @@ impl Layer0 {
         });
     }
 
-    /// Whether the supply pressure switch is open, as its board last reported.
+    /// Whether the supply-pressure switch is open, as its board last reported.
     pub(super) fn has_no_air(&self) -> bool {
         let supply = self.nodes.get(SUPPLY_NODE).and_then(|node| node.reply);
         supply.is_some_and(|reply| !reply.inputs.contains(InputBits::SUPPLY_PRESSURE))
     }
 
-    /// Ends a cycle for the supervision of the nodes.
+    /// Supervises the nodes at the end of a cycle.
     pub(super) fn supervise(&mut self, now_us: u64, events: &mut Events) {
         if self.cycle == 0 {
-            // No SYNC was sent: nobody could answer.
+            // No SYNC was sent, so nobody could answer.
             return;
         }
         self.watch_line(now_us, events);
@@ -246,7 +245,7 @@ impl Layer0 {
                 }
                 Some(Change::Back) => {
                     if self.nodes.get(index).is_some_and(Node::has_duplicate) {
-                        // It is heard again: its duplicate is gone. Who is left?
+                        // It is heard again, so its duplicate is gone. Identify which one is left.
                         self.nodes.forget(index);
                     }
                     events.push(now_us, Event::NodeBack(address));
@@ -265,7 +264,7 @@ impl Layer0 {
         if let Some((node, faults)) = self.nodes.first_fault() {
             self.hold_all(HoldReason::NodeFault { node, faults }, now_us, events);
         }
-        // A node that is back before it is missed has lost its position loop all the same.
+        // A node that restarts before it is missed has lost its position loop all the same.
         if self.power == Power::Armed
             && let Some(node) = self.nodes.first_disarmed()
         {

@@ -1,5 +1,5 @@
-//! Finds boards with other parameters in force than they should have, by the sums that they report
-//! (protocol/SPEC.md, Parameter sets): lost, half loaded, or set by somebody.
+//! Finds boards with the wrong parameters in force, by the sums that they report (protocol/SPEC.md, Parameter sets):
+//! lost, half loaded, or changed by somebody.
 
 use crate::setpoint::NODES;
 
@@ -19,7 +19,7 @@ impl Sums {
         }
     }
 
-    /// A board reports its sum. True if it differs from the one before, and from the wanted one.
+    /// A board reports its sum. Returns true if it differs both from the previous one and from the wanted one.
     pub(super) fn heard(&mut self, index: usize, sum: u32) -> bool {
         let Some((wanted, told)) = self.wanted.get(index).zip(self.told.get_mut(index)) else {
             return false;
@@ -28,7 +28,7 @@ impl Sums {
         before != Some(sum) && wanted.is_some_and(|wanted| wanted != sum)
     }
 
-    /// A board is lost: a returning one may be another board.
+    /// A board is lost: the one that returns may be another board.
     pub(super) fn lost(&mut self, index: usize) {
         if let Some(told) = self.told.get_mut(index) {
             *told = None;

@@ -35,9 +35,9 @@ impl WheelUnits {
         Speed7::new(counts as u8).unwrap_or_default()
     }
 
-    /// Limit of the speed of streamed references that reach `speed`: whole counts per sample,
-    /// 1..=127. Rounded up, and one more in which a wheel catches up with its reference; a limit
-    /// below the references would let them run away, and end a push in a jolt.
+    /// Limit of the speed for streamed references that reach `speed`: whole counts per sample, 1..=127. It is rounded
+    /// up, plus one count with which a wheel catches up with its reference; a limit below the references would let them
+    /// run away, and end a push with a jolt.
     #[must_use]
     pub fn limit(&self, speed: VelocityMmS) -> Speed7 {
         let counts = (libm::ceilf(self.per_sample(speed)) + 1.0).clamp(1.0, 127.0);
@@ -65,9 +65,9 @@ impl WheelUnits {
     }
 }
 
-/// Longest distance between a wheel and its reference, counts: half of the unambiguous range of the 24-bit
-/// circle. A profile that still runs to one such reference can then be followed by one to any other without
-/// going the wrong way round.
+/// Longest distance between a wheel and its reference, counts: half of the unambiguous range of the 24-bit circle. A
+/// profile still running to one such reference can then be followed by a profile to any other without going the wrong
+/// way round.
 const REACH_COUNTS: i32 = (1 << 22) - 1;
 
 /// References sent to the wheels.
@@ -88,8 +88,8 @@ impl Wheels {
 
     /// The slot of one wheel for this cycle; `None` while its count is unknown.
     ///
-    /// A new segment begins at the last reference sent, so that errors do not
-    /// add up; the very first at the measured count.
+    /// A new segment begins at the last reference that was sent, so that errors do not accumulate; the very first
+    /// begins at the measured count.
     pub fn setpoint(
         &mut self,
         side: Side,
@@ -128,8 +128,8 @@ impl Wheels {
         })
     }
 
-    /// Whether a new motion of `travel_mm`, which begins at the last reference, ends within the reach of both
-    /// wheels from their positions.
+    /// Whether a new motion of `travel_mm`, starting at the last reference, ends within reach of the positions of both
+    /// wheels.
     #[must_use]
     pub fn has_room(
         &self,
@@ -149,10 +149,10 @@ impl Wheels {
     }
 }
 
-/// A move of both wheels that the user commands by its length.
+/// A move of both wheels by a distance that the user commands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DirectMove {
-    /// From the wheels' positions to the end, over its magnitude.
+    /// Profile over the magnitude of the distance.
     profile: Trapezoid,
     backward: bool,
     target_mm: PositionMm,
@@ -161,7 +161,7 @@ pub(super) struct DirectMove {
 }
 
 impl DirectMove {
-    /// A move of `travel_mm` from `start_us` on, with speed and acceleration as given.
+    /// A move of `travel_mm`, starting at `start_us`, with the given speed and acceleration.
     pub(super) fn new(
         travel_mm: PositionMm,
         shape: &PushProfile,

@@ -9,8 +9,7 @@ use crate::command::Command;
 use crate::dispatcher::{Accepted, Refusal};
 
 impl Layer1 {
-    /// Starts a command. `Ok(true)` if it is done at once, `Ok(false)` if its
-    /// end is reported later.
+    /// Starts a command. `Ok(true)` if it is completed at once, `Ok(false)` if its end is reported later.
     pub(super) fn execute(&mut self, accepted: &Accepted, now_us: u64) -> Result<bool, Refusal> {
         let moving = matches!(
             self.mode,
@@ -70,7 +69,7 @@ impl Layer1 {
                         node: self.unheard(),
                     },
                 )?;
-                // A new motion of the wheels: they stay where they are.
+                // A new motion of the wheels, in which they stay where they are.
                 self.segment = self.segment.wrapping_add(1);
                 self.mode = Mode::Homing(homing);
             }

@@ -1,13 +1,11 @@
-//! Foot trajectory of the paper's §6 ("y = sin²(time/8)", Figs. 5–8) through
-//! inverse kinematics.
+//! Foot trajectory of the paper's §6 ("y = sin²(time/8)", Figs. 5–8) through inverse kinematics.
 //!
-//! The axes of Figs. 5–8 fit one reading only (MODEL.md §6.1): the abscissa is
-//! the argument time/8, the arch takes 8π s, and with rate Ω = 1/8 rad/s
+//! The axes of Figs. 5–8 allow only one reading (MODEL.md §6.1): the abscissa is the argument time/8, the arch takes 8π
+//! s, and with rate Ω = 1/8 rad/s
 //!
 //! `x = X t/T,  z = A sin²(Ω t),  T = π/Ω`.
 //!
-//! [`FootShape::Literal`] is the caption taken word for word: z = sin²(t/8)
-//! metres over 3.5 s.
+//! [`FootShape::Literal`] takes the caption word for word: z = sin²(t/8) metres over 3.5 s.
 
 use fixed::types::I16F16;
 use wheeleg_kinematics::LegParameters;
@@ -20,13 +18,13 @@ use crate::contact::Side;
 use crate::mirror;
 use crate::setpoint::{Cylinder, JointSetpoint, OnLinkLoss, Phase, Setpoints};
 
-/// Path of the foot relative to where it starts, in the robot's axes.
+/// Path of the foot relative to its starting point, in the robot's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FootShape {
     /// One arch: forward at constant speed, up and down as sin².
     Arch {
-        /// Distance X forward, mm ([`argument::FORWARD`]). The 240 mm that fit Fig. 5 exceed
-        /// the stroke of Figs. 12–13 and are for drawing only.
+        /// Distance X forward, mm ([`argument::FORWARD`]). The 240 mm that fit Fig. 5 exceed the stroke of Figs. 12–13
+        /// and are only for drawing.
         forward_mm: PositionMm,
         /// Distance to the robot's left, mm ([`argument::LEFT`]; 0 in the paper).
         left_mm: PositionMm,
@@ -35,8 +33,7 @@ pub enum FootShape {
         /// Rate Ω, rad/s ([`argument::RATE`]; 1/8 in the paper).
         rate_rad_s: f32,
     },
-    /// The caption of Fig. 5 taken literally: z = sin²(t/8) m, 3.5 s, so that the
-    /// foot rises 179.5 mm and stays up.
+    /// The caption of Fig. 5 taken literally: z = sin²(t/8) m over 3.5 s, so that the foot rises 179.5 mm and stays up.
     Literal {
         /// Distance X forward, mm ([`argument::FORWARD`]).
         forward_mm: PositionMm,
@@ -134,11 +131,11 @@ pub struct FootTrajectory {
     leg: LegParameters<f32>,
     start: Setpoints,
     start_us: u64,
-    /// Foot at the start, robot's axes from O4, m.
+    /// Foot at the start, in the robot's axes from O4, m.
     origin_m: [f32; 3],
 }
 
-/// Points of the path that are checked before it is accepted.
+/// Number of points of the path that are checked before it is accepted.
 const CHECKS: u8 = 64;
 
 impl FootTrajectory {
@@ -203,8 +200,7 @@ impl FootTrajectory {
             ..self.start
         };
         let Some((strokes, rates)) = self.strokes_at(t_s) else {
-            // Checked when the path was accepted; between two checked points
-            // the last references are held.
+            // The path was checked when it was accepted; between two checked points the last references are held.
             return out;
         };
         let on_link_loss = if done {
@@ -228,7 +224,7 @@ impl FootTrajectory {
                 });
             }
         }
-        // Hold the end of the path if a later point should not be computable.
+        // Holds the end of the path in case a later point cannot be computed.
         if done {
             self.start = out;
         }

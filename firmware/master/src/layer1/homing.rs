@@ -1,4 +1,4 @@
-//! Slewed move of all joints to a pose, and the test that they have settled.
+//! Slewed move of all joints to a pose, and the check that they have settled.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -10,8 +10,7 @@ use crate::setpoint::{Feedback, JOINTS, JointSetpoint};
 pub struct HomingConfig {
     /// Speed of the references, mm/s, > 0.
     pub slew_mm_s: VelocityMmS,
-    /// Largest distance from the pose that counts as settled, mm. The paper
-    /// asks for "some millimetres".
+    /// Largest distance from the pose that counts as settled, mm. The paper calls for "some millimetres".
     pub tolerance_mm: PositionMm,
     /// Consecutive cycles within tolerance before the pose is reached.
     pub settle_cycles: u16,
@@ -48,7 +47,7 @@ pub enum HomingStep {
     Moving,
     /// All joints settled at the pose.
     Settled,
-    /// Time is up; the first joint (0..6) that is not within tolerance.
+    /// Time is up; gives the first joint (0..6) that is not within tolerance.
     TimedOut {
         /// Index of the joint.
         joint: u8,
@@ -76,7 +75,7 @@ impl Homing {
         })
     }
 
-    /// The pose this move leads to.
+    /// The target pose of this move.
     #[must_use]
     pub const fn target_mm(&self) -> [PositionMm; JOINTS] {
         self.target_mm
@@ -84,7 +83,7 @@ impl Homing {
 
     /// Advances by one cycle of 10 ms.
     pub fn cycle(&mut self, feedback: &Feedback) -> ([Option<JointSetpoint>; JOINTS], HomingStep) {
-        // slew × 10 ms; at least one LSB so that a tiny slew still arrives.
+        // slew × 10 ms, but at least one LSB so that even a tiny slew arrives.
         let step = self
             .config
             .slew_mm_s

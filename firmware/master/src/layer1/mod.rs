@@ -1,9 +1,8 @@
 //! Layer 1: gaits and foot trajectories. One call per bus cycle.
 //!
-//! Takes commands and measurements from its RT-FIFOs, gives one set of
-//! references per cycle to layer 0's, and touches nothing else: it can run in
-//! a thread of its own, and layer 0 notices when it stops ([`Layer1::cycle`]
-//! not called for 100 ms).
+//! It takes commands and measurements from its RT-FIFOs, writes one set of references per cycle to layer 0's, and
+//! touches nothing else. So it can run in a thread of its own; layer 0 notices when it stops ([`Layer1::cycle`] not
+//! called for 100 ms).
 
 mod commands;
 pub mod foot;
@@ -61,16 +60,16 @@ pub struct Layer1 {
     homing: HomingConfig,
     /// Dimensions of a leg.
     leg: LegParameters<f32>,
-    /// What a walk needs to know of the robot; `None`: its wheels cannot be led in a walk.
+    /// What a walk needs to know of the robot; `None`: its wheels cannot be controlled in a walk.
     walks: Option<WalkGeometry>,
     mode: Mode,
     feedback: Feedback,
     /// Command whose end is still to be reported.
     active: Option<Ticket>,
     segment: u16,
-    /// Commands `Hold` carried out (wraps).
+    /// Number of `Hold` commands carried out (wraps).
     holds: u8,
-    /// Number of the permission to move that holds.
+    /// Number of the permission to move that is in force.
     permit: u16,
     lost_setpoints: u32,
     tally: Tally,
@@ -110,7 +109,7 @@ impl Layer1 {
         &self.params
     }
 
-    /// Set-point sets that found their queue full, since start-up (wraps).
+    /// Sets of set-points that found their queue full, since start-up (wraps).
     #[must_use]
     pub const fn lost_setpoints(&self) -> u32 {
         self.lost_setpoints
@@ -122,8 +121,8 @@ impl Layer1 {
         &self.tally
     }
 
-    /// Runs one cycle: newest feedback, all waiting commands (at most as many
-    /// as the queue holds), one set of references.
+    /// Runs one cycle: takes the newest feedback and all waiting commands (at most as many as the queue holds), and
+    /// writes one set of references.
     pub fn cycle(
         &mut self,
         now_us: u64,
@@ -202,7 +201,7 @@ impl Layer1 {
         [l2, l5, l6, r2, r5, r6]
     }
 
-    /// References equal to the measured strokes; joints not heard are withdrawn.
+    /// References equal to the measured strokes; those of joints that were not heard are withdrawn.
     fn frozen(&self, now_us: u64) -> Setpoints {
         let mut out = Setpoints::idle(now_us);
         out.phase = Phase::Hold;

@@ -12,7 +12,7 @@ use crate::contact::Side;
 /// Stroke of every cylinder in mm (MODEL.md: ASSUMED, fits the axes of Figs. 12–13).
 pub const STROKE_MM: PositionMm = PositionMm::from_int(180);
 
-/// A stroke that may be asked for: the nearest one that a cylinder has.
+/// Limits a demanded stroke to the stroke of a cylinder.
 pub(crate) const fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
     stroke_mm.limit(PositionMm::ZERO, STROKE_MM)
 }
@@ -20,23 +20,21 @@ pub(crate) const fn in_stroke(stroke_mm: PositionMm) -> PositionMm {
 /// Which leg steps when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pattern {
-    /// One leg steps every time; the other holds its place, foot on the
-    /// ground. The test of the paper's Figs. 12–16 (three steps of one leg).
+    /// One leg makes every step; the other holds its place, foot on the ground. This is the test of the paper's Figs.
+    /// 12–16 (three steps of one leg).
     Single(
         /// The stepping leg.
         Side,
     ),
-    /// The legs step in turn (L–R–L). Each push covers half the reached
-    /// stroke, and both legs follow the travel: a leg swings from 0 to the
-    /// full stroke, and is carried back to half by its own push and to 0 by
-    /// the other leg's.
+    /// The legs step in turn (L–R–L). Each push covers half the reached stroke, and both legs follow the travel: a leg
+    /// swings from 0 to the full stroke, and is carried back to half by its own push and to 0 by the other leg's.
     Alternate {
         /// The leg that steps first.
         first: Side,
     },
 }
 
-/// Square-wave gait (paper Figs. 9, 12–16). Times count from the start of a step.
+/// Square-wave gait (paper Figs. 9, 12–16). Times are measured from the start of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaitParams {
     /// Number of steps ([`argument::STEPS`]).
@@ -53,11 +51,9 @@ pub struct GaitParams {
     pub push_us: u32,
     /// Stroke of b5 and b6 used by a step, mm ([`argument::STEP_STROKE`]).
     pub stroke_mm: PositionMm,
-    /// Stroke of b5 at which the held leg (or, alternating, the second leg)
-    /// stands, mm.
+    /// Stroke of b5 at which the held leg (or, when alternating, the second leg) stands, mm.
     pub held_leg_s5_mm: PositionMm,
-    /// Stroke of b6 at which the held leg stands, mm (180 = fully
-    /// extended, foot on the ground).
+    /// Stroke of b6 at which the held leg stands, mm (180 = fully extended, foot on the ground).
     pub held_leg_s6_mm: PositionMm,
     /// Stroke of both yaw cylinders, mm; 90 is straight ahead (b2 = 0.40 m).
     pub yaw_s2_mm: PositionMm,
@@ -105,8 +101,8 @@ pub enum ParamError {
         /// Which, and its range.
         OutOfRange,
     ),
-    /// An instant of the gait does not come before another one. The order is lift before
-    /// reach and before lower, both before push, push before period.
+    /// An instant of the gait is not before another one. The order is: lift before reach and before lower, both before
+    /// push, push before period.
     Order {
         /// The instant that must come first.
         first: &'static Argument,
@@ -124,7 +120,7 @@ pub enum ParamError {
         /// Time available, µs.
         has_us: u32,
     },
-    /// The slow part of the lowering alone takes as long as there is until the push.
+    /// The slow part of the lowering alone takes all the time until the push.
     TouchdownTooSlow {
         /// Length of the slow part: a step may have less than [`GUARD_MM`] to go down.
         way_mm: PositionMm,
@@ -140,18 +136,18 @@ pub enum ParamError {
     ),
     /// The foot trajectory leaves the workspace of the leg.
     OutOfReach {
-        /// Time at which it does, ms from its start.
+        /// Time at which it does so, ms from the start.
         at_ms: u32,
     },
-    /// A move of the wheels is longer than their 24-bit counters can tell.
+    /// A move of the wheels is longer than their 24-bit counters can represent.
     BeyondCounter {
-        /// Longest move either way, mm.
+        /// Longest move in either direction, mm.
         limit_mm: PositionMm,
     },
 }
 
 impl ParamError {
-    /// The arguments whose values are at fault, the first one first.
+    /// The arguments whose values are at fault, the main one first.
     pub fn arguments(&self) -> impl Iterator<Item = &'static Argument> + use<> {
         let list: [Option<&'static Argument>; 5] = match *self {
             Self::OutOfRange(OutOfRange { argument, .. }) | Self::NotFinite(argument) => {
@@ -325,8 +321,7 @@ impl GaitParams {
         ]
     }
 
-    /// Whether the push ends within the step. A push behind the period is out of order, which
-    /// is said of it already.
+    /// Whether the push ends within the step. A push after the period is out of order, which is reported separately.
     fn push_too_long(&self) -> Option<ParamError> {
         let has_us = self
             .period_us
@@ -341,8 +336,8 @@ impl GaitParams {
         (needs_us > has_us).then_some(ParamError::PushTooLong { needs_us, has_us })
     }
 
-    /// Whether a foot would still be coming down slowly when the push begins. The fast way before
-    /// the slow one ends where a piston arrives, which takes time that nobody knows here.
+    /// Whether a foot would still be lowering slowly when the push begins. The fast part before it ends when the piston
+    /// arrives, which takes a time that is not known here.
     fn touchdown_too_slow(&self) -> Option<ParamError> {
         let has_us = self
             .push_us
@@ -362,7 +357,7 @@ impl GaitParams {
         })
     }
 
-    /// The part of the lowering at the touchdown speed: all of it, where a step is short.
+    /// The part of the lowering at the touchdown speed: all of it, if a step is short.
     #[must_use]
     pub fn slow_way_mm(&self) -> PositionMm {
         self.stroke_mm.limit(PositionMm::ZERO, GUARD_MM)

@@ -13,9 +13,8 @@ pub struct Trapezoid {
 impl Trapezoid {
     /// Profile over `distance_mm` ≥ 0 with the given limits, both > 0.
     ///
-    /// A distance below `speed²/acceleration` gives a triangle of lower peak
-    /// speed. Values that are not finite or out of range give a profile that
-    /// stays at rest.
+    /// A distance below `speed²/acceleration` gives a triangle with a lower peak speed. Values that are not finite or
+    /// out of range give a profile that stays at rest.
     #[must_use]
     pub fn new(distance_mm: f32, speed_mm_s: f32, acceleration_mm_s2: f32) -> Self {
         let usable = distance_mm > 0.0
@@ -56,8 +55,7 @@ impl Trapezoid {
         self.cruise_s + 2.0 * self.ramp_s
     }
 
-    /// Position (mm) and speed (mm/s) at `t_s` after the start; clamped to the
-    /// ends outside `0..=duration_s`.
+    /// Position (mm) and speed (mm/s) at `t_s` after the start; clamped to the ends outside `0..=duration_s`.
     #[must_use]
     pub fn at(&self, t_s: f32) -> (f32, f32) {
         if t_s.is_nan() || t_s <= 0.0 {

@@ -1,7 +1,7 @@
 //! The square-wave gait of the paper's Figs. 9 and 12–16 (MODEL.md §6.2).
 //!
-//! The references are steps; the smooth curves of the figures are the answers
-//! of the cylinders. Within step `k`, with `u` the time since its start:
+//! The references are steps; the smooth curves of the figures are the responses of the cylinders. Within step `k`, with
+//! `u` the time since its start:
 //!
 //! | u | b6 of the stepping leg | b5 of the stepping leg | wheels |
 //! |---|---|---|---|
@@ -34,7 +34,7 @@ use touchdown::Touchdown;
 pub struct SquareGait {
     params: GaitParams,
     start_us: u64,
-    /// Steps to do; lowered by [`Self::stop_after_step`].
+    /// Number of steps to do; reduced by [`Self::stop_after_step`].
     steps: u16,
     /// Step whose push has been set up, if any.
     pushed: Option<u16>,
@@ -44,7 +44,7 @@ pub struct SquareGait {
     /// Measured travel when the present push began.
     travel_origin_um: i64,
     segment: u16,
-    /// Which legs have been lowered since they last rose.
+    /// Which legs have been lowered since they were last lifted.
     lowered: [bool; WHEELS],
     /// How each foot comes down.
     touchdown: [Touchdown; WHEELS],
@@ -60,8 +60,8 @@ struct Instant {
 }
 
 impl SquareGait {
-    /// Starts the gait clock at `start_us`; the robot stands in the start pose
-    /// of the parameters. `segment` numbers the first motion of the wheels.
+    /// Starts the gait clock at `start_us`; the robot stands in the start pose of the parameters. `segment` numbers the
+    /// first motion of the wheels.
     ///
     /// # Errors
     /// The first limit that the parameters violate.
@@ -85,19 +85,19 @@ impl SquareGait {
         })
     }
 
-    /// Ends the gait with the step that is under way at `now_us`.
+    /// Ends the gait after the step that is under way at `now_us`.
     pub fn stop_after_step(&mut self, now_us: u64) {
         let step = self.instant(now_us).step;
         self.steps = self.steps.min(step.saturating_add(1));
     }
 
-    /// Steps that will have been done when the gait is over.
+    /// Number of steps that will have been done when the gait ends.
     #[must_use]
     pub const fn steps(&self) -> u16 {
         self.steps
     }
 
-    /// Number of the wheels' motion in use.
+    /// Number of the present motion of the wheels.
     #[must_use]
     pub const fn segment(&self) -> u16 {
         self.segment
@@ -172,7 +172,7 @@ impl SquareGait {
         }
     }
 
-    /// `Push` becomes `Rest` once the profile of this step's push is over.
+    /// `Push` becomes `Rest` once the profile of this step's push has ended.
     fn refine_push(&self, at: Instant) -> Phase {
         let over = self
             .params
@@ -215,7 +215,7 @@ impl SquareGait {
         self.pushed = Some(step);
     }
 
-    /// Whether b5 of `side` gives way to the travel when `stepping` has stepped.
+    /// Whether b5 of `side` follows the travel after `stepping` has stepped.
     fn follows(&self, side: Side, stepping: Side) -> bool {
         match self.params.pattern {
             Pattern::Single(_) => side == stepping,

@@ -1,16 +1,16 @@
 //! Walking: the wheels drive, the legs step along.
 //!
-//! The robot moves on without a stop: the wheels turn at the speed asked for, a standing foot
-//! goes with the ground (every standing foot moves in the robot's axes with −v − ω × p), and one
-//! foot at a time swings to a new foothold. Time and place of a swing follow from speed and reach:
+//! The robot moves without stopping. The wheels turn at the ordered speed, a standing foot follows the ground (every
+//! standing foot moves in the robot's axes with −v − ω × p), and one foot at a time swings to a new foothold. Time and
+//! place of a swing follow from speed and reach:
 //!
 //! * a stance lasts as long as the foot stays within its leg's reach, T_st = S/v;
-//! * a cycle is a stance and a swing; the legs swing half a cycle apart (alternate) or one right
-//!   after the other (tandem);
-//! * where the speed leaves time, alternate legs swing earlier: some reach is kept for a swing that takes long;
+//! * a cycle is a stance and a swing; the legs swing half a cycle apart (alternate) or one right after the other
+//!   (tandem);
+//! * where the speed leaves time, alternate legs swing earlier, to keep some reach for a swing that takes long;
 //! * a foot rises only when the other has been loaded for 100 ms;
-//! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the
-//!   standing foot has room for it.
+//! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the standing foot has room
+//!   for it.
 
 mod geometry;
 mod leg;
@@ -38,41 +38,41 @@ const CYCLE_S: f32 = 0.01;
 const ACCELERATION_M_S2: f32 = 0.3;
 /// Acceleration of turning, rad/s².
 const TURN_RAD_S2: f32 = 0.5;
-/// A foot rises only when the other has been loaded for so many cycles (100 ms).
+/// A foot rises only when the other has been loaded for this many cycles (100 ms).
 const LOADED: u16 = 10;
 /// Duration of a swing before one has been measured, s: lift, reach and lower overlapped.
 const SWING_S: f32 = 1.1;
-/// Shortest and longest swing that the plan takes from the last ones, s.
+/// Shortest and longest duration of a swing that the plan adopts from measured swings, s.
 const SWING_MIN_S: f32 = 0.6;
 const SWING_MAX_S: f32 = 3.0;
-/// From the touch of one foot to the rise of the other, s: [`LOADED`] and a cycle each way.
+/// Time from the touch of one foot to the rise of the other, s: [`LOADED`] and a cycle each way.
 const EXCHANGE_S: f32 = 0.12;
-/// A stance is planned to end so much before its foot is at the end of its reach, s. Ground that a foot
-/// looks for 50 mm below where it was expected takes that long: the wheels need not wait for it.
+/// A stance is planned to end this long before its foot reaches the end of its reach, s. A foot that searches for
+/// ground 50 mm below the expected height takes that long, and the wheels need not wait for it.
 const RESERVE_S: f32 = 0.5;
-/// The references wait for wheels that are behind by so much, mm, and stand still at twice that.
+/// The references wait for wheels that are behind by this much, mm, and stop at twice that.
 const LEAD_MM: f32 = 40.0;
-/// Feet that have moved less than this, m, have not moved.
+/// Feet that have moved by less than this, m, count as not having moved.
 const PROGRESS_M: f32 = 0.005;
-/// A robot that is stuck backs off for so many cycles (1 s) at this speed, m/s, …
+/// A robot that is stuck backs off for this many cycles (1 s), at [`BACK_M_S`] m/s.
 const BACK_OFF: u16 = 100;
 const BACK_M_S: f32 = 0.05;
-/// An order that is slower than this, m/s, does not get stuck.
+/// A slower order than this, m/s, does not get stuck.
 const BACK_LEAST_M_S: f32 = 1e-4;
-/// So many cycles of layer 1 can be missed before it is given up.
+/// Layer 1 can miss this many cycles before it is given up.
 const MISSED_MOST: u64 = 10;
-/// … and lifts its feet higher ([`HIGHER_MM`]) until it has come so far, m, …
+/// After backing off the robot lifts its feet higher ([`HIGHER_MM`]) until it has moved this far, m, …
 const FREE_M: f32 = 0.5;
-/// … or has tried so many times.
+/// … or has tried this many times.
 const TRIES: u8 = 3;
-/// The governor is told when it takes more than this share of the speed, and again only after it
-/// has given all of it back.
+/// The governor is reported when it takes more than this share of the speed, and again only after it has given all of
+/// it back.
 const GOVERNED: f32 = 0.5;
-/// The nose has sunk where both legs are shorter than this share of the height ordered.
+/// The nose has sunk if both legs are shorter than this share of the ordered height.
 const SUNK: f32 = 0.5;
-/// Acts that wait to be told.
+/// Capacity for acts that wait to be reported.
 const TOLD: usize = 2;
-/// The wheels' references restart after this distance, mm, far below what they can tell.
+/// The wheels' references restart after this distance, mm, which is far below what they can represent.
 const SEGMENT_MM: f32 = 4000.0;
 
 /// A walk under way.
@@ -90,23 +90,23 @@ pub struct Walk {
     wheels_um: [i64; WHEELS],
     /// Cycles since the last swing began.
     since_swing: u16,
-    /// Duration of a swing, from those that were, s.
+    /// Duration of a swing, from past swings, s.
     swing_s: f32,
     steps: u16,
     stopping: bool,
-    /// What the references of the wheels are ahead of them, mm.
+    /// How far the references of the wheels are ahead of them, mm.
     lead_mm: [f32; WHEELS],
-    /// Way since the last try to get on, m.
+    /// Distance since the last attempt to get free, m.
     free_m: f32,
     tries: u8,
-    /// One of these tries was at something before both legs that no wheel climbs. Such a thing is tried once more, not
-    /// three times: feet that are lifted higher do not help.
+    /// One of these attempts was at something in front of both legs that no wheel climbs. Such an obstacle is tried
+    /// only once more, not three times, because lifting the feet higher does not help.
     tried_face: bool,
-    /// Cycles of backing off that are left.
+    /// Remaining cycles of backing off.
     back_off: u16,
-    /// What the behaviours of layer 0 do.
+    /// What the behaviours of layer 0 are doing.
     acts: Acts,
-    /// How often it had been stuck when that was looked at last.
+    /// Count of getting stuck when it was last looked at.
     stuck: u8,
     /// Time of the last references, µs.
     time_us: u64,
@@ -159,7 +159,7 @@ impl Walk {
         }))
     }
 
-    /// Changes the order of a walk under way, or of one that is about to stop.
+    /// Changes the order of a walk that is under way or about to stop.
     ///
     /// # Errors
     /// The first limit that the order violates.
@@ -170,7 +170,7 @@ impl Walk {
         Ok(())
     }
 
-    /// Comes to a stop, both feet down.
+    /// Comes to a stop with both feet down.
     pub fn stop(&mut self) {
         self.stopping = true;
     }
@@ -181,8 +181,7 @@ impl Walk {
         self.steps
     }
 
-    /// What its own behaviours have done since it was asked last: [`Behaviour::Stuck`] and
-    /// [`Behaviour::StrokeGovernor`].
+    /// What its own behaviours have done since the last call: [`Behaviour::Stuck`] and [`Behaviour::StrokeGovernor`].
     pub fn take_acts(&mut self) -> impl Iterator<Item = Act> + use<> {
         core::mem::take(&mut self.told).into_iter().flatten()
     }
@@ -193,7 +192,7 @@ impl Walk {
         }
     }
 
-    /// Number of the wheels' motion in use.
+    /// Number of the present motion of the wheels.
     #[must_use]
     pub const fn segment(&self) -> u16 {
         self.segment
@@ -244,8 +243,8 @@ impl Walk {
         self.write(now_us, lift_mm)
     }
 
-    /// Backs off where the feet make no progress, and gives up after some tries. `bumped`: one has just
-    /// run against something.
+    /// Backs off if the feet make no progress, and gives up after some attempts. `bumped`: a foot has just run against
+    /// something.
     fn watch_progress(&mut self, progress_m: f32, bumped: bool) {
         self.free_m += progress_m;
         if self.free_m > FREE_M {
@@ -263,7 +262,7 @@ impl Walk {
             return;
         }
         self.free_m = 0.0;
-        // A try for another cause says nothing about a face.
+        // An attempt for another cause says nothing about a face.
         let goes_on = self.tries < TRIES && !(faces && self.tried_face);
         if goes_on {
             self.tries = self.tries.saturating_add(1);
@@ -277,14 +276,14 @@ impl Walk {
         }
     }
 
-    /// What the ground has passed below since the last cycle, by the wheels: m and rad.
+    /// How far the ground has passed below since the last cycle, according to the wheels: m and rad.
     fn moved(&mut self, feedback: &Feedback) -> Twist {
         let [left, right] = self.wheels_um;
         let [now_left, now_right] = feedback.wheels_um;
         self.wheels_um = feedback.wheels_um;
         let metres = |now: i64, before: i64| now.saturating_sub(before) as f32 * 1e-6;
         let way = [metres(now_left, left), metres(now_right, right)];
-        // Wheels that layer 0 leads back are not behind.
+        // Wheels that layer 0 moves back are not behind.
         let back_mm = self.acts.back_mm.get().to_num::<f32>();
         for (lead, way) in self.lead_mm.iter_mut().zip(way) {
             *lead -= 1e3 * way + back_mm;
@@ -292,7 +291,7 @@ impl Walk {
         Twist::of_wheels(&self.geometry, way)
     }
 
-    /// The motion asked for.
+    /// The ordered motion.
     fn wanted(&self) -> Twist {
         if self.stopping {
             return Twist::default();
@@ -304,13 +303,13 @@ impl Walk {
         if self.back_off == 0 {
             return ordered;
         }
-        // The way that it came, a turn as a turn.
+        // Back the way it came; a turn backs off as a turn.
         let rim = |side| libm::fabsf(ordered.wheel_m_s(&self.geometry, side));
         let fastest = rim(Side::Left).max(rim(Side::Right));
         ordered.scaled(-BACK_M_S / fastest.max(BACK_LEAST_M_S))
     }
 
-    /// Keeps the mean height of the legs, and feet on the ground.
+    /// Keeps the mean height of the legs, and the feet on the ground.
     fn level(&mut self, plan_mm: f32) {
         let [left, right] = &self.legs;
         let rise = if left.wants_nose_down() || right.wants_nose_down() {
@@ -318,8 +317,8 @@ impl Walk {
         } else {
             plan_mm - 0.5 * (left.stood_mm(&self.acts) + right.stood_mm(&self.acts))
         };
-        // A leg that extends there would climb it, and lift the nose. But where both are short the nose
-        // has sunk: feet that cannot be lifted run against everything.
+        // A leg that extends there would climb the obstacle and lift the nose. But if both legs are short the nose has
+        // sunk, and feet that cannot be lifted run against everything.
         let longest_mm = left.stood_mm(&self.acts).max(right.stood_mm(&self.acts));
         let sunk = longest_mm < SUNK * plan_mm;
         let rise = if !sunk && (left.may_stand_at_a_face() || right.may_stand_at_a_face()) {
@@ -332,12 +331,12 @@ impl Walk {
         }
     }
 
-    /// Time left of a leg's stance at a motion, s.
+    /// Time left of a leg's stance at this motion, s.
     fn left_s(&self, twist: Twist, leg: &Leg) -> f32 {
         time_left_s(twist, &self.geometry, leg.side, leg.foot_m)
     }
 
-    /// The leg that swings next, if any, and in how many cycles as things stand: 0 is now.
+    /// The leg that swings next, if any, and in how many cycles as things stand: 0 means now.
     fn next_swing(&self, wanted: Twist) -> Option<(Side, u8)> {
         let [left, right] = &self.legs;
         if wanted == Twist::default() || self.back_off > 0 || !left.stands() || !right.stands() {
@@ -354,7 +353,7 @@ impl Walk {
         let cycle_s = self.stance_s(wanted) + self.swing_s;
         let apart_s = match self.order.pattern {
             WalkPattern::Alternate => 0.5 * (cycle_s - RESERVE_S),
-            // The second of a pair follows at once, the first one a whole cycle after it did.
+            // The second of a pair follows at once, the first one a whole cycle after the last first one.
             WalkPattern::Tandem if self.steps % 2 == 1 => 0.0,
             WalkPattern::Tandem => cycle_s - self.swing_s,
         };
@@ -365,23 +364,23 @@ impl Walk {
         } else {
             libm::ceilf((apart_s - since_s) / CYCLE_S)
         };
-        // A float to integer `as` saturates, and maps what is not a number to 0.
+        // A float-to-integer `as` saturates, and maps NaN to 0.
         let cycles = (apart as u16).max(LOADED.saturating_sub(other.loaded));
         let cycles = u8::try_from(cycles).ok()?;
         Some((next.side, cycles))
     }
 
-    /// The shorter of both legs' stances at a motion, s.
+    /// The shorter of both legs' stances at this motion, s.
     fn stance_s(&self, twist: Twist) -> f32 {
         let [left, right] =
             [Side::Left, Side::Right].map(|side| stance(twist, &self.geometry, side).duration_s);
         left.min(right)
     }
 
-    /// Brings the references' motion towards the one asked for, as fast as the feet allow.
-    /// `cycles`: since the last references; layer 0 has led the wheels on meanwhile.
+    /// Brings the references' motion towards the wanted one, as fast as the feet allow. `cycles`: cycles since the last
+    /// references, during which layer 0 has continued to drive the wheels.
     fn accelerate(&mut self, wanted: Twist, cycles: u64) {
-        // A new segment begins at the last reference sent.
+        // A new segment begins at the last reference that was sent.
         if self
             .travel_mm
             .iter()
@@ -422,13 +421,13 @@ impl Walk {
         }
     }
 
-    /// Share of the references' motion that layer 0 makes the wheels' own.
+    /// Share of the references' motion that layer 0 passes on to the wheels.
     fn pace(&self) -> f32 {
         self.acts.pace.to_num()
     }
 
-    /// Share of the motion asked for at which no standing foot runs out of reach before it may
-    /// swing, and the wheels follow.
+    /// Share of the wanted motion at which no standing foot runs out of reach before it may swing, and at which the
+    /// wheels can follow.
     fn allowed(&self, wanted: Twist) -> f32 {
         let behind = [Side::Left, Side::Right]
             .into_iter()
@@ -457,10 +456,10 @@ impl Walk {
         follows.min(share(left, right)).min(share(right, left))
     }
 
-    /// Whether the robot has come to its stop.
+    /// Whether the robot has come to a stop.
     fn over(&self) -> bool {
         let still = self.twist == Twist::default();
-        // One that gave up may stand with a foot in a hole.
+        // A robot that gave up may stand with a foot in a hole.
         let gave_up = self.tries >= TRIES;
         let down = |leg: &Leg| leg.stands() && leg.loaded >= LOADED || gave_up && leg.rests();
         self.stopping && still && self.legs.iter().all(down)

@@ -1,4 +1,4 @@
-//! Which answers count, until when a request is sent, and when a group of them is over.
+//! Which answers count, until when a request is sent, and when a group of requests is complete.
 
 use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
@@ -6,7 +6,7 @@ use wheeleg_master::command::Command;
 use wheeleg_master::dispatcher::{Refusal, Request};
 use wheeleg_protocol::{Address, Envelope, Fault, MAX_ENCODED, Message, NodeMode};
 
-/// A reply to another board is not the master's business.
+/// A reply to another board does not concern the master.
 #[test]
 fn a_slot_reply_to_another_than_the_master_is_no_reply() {
     for (to, heard) in [(Address::MASTER, true), (Address::joint(1).unwrap(), false)] {
@@ -66,7 +66,7 @@ fn a_request_is_sent_until_its_deadline_and_not_after_it() {
             command: Command::OpenAllValves { joint: 3 },
         };
         let ticket = rig.master.submit_request(request, rig.now_us).unwrap();
-        // The first time to ask is 3.6 ms after the start of the cycle.
+        // The first opportunity to ask is 3.6 ms after the start of the cycle.
         rig.cycle();
         let opened = rig.node(3).requests.iter();
         let opened = opened.filter(|m| matches!(m, Message::OpenAllValves(_)));

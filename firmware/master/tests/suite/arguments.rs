@@ -1,4 +1,4 @@
-//! Arguments of commands: one table for building commands and for the checks of the layers.
+//! Arguments of commands: one table both for building commands and for the checks of the layers.
 
 use fixed::types::I16F16;
 use wheeleg_master::MasterConfig;
@@ -12,7 +12,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::common::TestRig;
 
-/// Arguments that the master accepts: those of the paper's gait, otherwise about the middle.
+/// Arguments that the master accepts: those of the paper's gait, otherwise about the middle of the range.
 fn usual(argument: &'static Argument) -> Value {
     let seconds = |us| Value::Micros(us);
     match (argument.name, argument.kind) {
@@ -55,7 +55,7 @@ fn given_with(code: CommandCode, name: &str, value: Value) -> Vec<Given<'static>
     given
 }
 
-/// Smallest and largest value, and the next ones beyond that the type can hold.
+/// Smallest and largest value, and the next ones beyond them if the type can hold them.
 fn edges(argument: &Argument) -> ([Value; 2], [Option<Value>; 2]) {
     let step = I16F16::from_bits(1);
     match argument.kind {
@@ -91,7 +91,7 @@ fn edges(argument: &Argument) -> ([Value; 2], [Option<Value>; 2]) {
     }
 }
 
-/// The command with one value replaced past all checks; `None` if its type cannot hold it.
+/// The command with one value replaced, bypassing all checks; `None` if its type cannot hold it.
 fn forced(command: Command, name: &str, value: Value) -> Option<Command> {
     let mut command = command;
     let byte = |v| u8::try_from(v).ok();
@@ -176,7 +176,7 @@ fn forced(command: Command, name: &str, value: Value) -> Option<Command> {
     Some(command)
 }
 
-/// Whether the master refuses the command for its arguments, and which.
+/// Which argument, if any, makes the master refuse the command.
 fn refused(command: Command) -> Option<Refusal> {
     let mut rig = TestRig::new(MasterConfig::default());
     match command {
@@ -236,7 +236,7 @@ fn every_command_is_built_from_exactly_the_arguments_of_its_row() {
     }
 }
 
-/// The layers check exactly the table's ranges when they carry a command out.
+/// The layers check exactly the ranges of the table when they carry a command out.
 #[test]
 fn the_layers_refuse_what_lies_one_step_beyond_the_table_and_nothing_within() {
     let mut refusals = 0;
@@ -258,7 +258,7 @@ fn the_layers_refuse_what_lies_one_step_beyond_the_table_and_nothing_within() {
                         });
                         assert_eq!(refusal, None, "{at} {value:?}");
                     }
-                    // An instant at its limit is out of order with the others, not of range.
+                    // An instant at its limit is out of order with the others, not out of range.
                     Err(ArgumentError::Relation(
                         ParamError::Order { .. } | ParamError::PushTooLong { .. },
                     )) => {}

@@ -16,7 +16,7 @@ const YAW: usize = 0;
 const B5: usize = 1;
 const B6: usize = 2;
 
-/// A robot, whose feet may have nails.
+/// A robot whose feet may have nails.
 pub(crate) fn geometry(nailed: bool) -> WalkGeometry {
     WalkGeometry {
         nail_m: if nailed { 0.06 } else { 0.0 },
@@ -104,7 +104,7 @@ impl Robot {
         travel.map_or(0.0, |travel| travel.wheels[0].velocity_mm_s.to_f64())
     }
 
-    /// Leads the wheels for a cycle at a speed, mm/s; returns the speed used.
+    /// Commands the wheels for a cycle at a speed, mm/s; returns the speed used.
     pub(crate) fn lead(&mut self, mm_s: f64, fresh: bool) -> TravelSetpoint {
         if fresh {
             self.travel_mm += 0.01 * mm_s;
@@ -145,12 +145,12 @@ fn b1_a_cylinder_at_its_limit_for_half_a_second_gives_way() {
         assert_eq!(robot.acts().overload, told, "layer 1 knows");
         assert_eq!(robot.reference(B5, 60.0), back);
         assert_eq!(robot.run(200), [], "told once");
-        // Another phase of the leg, another try.
+        // In another phase of the leg there is another attempt.
         robot.setpoints.walk = Some(WalkPlan {
             legs: [LegPlan::Lift, LegPlan::Stance],
             driven: true,
         });
-        // It gets free by 3 mm in a cycle.
+        // It is freed by 3 mm per cycle.
         for cycle in 1..=11 {
             robot.run(1);
             let free = back + if back > 60.0 { -3.0 } else { 3.0 } * f64::from(cycle);
@@ -180,7 +180,7 @@ fn b2_two_hanging_feet_stop_the_wheels_and_no_leg_extends_far() {
     assert_eq!(robot.acts().pace, 0);
     assert_eq!(robot.acts().beyond_mm, [mm(10.0); 2]);
     assert_eq!(robot.acts().deep, [false; 2]);
-    // One that swings carries nothing either.
+    // A swinging foot carries nothing, either.
     let mut robot = Robot::all([LegPlan::Stance, LegPlan::Reach]);
     robot.touch([false; 2]);
     assert!(!robot.run(5).contains(&Act::TipGuard));
@@ -188,8 +188,8 @@ fn b2_two_hanging_feet_stop_the_wheels_and_no_leg_extends_far() {
     assert!(!robot.acts().deep[0]);
 }
 
-/// Wheels that stop and hold keep a nose up that their torque has lifted: they go back until a foot carries, by
-/// 80 mm at most, and layer 1 knows how far.
+/// Wheels that stop and hold keep up a nose that their torque has lifted: they go back until a foot carries load, by at
+/// most 80 mm, and layer 1 knows how far.
 #[test]
 fn b2_wheels_give_way_after_200_ms_until_a_foot_carries() {
     let mut robot = Robot::all([LegPlan::Stance, LegPlan::Reach]);
@@ -224,8 +224,8 @@ fn b2_wheels_give_way_after_200_ms_until_a_foot_carries() {
     assert_eq!(robot.acts().back_mm, mm(0.0), "switched off");
 }
 
-/// Feet that search for the ground at their full length carry nothing: wheels that went on would drive in
-/// below the robot until it lies on its tail. If one foot stands, the other is only set down.
+/// Feet that search for the ground at full length carry nothing: wheels that continued would drive in below the robot
+/// until it lies on its tail. If one foot stands, the other is only set down.
 #[test]
 fn b2_the_wheels_stop_while_both_feet_are_set_down_without_ground() {
     let lower = LegPlan::Lower(mm(150.0));
@@ -253,7 +253,7 @@ fn the_wheels_slow_down_and_speed_up_by_0_3_m_s2() {
     for cycle in 0..80 {
         robot.run(1);
         let led = robot.lead(120.0, true).wheels[0].velocity_mm_s.to_f64();
-        // Led twice in a cycle here.
+        // Commanded twice per cycle here.
         assert!(last - led < 6.1, "{cycle}: {last} {led}");
         last = led;
     }
@@ -279,7 +279,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
     robot.joint(B6).stroke_mm = mm(121.0);
     robot.touch([true; 2]);
     assert_eq!(robot.run(1), []);
-    // It presses at once, and stands when it is felt in two cycles in a row.
+    // It presses at once, and stands once the touch has lasted for two consecutive cycles.
     assert_eq!(robot.reference(B6, 0.0), 125.0);
     assert_eq!(robot.acts().landing[0], Landing::Waiting);
     robot.joint(B6).stroke_mm = mm(122.0);
@@ -297,7 +297,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
         robot.joint(B6).stroke_mm = mm(at);
         assert_eq!(robot.run(2), told, "{at}");
     }
-    // A touch of one cycle is a graze: the foot keeps going down.
+    // A touch of one cycle is a graze: the foot continues downwards.
     let mut robot = Robot::all([LegPlan::Lower(from), LegPlan::Stance]);
     robot.joint(B6).stroke_mm = mm(125.0);
     robot.run(1);
@@ -312,7 +312,7 @@ fn b3_a_foot_stops_where_its_switches_close() {
     assert_eq!(robot.acts().landing[0], Landing::Waiting, "felt anew");
     robot.run(1);
     assert_eq!(robot.acts().landing[0], Landing::Down(mm(129.0)));
-    // Without it the foot goes down to the expected ground, and 4 mm more.
+    // With the behaviour off, the foot goes down to the expected ground, and 4 mm further.
     let mut robot = Robot::new(
         [LegPlan::Lower(from), LegPlan::Stance],
         Behaviours::ALL.without(Behaviour::Touchdown),
@@ -365,7 +365,7 @@ fn b4_a_foot_searches_down_to_its_full_length() {
     let (robot, told) = search(Behaviours::ALL);
     assert_eq!(robot.reference(B6, 0.0), 180.0);
     assert_eq!(told, [Act::NoGround(Side::Left)]);
-    // From 178 mm on it is at its full length: 38 cycles down, 62 at the end.
+    // From 178 mm on it is at full length: 38 cycles down, 62 at the end.
     assert_eq!(robot.acts().landing[0], Landing::Nothing(62));
     let (robot, told) = search(Behaviours::ALL.without(Behaviour::Search));
     assert_eq!(
@@ -392,8 +392,8 @@ fn b4_no_ground_is_told_after_200_ms() {
     assert_eq!(robot.run(1), [Act::NoGround(Side::Left)]);
 }
 
-/// A foot that is pressed against something from the start of its reach goes back after 0.1 s: after 0.2 s of
-/// push without motion its board takes it for a fault. One that gets away has its 250 ms.
+/// A foot that is pressed against something from the start of its reach goes back after 0.1 s, because after 0.2 s of
+/// pushing without motion its board takes this for a fault. A foot that gets away has its 250 ms.
 #[test]
 fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_gives_up() {
     let pressed = |velocity_mm_s: f64| {
@@ -404,7 +404,7 @@ fn b5_a_reach_that_begins_pressed_against_something_is_told_before_its_board_giv
     let mut robot = pressed(9.9);
     assert_eq!(robot.run(9), []);
     assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
-    // A moving one is reported a cycle later: b5 waits where it touches.
+    // A moving foot is reported a cycle later: b5 waits where it touches.
     assert_eq!(pressed(10.1).run(10), []);
 }
 
@@ -438,8 +438,7 @@ fn b5_a_reach_that_stalls_or_touches_has_met_something() {
         robot.touch([true; 2]);
         assert_eq!(robot.run(1), [Act::Bump(Side::Left)]);
     }
-    // A foot that leaves the ground touches it still: b5 waits there, over the ground, and the wheels
-    // slow down.
+    // A foot that is leaving the ground still touches it: b5 waits there, over the ground, and the wheels slow down.
     let mut robot = Robot::all(reach);
     robot.setpoints.joints[B5] = Some(JointSetpoint {
         reference_mm: mm(150.0),
@@ -503,7 +502,7 @@ fn b6_a_foot_follows_lost_ground_by_20_mm_at_half_the_speed() {
     assert!(!robot.acts().lost[0]);
 }
 
-/// A robot whose wheels turn and whose legs follow with this slip, for `cycles` cycles; λ and pace act.
+/// A robot whose wheels turn and whose legs follow with this slip, for `cycles` cycles.
 fn slipping(slip: f64, cycles: u32, enabled: Behaviours) -> Robot {
     let mut robot = Robot::new(STAND, enabled);
     let (mut wheels, mut stroke) = (0.0, 170.0);
@@ -540,7 +539,7 @@ fn b7_wheels_that_slip_slow_down_and_the_legs_pull() {
     let robot = slipping(0.77, 160, Behaviours::ALL);
     assert_eq!(robot.told, [Act::Slip]);
     assert!(robot.acts().pace < 1);
-    // A leg counts from 0.3 s of its stance on, and the slip must last as long.
+    // A leg counts from 0.3 s of its stance on, and the slip must last for the same time.
     for (cycles, told) in [(55, 0), (70, 1)] {
         assert_eq!(slipping(0.5, cycles, Behaviours::ALL).told.len(), told);
     }
@@ -559,7 +558,7 @@ fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
     assert_eq!(robot.acts().stuck, 1, "as patient as before");
     robot.run(1);
     assert_eq!(robot.acts().stuck, 2);
-    // A leg that moves by 5 mm with wheels that turn by 10 mm gets on.
+    // A leg that moves by 5 mm, with wheels that turn by 10 mm, makes progress.
     for (leg_mm, wheels_um, stuck) in [
         (5.1, 10_000, false),
         (4.9, 10_000, true),
@@ -578,7 +577,7 @@ fn b9_no_progress_for_3_s_or_a_blocked_wheel_is_stuck() {
         }
         assert_eq!(found, stuck, "{leg_mm} {wheels_um}");
     }
-    // All that the motor has, at less than a fifth of the speed.
+    // Maximum motor command, at less than a fifth of the speed.
     for (effort, way_um, stuck) in [(91, 190, true), (90, 190, false), (91, 210, false)] {
         let mut robot = Robot::all(STAND);
         robot.lead(100.0, true);
@@ -627,7 +626,7 @@ fn b9_three_swings_in_a_row_that_run_against_something_are_stuck_and_then_two() 
         each.collect::<Vec<_>>()
     };
     assert_eq!(swings(&[true; 3], 20_000), [false, false, true]);
-    // Again before it has come half a metre farther.
+    // Again before it has come half a metre further.
     assert_eq!(swings(&[true; 2], 20_000), [false, true]);
     assert_eq!(swings(&[true, false, true], 20_000), [false; 3]);
     assert_eq!(swings(&[false; 9], 20_000), [false; 9]);

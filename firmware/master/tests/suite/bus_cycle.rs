@@ -51,7 +51,7 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
         assert!(rig.saw(|event| *event == Event::NodeReady(node)), "{node}");
         assert_eq!(rig.node(node).mode, NodeMode::Armed);
     }
-    // 180 mm/s and 600 mm/s² in the chip's units at 520 µs a sample:
+    // 180 mm/s and 600 mm/s² in the chip's units at 520 µs per sample:
     // 19 863 counts/s → 10.33 → 10; 66 209 counts/s² → 0.017903·256 = 4.58 → 5.
     let requests = rig.node(7).requests.clone();
     assert!(requests.iter().any(|m| matches!(m,
@@ -66,8 +66,8 @@ fn every_node_is_identified_then_armed_with_wheel_setup() {
     );
 }
 
-/// A limit below the streamed speed lets the wheels fall behind their references, and the stop at the end of
-/// a push becomes a jolt.
+/// With a limit below the streamed speed the wheels fall behind their references, and the stop at the end of a push
+/// becomes a jolt.
 #[test]
 fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
     let mut rig = TestRig::new(MasterConfig {
@@ -75,8 +75,8 @@ fn the_limit_of_a_streamed_wheel_is_above_all_that_is_streamed() {
         ..MasterConfig::default()
     });
     rig.arm();
-    // 150 mm/s and 0.175 rad/s at 0.28 m: 199 mm/s, above the 180 mm/s of a push;
-    // 110.35 counts/mm and 520 µs make 11.42 counts of them, rounded up and one more.
+    // 150 mm/s and 0.175 rad/s at 0.28 m: 199 mm/s, above the 180 mm/s of a push. With 110.35 counts/mm and 520 µs this
+    // makes 11.42 counts, rounded up plus one.
     assert_eq!(profiles(&mut rig), [[13, 5], [13, 5]]);
     let faster = GaitParams {
         push_speed_mm_s: VelocityMmS::from_int(250),
@@ -110,7 +110,7 @@ fn new_gait_parameters_reach_the_wheels_profiles() {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     assert_eq!(profiles(&mut rig), [[10, 5], [10, 5]]);
-    // Armed: sent at once, once, and only where something changed.
+    // Armed: sent immediately, once, and only if something has changed.
     let set = rig.submit(Command::SetGait(gait(360, 1200)));
     rig.run(20);
     assert!(rig.done(set));
@@ -211,13 +211,13 @@ fn arming_waits_for_slow_answers_however_long_they_take_in_all() {
         rig.cycle();
         cycles += 1;
     }
-    // Longer than the boards have to show a closed loop once all were asked.
+    // Longer than the boards have to show a closed loop once all of them have been asked.
     assert!(cycles > 12, "{cycles}");
     assert!(rig.master.is_armed());
 }
 
-/// Asks for arming; one board acknowledges it and does not close its loop. Gives the
-/// ticket in the cycle in which the last board has acknowledged.
+/// Asks for arming; one board acknowledges it but does not close its loop. Returns the ticket in the cycle in which the
+/// last board has acknowledged.
 fn armed_but_for_one(rig: &mut TestRig) -> Ticket {
     rig.run(60);
     rig.node(5).never_arms = true;
@@ -241,7 +241,7 @@ fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged()
     rig.run(2);
     assert!(rig.nodes.iter().all(|node| node.mode == NodeMode::Idle));
 
-    // In the last of them it is not too late.
+    // In the last of these cycles it is not too late.
     let mut rig = TestRig::new(MasterConfig::default());
     let ticket = armed_but_for_one(&mut rig);
     rig.run(9);
@@ -254,7 +254,7 @@ fn boards_have_ten_cycles_to_close_their_loops_after_the_last_has_acknowledged()
 fn arming_is_done_when_no_joint_fills_any_more() {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
-    // A wheel that waits for a change of direction delays nobody.
+    // A wheel that waits for a change of direction delays nothing.
     rig.node(7).limits = Limit::DriveInhibited.mask();
     rig.node(4).limits = Limit::DriveInhibited.mask();
     let ticket = rig.submit(Command::Arm);
@@ -264,7 +264,7 @@ fn arming_is_done_when_no_joint_fills_any_more() {
     rig.run(2);
     assert!(rig.done(ticket) && rig.master.is_armed());
 
-    // One that fills for ever is not waited for.
+    // A joint that fills for ever is not waited for.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).limits = Limit::DriveInhibited.mask();
@@ -339,12 +339,12 @@ fn a_wheel_move_beyond_the_encoder_circle_is_refused() {
         assert!(!done);
     }
     assert_eq!(go(&mut rig, 7_500), (None, true));
-    // A second one would add up to 15 m from the wheels' positions.
+    // A second move would add up to 15 m from the wheels' positions.
     assert_eq!(go(&mut rig, 7_500), (Some(Refusal::Moving), false));
     assert_eq!(go(&mut rig, -7_500), (None, true));
 }
 
-/// Half of the unambiguous range of the 24-bit circle, less one.
+/// Half of the unambiguous range of the 24-bit circle, minus one.
 #[test]
 fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
     let wheels = WheelGeometry {
@@ -371,7 +371,7 @@ fn a_wheel_reference_is_at_most_2_to_the_22_less_one_counts_away() {
         assert!(matches!(refusal, Some(Refusal::Parameter(_))), "{far}");
         assert!(!done);
     }
-    // The wheels are held: each way back comes on top of the way there.
+    // The wheels are held: each way back is added to the way there.
     for (counts, answer) in [
         (reach, (None, true)),
         (1, (Some(Refusal::Moving), false)),
@@ -404,7 +404,7 @@ fn a_velocity_is_told_in_sixteenths_of_a_count_per_sample() {
     }
 }
 
-/// By a hand, while the master does not lead them.
+/// Turned by hand, while the master does not control them.
 #[test]
 fn wheels_that_were_turned_while_stopped_go_on_from_where_they_are() {
     let disarm = [Command::Disarm];
@@ -528,7 +528,7 @@ fn a_wheel_that_starts_anew_has_not_moved() {
     wheel.position = 0;
     rig.run(1);
     assert_eq!(travel_um(&rig), before);
-    // From there on its counts are motion again: half of it is the mean of both.
+    // From there on its counts are motion again; half of it is the mean of both wheels.
     rig.nodes[6].mode = NodeMode::Idle;
     rig.nodes[6].position = 1_000;
     rig.run(1);
@@ -597,7 +597,7 @@ fn telemetry_drops_the_oldest_and_counts() {
         records.push(record);
     }
     assert_eq!(records.len(), 32);
-    // Cycles 1..=100 are over; the last 32 remain and the 68 before are lost.
+    // Cycles 1..=100 are over; the last 32 remain, and the 68 before them are lost.
     assert_eq!(records[0].cycle, 69);
     assert_eq!(records[31].cycle, 100);
     rig.keep_telemetry = false;
@@ -623,7 +623,7 @@ proptest! {
             prop_assert_eq!(sync.slots, wheeleg_protocol::SyncSlots::NONE);
             prop_assert_eq!(sync.flags, SyncFlags::NONE);
             master.on_bus_bytes(&chunk, now + 500);
-            // Sound frames with arbitrary contents, so that the CRC does not hide the handlers.
+            // Valid frames with arbitrary contents, so that the CRC does not hide the handlers.
             for (payload, from, kind, sequence) in replies.by_ref().take(4) {
                 let header = wheeleg_protocol::Header {
                     version: wheeleg_protocol::VERSION,

@@ -91,7 +91,7 @@ fn every_code_names_the_layer_that_answers_it() {
             row.code,
             CommandCode::EmergencyStop | CommandCode::TakeControl | CommandCode::ReleaseControl
         ) {
-            // Not queued, or not for this client (`operator.rs`).
+            // Not queued, or not allowed for this client (`operator.rs`).
             continue;
         }
         let mut master = Master::new(MasterConfig::default()).unwrap();
@@ -203,7 +203,7 @@ fn a_repeated_overtaken_or_early_emergency_stop_is_obeyed() {
         };
         assert!(master.submit_request(stop, now).is_ok(), "{id}");
         assert_eq!(master.layer0().hold(), Some(HoldReason::EmergencyStop));
-        // The count of the client does not go back.
+        // The client's count does not go back.
         assert_eq!(
             master.submit_request(request(1, 10, now), now).err(),
             Some(if id == 11 {

@@ -1,4 +1,4 @@
-//! Commands of the user to single axes: which board gets what, and when nothing may reach one.
+//! Commands of the user to single axes: which board gets what, and when no board may get anything.
 
 use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
@@ -111,7 +111,7 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
         slot.reference
     };
     let before = kept(&mut rig);
-    // Pushed away, and commanded to stop again.
+    // Pushed away, then commanded to stop again.
     rig.node(1).position += i64::from(PositionMm::from_int(9).raw());
     rig.node(1).rate = 0;
     rig.run(2);
@@ -120,11 +120,11 @@ fn a_second_stop_keeps_the_axes_where_the_first_did() {
     assert_eq!(kept(&mut rig), before);
 }
 
-/// Counts that the left wheel travels in a gait, after these moves of the user, mm.
+/// Counts that the left wheel travels in a gait that follows these moves of the user, mm.
 fn gait_after(moves_mm: &[i16]) -> i64 {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.stand();
-    // A second time: neither restarts the numbers.
+    // A second time: neither of them restarts the numbers.
     let ticket = rig.submit(Command::Stand);
     rig.run(500);
     assert!(rig.done(ticket));
@@ -141,7 +141,7 @@ fn gait_after(moves_mm: &[i16]) -> i64 {
     rig.node(7).position - start
 }
 
-/// A user releases the wheels with `Hold`: a move under way ends there, also the second time.
+/// A user releases the wheels with `Hold`: a move under way ends there, the second time as well.
 #[test]
 fn a_hold_stops_a_move_of_the_user() {
     for wheel_drive in [WheelDrive::Profile, WheelDrive::Stream] {
@@ -167,7 +167,7 @@ fn a_hold_stops_a_move_of_the_user() {
             assert_eq!(slot(&mut rig), None, "withdrawn");
             rig.run(200);
             assert_eq!(slot(&mut rig), None, "and not taken up again");
-            // 1,000 mm are 110,348 counts; streamed, 100 cycles are 150 mm of them.
+            // 1,000 mm are 110,348 counts; when streamed, 100 cycles make 150 mm of them.
             if wheel_drive == WheelDrive::Stream {
                 let way = rig.node(7).position - start;
                 assert!((10_000..20_000).contains(&way), "{way}");
@@ -176,7 +176,7 @@ fn a_hold_stops_a_move_of_the_user() {
     }
 }
 
-/// Both number their motions: however many there were, a gait goes on from the wheels' positions.
+/// Both number their motions: however many there were, a gait starts from the wheels' positions.
 #[test]
 fn a_move_of_the_user_is_none_of_the_gaits() {
     let alone = gait_after(&[]);

@@ -1,4 +1,4 @@
-//! Foot trajectories through inverse kinematics in `f32` against `f64`, and the mirror.
+//! Foot trajectories through inverse kinematics in `f32`, compared with `f64`, and the mirroring.
 
 use wheeleg_master::argument::{self, OutOfRange, Value};
 use wheeleg_master::contact::Side;
@@ -146,14 +146,13 @@ fn mirror_flips_the_side_and_nothing_else() {
         for (a, b) in strokes.iter().zip(back) {
             assert!((a - b).abs() < 1e-6);
         }
-        // Moving to the robot's left shortens the left leg's yaw cylinder and
-        // lengthens the right leg's.
+        // Moving to the robot's left shortens the left leg's yaw cylinder and lengthens the right leg's.
         let (_, rates) = strokes_of_foot(&leg(), side, foot, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(rates[0] < 0.0, side == Side::Left, "{rates:?}");
     }
 }
 
-/// A shorter crank, a foot farther out, and a vertical cylinder that begins lower.
+/// A shorter crank, a foot further out, and a vertical cylinder that begins lower.
 #[test]
 fn a_leg_of_other_dimensions_is_led_by_its_own() {
     let mut other = leg();
@@ -183,7 +182,7 @@ fn a_leg_of_other_dimensions_is_led_by_its_own() {
         for (back, stroke) in back.into_iter().zip(strokes) {
             assert!((back - stroke).abs() < 1e-6, "{strokes:?} {back}");
         }
-        // Led by the paper's dimensions the foot would go elsewhere, or nowhere.
+        // With the paper's dimensions the foot would go elsewhere, or nowhere.
         let wrong = strokes_of_foot(&leg(), Side::Left, foot, [0.0; 3]);
         assert!(wrong.is_none_or(|(wrong, _)| (wrong[1] - strokes[1]).abs() > 0.04));
     }

@@ -1,5 +1,5 @@
-//! All tests of the crate in one program, which is built and linked once: a mutant
-//! (`cargo xtask mutants`) takes a third of the time that a program per file takes.
+//! All tests of the crate in one program, which is built and linked once: a mutant (`cargo xtask mutants`) takes a
+//! third of the time that it would with a program per file.
 
 mod answers;
 mod arguments;

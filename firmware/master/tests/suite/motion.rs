@@ -10,8 +10,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 const START_US: u64 = 7_000_000;
 
-/// Feedback of a robot that follows exactly: strokes equal to the last
-/// references, travel equal to that of the wheels.
+/// Feedback of a robot that follows exactly: strokes equal to the last references, travel equal to that of the wheels.
 struct Ideal {
     feedback: Feedback,
     base_um: i64,
@@ -82,7 +81,7 @@ fn record(params: GaitParams, step_us: u64, seconds: u64) -> Vec<Sample> {
 fn square_wave_switches_at_the_instants_of_the_model() {
     let samples = record(GaitParams::default(), 10_000, 10);
     for s in &samples {
-        // Exact rational time of the grid, so that no rounding hides a shift by one cycle.
+        // Exact rational time on the grid, so that no rounding hides a shift by one cycle.
         let k3 = (s.t_s * 300.0).round() as i64; // t in 1/300 s
         let step = (k3 / 1000).min(2);
         let u = (k3 - step * 1000) as f64 / 300.0;
@@ -184,7 +183,7 @@ fn look_ahead_counts_down_to_the_very_cycle() {
                 if then.reflex == Reflex::FollowTravel && then.velocity_mm_s == VelocityMmS::ZERO
                     || then.velocity_mm_s < VelocityMmS::ZERO
                 {
-                    // A push: it begins at that cycle and leads there at its end.
+                    // A push: it begins in that cycle and is there at its end.
                     let phase = |i: usize| samples[i].setpoints.phase;
                     assert_eq!(phase(arrival), Phase::Push);
                     assert_ne!(phase(arrival - 1), Phase::Push);
@@ -283,7 +282,7 @@ fn stop_ends_with_the_step_under_way() {
     assert_eq!(gait.steps(), 2);
 }
 
-/// The foot stood at 170 mm: it goes fast to 15 mm above that, and slowly from there on.
+/// The foot stood at 170 mm: it is lowered fast to 15 mm above that, and slowly from there on.
 #[test]
 fn a_guarded_touchdown_is_slow_from_above_the_ground_on() {
     const SPEED_MM_S: f64 = 60.0;
@@ -326,7 +325,7 @@ fn a_guarded_touchdown_is_slow_from_above_the_ground_on() {
         180.0,
         "the push needs it down"
     );
-    // In the next step the ground is at the foot's present place.
+    // In the next step the ground is expected at the foot's present position.
     assert_eq!(b6_at(3_434, Some(176)).reference_mm.to_f64(), 0.0);
     assert_eq!(b6_at(4_340, Some(0)).reference_mm.to_f64(), 161.0);
 }

@@ -1,4 +1,4 @@
-//! The lease of control: who may command, and what happens when the operator is gone.
+//! The lease of control: who may give commands, and what happens when the operator is gone.
 
 use crate::common::{CYCLE_US, TestRig};
 use wheeleg_master::MasterConfig;
@@ -37,7 +37,7 @@ impl Console {
         self.rig.master.submit_request(request, self.rig.now_us)
     }
 
-    /// Cycles in which the operator looks on.
+    /// Cycles in which the operator is watching.
     fn watch(&mut self, cycles: usize) {
         for _ in 0..cycles {
             self.rig.master.beat(self.rig.now_us, self.rig.now_us);
@@ -134,7 +134,7 @@ fn what_waits_when_the_operator_is_lost_never_runs() {
     let mut console = Console::new();
     console.done(Command::TakeControl, 1);
     console.done(Command::Arm, 20);
-    // A host that was suspended: earlier commands are taken from the queue long after.
+    // A host that was suspended: earlier commands are taken from the queue long afterwards.
     let arm = console
         .give(OPERATOR_CLIENT, Command::Disarm)
         .expect("taken");
@@ -202,7 +202,7 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
         assert_eq!(console.rig.master.layer0().lease().seen_us(), seen);
     }
     console.rig.run(50);
-    // Nor does a beat of a client that holds nothing.
+    // Nor does a beat of a client without control.
     console
         .rig
         .master
@@ -210,7 +210,7 @@ fn a_late_repeated_or_future_beat_gains_nothing() {
     assert!(!console.rig.master.layer0().lease().is_held());
 }
 
-/// Each request refers to a view from long before: otherwise one could drive without looking.
+/// Each request refers to a view from long ago: otherwise one could drive without looking.
 #[test]
 fn who_takes_the_control_again_has_seen_nothing_more() {
     let mut console = Console::new();

@@ -1,5 +1,5 @@
-//! A walk whose layer 1 has stopped, with eight boards on the bus: what goes on, how it ends, and what can
-//! never begin again.
+//! A walk whose layer 1 has stopped, with eight boards on the bus: what continues, how it ends, and what can never
+//! start again.
 
 use crate::common::{CYCLE_US, TestRig, leg};
 use wheeleg_master::MasterConfig;
@@ -18,7 +18,7 @@ use wheeleg_units::{PositionMm, VelocityMmS};
 
 /// Stroke of a leg that reaches the ground, mm.
 const GROUND_MM: f64 = 155.0;
-/// Cycles after which layer 1 is given up, and after which its walk's behaviours end.
+/// Cycles after which layer 1 is given up, and after which the behaviours of its walk end.
 const GIVEN_UP: usize = 10;
 const ENDS: usize = 500;
 
@@ -43,7 +43,7 @@ impl Walker {
         let mut walker = Self {
             rig: TestRig::new(MasterConfig {
                 wheel_drive: WheelDrive::Stream,
-                // All pistons are as quick as the fake ones.
+                // All pistons are as fast as the fake ones.
                 behaviours: Behaviours::ALL.without(Behaviour::Stuck),
                 ..MasterConfig::default()
             }),
@@ -100,7 +100,7 @@ impl Walker {
         wheels.map(|node| node.position).collect()
     }
 
-    /// Checks that nothing moves for `cycles` cycles, and nothing is armed that could.
+    /// Checks that for `cycles` cycles nothing moves and nothing is armed that could move.
     fn stays(&mut self, cycles: usize, why: &str) {
         let (strokes, wheels) = (self.strokes_mm(), self.wheels());
         for cycle in 0..cycles {
@@ -133,7 +133,7 @@ fn a_layer_1_that_wakes_after_it_was_given_up_is_not_followed_and_its_feet_are_s
             strokes[2] >= GROUND_MM && strokes[5] >= GROUND_MM,
             "{strokes:?}"
         );
-        // The ground below a foot gives way: the leg follows.
+        // The ground below a foot gives way, and the leg follows.
         walker.ground_mm[0] = strokes[2] + 5.0;
         walker.run(20);
         let followed = walker.strokes_mm()[2] - strokes[2];
@@ -255,7 +255,7 @@ fn asks(walker: &mut Walker, command: Command) {
     walker.rig.submit(command);
 }
 
-/// A stop: its name, how it comes about, the reported reason.
+/// A stop: its name, its trigger, and the reported reason.
 type Stop = (&'static str, fn(&mut Walker), Option<HoldReason>);
 
 /// Causes that can stop a robot whose layer 1 has stopped.
@@ -304,14 +304,14 @@ const STOPS: [Stop; 8] = [
 #[test]
 fn every_stop_stops_a_walk_without_layer_1_and_a_layer_1_that_wakes_moves_nothing() {
     for (name, stop, reason) in STOPS {
-        // Before layer 1 is given up, in the slowing down, and when the robot stands.
+        // Before layer 1 is given up, while slowing down, and when the robot stands.
         for cycles in [4, GIVEN_UP + 12, 130] {
             for wakes in [false, true] {
                 let why = format!("{name} {cycles} cycles after the stall, wakes {wakes}");
                 let mut walker = Walker::new(order(120, "0.03"), 311);
                 walker.stall(cycles);
                 stop(&mut walker);
-                // Three cycles to miss a board, some to find the request for a hold.
+                // Three cycles until a board counts as missing, and some until the request for a hold is found.
                 walker.run(GIVEN_UP + 2);
                 if wakes {
                     walker.wake();
@@ -410,7 +410,7 @@ fn commands_to_a_layer_1_that_was_given_up_are_answered() {
     walker.stays(20, "held");
 }
 
-/// Where the left wheel is led, counts.
+/// Reference of the left wheel, counts.
 fn led(sync: &Sync) -> i32 {
     let wheel = sync.slots.wheel(Address::wheel(7).unwrap()).unwrap();
     wheel.reference.get()
@@ -452,7 +452,7 @@ fn feet_lose_nothing_when_layer_1_misses_the_cycle_of_an_act() {
             let legs = walker.rig.last_record.unwrap().walk.unwrap().legs;
             legs[0] == LegPlan::Reach
         };
-        // A reach that hardly gets on.
+        // A reach that makes hardly any progress.
         while !reaches(&walker) {
             walker.run(1);
         }
@@ -468,7 +468,7 @@ fn feet_lose_nothing_when_layer_1_misses_the_cycle_of_an_act() {
         let bump = Event::Behaviour(Act::Bump(Side::Left));
         let mut cycles = 0;
         while !walker.rig.saw(|event| *event == bump) {
-            // Layer 1 is away in the cycle of the bump, whenever that is.
+            // Layer 1 is absent in the cycle of the bump, whenever that is.
             walker
                 .rig
                 .master

@@ -84,7 +84,7 @@ fn parameters_out_of_range_are_refused_by_name() {
     );
 }
 
-/// A step that goes up by less than the slow distance is lowered slowly over its whole height.
+/// A step whose height is less than the slow distance is lowered slowly over its whole height.
 #[test]
 fn a_short_step_is_lowered_slowly_over_its_own_stroke() {
     let short = |stroke_mm: f64, speed_mm_s: f64| GaitParams {
@@ -92,7 +92,7 @@ fn a_short_step_is_lowered_slowly_over_its_own_stroke() {
         touchdown_speed_mm_s: VelocityMmS::from_f64(speed_mm_s),
         ..GaitParams::default()
     };
-    // There is a second.
+    // There is one second for it.
     assert_eq!(short(5.0, 5.01).validate(), Ok(()));
     assert_eq!(short(1.0, 1.01).validate(), Ok(()));
     let error = short(5.0, 5.0).validate().expect_err("refused");
@@ -106,7 +106,7 @@ fn a_short_step_is_lowered_slowly_over_its_own_stroke() {
     assert_eq!(short(100.0, 15.01).validate(), Ok(()));
 }
 
-/// Each of the five relations of order on its own, and all violations at once.
+/// Each of the five order relations on its own, and all violations at once.
 #[test]
 fn every_relation_names_both_instants() {
     let good = GaitParams::default();

@@ -12,10 +12,10 @@ use wheeleg_protocol::{
     NodeMode, ResetCause,
 };
 
-/// Cycles of a whole round of questions: link and log of eight boards.
+/// Cycles of a full round of questions: link and log of eight boards.
 const ROUND: usize = 160;
 
-/// The master hears a broken frame.
+/// The master receives a broken frame.
 fn noise(rig: &mut TestRig) {
     let broken = [0, 5, 9, 9, 9, 9, 9, 0];
     rig.master.on_bus_bytes(&broken, rig.now_us);
@@ -60,7 +60,7 @@ fn a_board_with_a_new_fault_is_asked_why_in_the_same_cycle_and_once() {
     assert_eq!(diagnoses(&rig).len(), 1, "once");
 }
 
-/// A new master leads boards that have not reported their fault to anybody yet.
+/// A new master controls boards that have not yet reported their fault to anybody.
 #[test]
 fn a_fault_from_before_this_master_is_told_by_its_age() {
     const AGE_US: u64 = 3_000_000;
@@ -85,7 +85,7 @@ fn a_fault_from_before_this_master_is_told_by_its_age() {
 
 #[test]
 fn a_board_that_restarted_is_asked_why_whether_it_was_missed_or_not() {
-    // Within a cycle: found by its mode, armed or not.
+    // Within a cycle: detected by its mode, armed or not.
     for armed in [true, false] {
         let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
@@ -108,7 +108,7 @@ fn a_board_that_restarted_is_asked_why_whether_it_was_missed_or_not() {
             "armed: {armed}"
         );
     }
-    // Missed for long: asked when it is heard again.
+    // Missing for long: asked when it is heard again.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.node(7).silent = true;
@@ -320,7 +320,7 @@ fn parameters_are_read_written_and_saved_and_a_save_is_no_loss() {
         raw: -77,
     };
     assert!(rig.done(ticket) && rig.saw(|event| *event == value));
-    // Two erased pages: five cycles without a word.
+    // Two erased pages: five cycles of silence.
     rig.node(3).save_cycles = 5;
     rig.node(3).link.frames = 900;
     let ticket = rig.submit(Command::SaveParameters { node: 3 });
@@ -337,7 +337,7 @@ fn parameters_are_read_written_and_saved_and_a_save_is_no_loss() {
     assert_eq!(rig.refusal(ticket), Some(Refusal::NotDisarmed));
 }
 
-/// Only the board that saves is not missed meanwhile.
+/// Only the board that saves is not counted as missing meanwhile.
 #[test]
 fn another_board_that_falls_silent_during_a_save_is_missed_at_once() {
     let mut rig = TestRig::new(MasterConfig::default());
@@ -367,7 +367,7 @@ fn a_board_reset_in_mid_save_has_not_saved_whatever_it_says_afterwards() {
         diagnoses(&rig).iter().map(|(n, _)| *n).collect::<Vec<_>>(),
         [3]
     );
-    // One that never comes back is reported as lost after all.
+    // A board that never comes back is finally reported as lost.
     rig.node(5).save_cycles = 200;
     let ticket = rig.submit(Command::SaveParameters { node: 5 });
     rig.run(40);
@@ -437,7 +437,7 @@ fn who_fills_the_line_is_named() {
             rig.master.on_bus_bytes(&answer, start + 5_000 + 350 * i);
         }
     }
-    // Unrequested answers, twelve in a cycle.
+    // Unrequested answers, twelve per cycle.
     assert_eq!(found(&rig, Finding::LineFull), [Some(8)]);
     assert!(rig.master.is_armed(), "and goes on");
 }

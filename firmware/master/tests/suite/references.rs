@@ -1,5 +1,4 @@
-//! Changes that behaviours make to references come and go at their stated rate, whatever the robot does
-//! meanwhile.
+//! Changes that behaviours make to references come and go at their stated rate, whatever the robot does meanwhile.
 
 use crate::behaviours::{Robot, geometry, mm};
 use crate::common::leg;
@@ -20,7 +19,7 @@ fn plans(robot: &mut Robot, legs: [LegPlan; 2]) {
     robot.setpoints.walk = Some(WalkPlan { legs, driven: true });
 }
 
-/// References of these joints for 100 mm each, also for a robot that no longer walks.
+/// References of these joints for 100 mm each, even for a robot that no longer walks.
 fn references(robot: &Robot, joints: [usize; 2]) -> [f64; 2] {
     let plan = robot.setpoints.walk;
     joints.map(|joint| {
@@ -33,7 +32,7 @@ fn references(robot: &Robot, joints: [usize; 2]) -> [f64; 2] {
     })
 }
 
-/// Runs cycles; no reference of these joints changes by more than this in one. Returns the last ones.
+/// Runs cycles; no reference of these joints changes by more than this per cycle. Returns the last ones.
 fn evenly(robot: &mut Robot, joints: [usize; 2], most_mm: f64, cycles: u32) -> [f64; 2] {
     let mut before = references(robot, joints);
     for cycle in 0..cycles {
@@ -48,7 +47,7 @@ fn evenly(robot: &mut Robot, joints: [usize; 2], most_mm: f64, cycles: u32) -> [
     before
 }
 
-/// Runs a cycle: travel of the wheels, mm, and of the standing feet with this slip.
+/// Runs a cycle with this travel of the wheels, mm, and of the standing feet with this slip.
 fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     let turn = (wheels_mm[1] - wheels_mm[0]) / 560.0;
     let forward = 0.5 * (wheels_mm[0] + wheels_mm[1]);
@@ -76,8 +75,8 @@ fn goes(robot: &mut Robot, wheels_mm: [f64; 2], slip: f64) {
     }
 }
 
-/// A robot that has moved like this for some cycles, with both feet at first this far ahead of their yaw axes
-/// and left of them, mm.
+/// A robot that has moved like this for some cycles, with both feet initially this far ahead of their yaw axes and to
+/// the left of them, mm.
 fn gone(
     geometry: WalkGeometry,
     wheels_mm: [f64; 2],
@@ -128,7 +127,7 @@ fn legs_pull_the_way_that_their_wheels_go_each_for_itself() {
     };
     assert_eq!(lead([0.8, 0.8], [180.0, 0.0]), [70.0, 70.0]);
     assert_eq!(lead([-0.8, -0.8], [30.0, 0.0]), [130.0, 130.0]);
-    // When turning on the spot to the left, the left foot must go ahead.
+    // When turning on the spot to the left, the left foot must move forward.
     assert_eq!(lead([-0.25, 0.25], [150.0, 35.0]), [130.0, 70.0]);
 }
 
@@ -145,7 +144,7 @@ fn the_lead_of_a_pulling_leg_goes_by_half_a_millimetre_in_a_cycle() {
     robot.touch([false, true]);
     assert_eq!(evenly(&mut robot, B5, 0.5, 59)[0], 99.5);
     assert_eq!(evenly(&mut robot, B5, 0.5, 1)[0], 100.0);
-    // It turns back.
+    // It reverses its turn.
     let mut robot = pulls();
     let mut before = references(&robot, B5);
     for _ in 0..200 {
@@ -215,7 +214,7 @@ fn switching_behaviours_in_mid_walk_moves_no_reference_at_once() {
     assert!(before[0] > 110.0);
     robot.behaving.enable(Behaviours::NONE);
     assert_eq!(evenly(&mut robot, B6, 0.0, 20), before);
-    // An overloaded cylinder gets free by 3 mm in a cycle.
+    // An overloaded cylinder is freed by 3 mm per cycle.
     let mut robot = Robot::all(STAND);
     robot.joint(B5[0]).saturated = true;
     robot.joint(B5[0]).duty = Duty::from_per_mille(900);
@@ -247,7 +246,7 @@ fn a_nailed_foot_that_is_stopped_above_the_ground_it_expects_lands_within_60_ms(
     robot.joint(B6[0]).stroke_mm = mm(70.0);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(200);
     robot.run(15);
-    // Nails go in: it touches, and continues down.
+    // The nails penetrate: the foot touches, and continues downwards.
     robot.touch([true; 2]);
     robot.joint(B6[0]).velocity_mm_s = VelocityMmS::from_int(10);
     robot.run(30);
@@ -303,7 +302,7 @@ fn the_pace_changes_the_speed_of_a_wheel_by_3_mm_s_whatever_the_walk_does_meanwh
 
 #[test]
 fn a_robot_of_another_track_turns_otherwise() {
-    // Half the track: the same wheels turn it twice as fast, and the feet with it.
+    // Half the track: the same wheel speeds turn the robot twice as fast, and the feet with it.
     let narrow = WalkGeometry {
         track_m: 0.28,
         ..geometry(false)

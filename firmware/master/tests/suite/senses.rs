@@ -34,8 +34,8 @@ fn bearing_error_is_within_its_bound_and_the_bound_is_tight() {
         low = low.min(signed);
         high = high.max(signed);
     }
-    // The approximation errs to both sides, by nearly its bound: a better or a
-    // worse one would have another documented number.
+    // The approximation errs on both sides, by nearly its bound: a better or worse one would need another documented
+    // number.
     assert!(low < -0.8 * f64::from(BEARING_ERROR_RAD), "{low}");
     assert!(high > 0.8 * f64::from(BEARING_ERROR_RAD), "{high}");
 }
@@ -92,7 +92,7 @@ proptest! {
         let exact_um = total as f64 * 942_478.0 / 104_000.0;
         let found = odometry.wheel_um(Side::Left) as f64;
         prop_assert!((found - exact_um).abs() <= 0.51, "{found} {exact_um}");
-        // Distance to counts and back is within half a µm either way.
+        // Distance to counts and back is within half a µm in either direction.
         let um = odometry.wheel_um(Side::Left);
         prop_assert!((geometry.counts_to_um(geometry.um_to_counts(um)) - um).abs() <= 1);
     }
@@ -203,7 +203,7 @@ fn homing_slews_settles_and_times_out() {
         cycles += 1;
         for (i, joint) in joints.iter().enumerate() {
             let reference = joint.unwrap().reference_mm;
-            // 90 mm/s are 0.9 mm a cycle.
+            // 90 mm/s is 0.9 mm per cycle.
             assert!((reference.to_f64() - last[i]).abs() < 0.9001);
             last[i] = reference.to_f64();
             feedback.strokes_mm[i] = Some(reference);
@@ -213,11 +213,11 @@ fn homing_slews_settles_and_times_out() {
         }
         assert_eq!(step, HomingStep::Moving);
     }
-    // 120 mm take 134 cycles of 0.9 mm; then 30 cycles settled, the first of which arrives.
+    // 120 mm take 134 cycles of 0.9 mm; then 30 settled cycles, the first of which is that of arrival.
     assert!((160..=170).contains(&cycles), "{cycles}");
     assert_eq!(last, [90.0, 0.0, 180.0, 90.0, 90.0, 180.0]);
 
-    // Joint index 4 stays 4 mm off: time runs out and it is named.
+    // Joint index 4 stays 4 mm off: the time runs out and it is named.
     let mut homing = Homing::new(config, target, &feedback).unwrap();
     feedback.strokes_mm[4] = Some(mm(94));
     let outcome = (0..1500).map(|_| homing.cycle(&feedback).1).last();

@@ -45,7 +45,7 @@ fn a_silent_node_is_lost_after_three_cycles_and_the_rest_hold() {
     let sync = rig.cycle();
     assert!(rig.saw(|event| *event == Event::NodeLost(4)));
     assert!(rig.saw(|event| *event == Event::Hold(HoldReason::NodeLost(4))));
-    // In that very SYNC the references freeze at the strokes measured, and the wheels are withdrawn.
+    // In that very SYNC the references freeze at the measured strokes, and the wheels are withdrawn.
     for joint in [1, 2, 3, 5, 6] {
         let slot = sync.slots.joint(Address::joint(joint).unwrap()).unwrap();
         let moved = i64::from(slot.reference.raw()) - strokes[usize::from(joint) - 1];
@@ -144,7 +144,7 @@ fn an_e_stop_is_the_bit_in_sync_alone_and_a_hold_asks_for_brakes() {
     assert_eq!(rig.master.layer0().hold(), Some(HoldReason::SupplyLost));
     assert_eq!(brakes(&mut rig), 8);
 
-    // Nobody drives: there is nothing to brake, and nothing to hold.
+    // No axis is driven: there is nothing to brake, and nothing to hold.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(7).inputs = InputBits::NONE;
@@ -238,7 +238,7 @@ fn a_stalled_layer_one_is_held_for_a_tenth_of_a_second() {
     }
     rig.cycle();
     assert!(rig.saw(|event| *event == Event::Hold(HoldReason::LayerOneStalled)));
-    // It comes back: still latched.
+    // It comes back: the stop is still latched.
     rig.master.set_layer1_enabled(true);
     rig.run(5);
     assert!(!rig.master.is_armed());
@@ -262,7 +262,7 @@ fn a_node_that_restarts_faster_than_it_is_missed_stops_the_others() {
     assert!(!rig.master.is_armed(), "latched");
     let others = [1, 2, 3, 5, 6].map(|joint| rig.node(joint).mode);
     assert_eq!(others, [NodeMode::Hold; 5]);
-    // Disarming on request is no such event.
+    // Disarming on request does not cause this.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
     rig.submit(Command::Disarm);
@@ -304,7 +304,7 @@ fn blow_through_is_for_maintenance_only() {
 fn a_stop_reaches_the_others_before_the_silent_node_times_out() {
     let mut rig = TestRig::new(MasterConfig::default());
     rig.arm();
-    // A request to the node that is about to die is under way.
+    // A request to the node that is about to fall silent is under way.
     rig.node(1).silent = true;
     let ticket = rig.submit(Command::TransmitPosition { joint: 1 });
     rig.run(4);
@@ -318,8 +318,8 @@ fn a_stop_reaches_the_others_before_the_silent_node_times_out() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Garbage and forged replies in mid-step: every reference stays inside the
-    /// stroke, and a HOLD, once entered, is not left.
+    /// Garbage and forged replies in mid-step: every reference stays within the stroke, and a HOLD, once entered, is
+    /// not left.
     #[test]
     fn references_stay_in_the_stroke_whatever_the_bus_brings(
         garbage in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 120),
@@ -362,7 +362,7 @@ proptest! {
     }
 }
 
-/// The master has started again without the board's noticing: no request of this one armed it.
+/// The master has restarted without the board noticing: no request of this master has armed it.
 #[test]
 fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
     let left = |event: &Event| match event {
@@ -386,7 +386,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
             assert_eq!(asked, usize::from(boards.contains(&node.address.raw())));
         }
     }
-    // One that does not hear it is asked again, and named once.
+    // A board that does not hear the request is asked again, but named only once.
     let mut rig = TestRig::new(MasterConfig::default());
     rig.run(60);
     rig.node(4).mode = NodeMode::Armed;
@@ -400,7 +400,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
     assert_eq!(rig.node(4).mode, NodeMode::Idle);
     let told: Vec<_> = rig.events.iter().filter_map(|(_, e)| left(e)).collect();
     assert_eq!(told, [Some(4)]);
-    // A requested arming or disarming is no such thing, whichever board is slow.
+    // A requested arming or disarming does not count, whichever board is slow.
     for slow in [6, 8] {
         let mut rig = TestRig::new(MasterConfig::default());
         rig.arm();
@@ -408,7 +408,7 @@ fn a_board_that_is_armed_while_nobody_is_is_told_of_and_disarmed() {
         let ticket = rig.submit(Command::Disarm);
         rig.run(60);
         assert!(rig.done(ticket) && !rig.saw(|event| left(event).is_some()));
-        // Nor is an aborted arming.
+        // Nor does an aborted arming.
         let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         rig.node(2).never_arms = true;

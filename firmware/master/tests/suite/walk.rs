@@ -1,6 +1,6 @@
-//! A walk against an ideal robot: pistons that follow their references at a limited speed, wheels that follow
-//! theirs, and a nose that rests on the feet: a leg that reaches as far down as the other one, within the
-//! give of the air, touches the ground.
+//! A walk on an ideal robot: pistons that follow their references at a limited speed, wheels that follow theirs, and a
+//! nose that rests on the feet. A leg touches the ground if it reaches as far down as the other one, to within the
+//! compliance of the air.
 
 use crate::common::leg;
 use fixed::types::I16F16;
@@ -32,7 +32,7 @@ struct Robot {
     last: Setpoints,
     /// How often it was reported as stuck, not counting what the behaviours find.
     stuck: u8,
-    /// Something that its feet cannot be lifted over keeps b5 from going farther out than this, mm.
+    /// An obstacle over which the feet cannot be lifted keeps b5 from extending beyond this, mm.
     wall_mm: [f64; 2],
 }
 
@@ -71,7 +71,7 @@ impl Robot {
         touches(&self.strokes, &self.ground, side)
     }
 
-    /// Foot of a leg from its yaw axis, m.
+    /// Position of a leg's foot from its yaw axis, m.
     fn foot_m(&self, side: Side) -> [f64; 2] {
         let first = side.joint(Cylinder::Yaw);
         let strokes = [0, 1, 2].map(|i| (self.strokes[first + i] * 1e-3) as f32);
@@ -147,7 +147,7 @@ impl Robot {
     }
 }
 
-/// Whether a foot reaches as far down as the other, or as the air lets it, mm.
+/// Whether a foot reaches as far down as the other one, or as far as the air allows, mm.
 fn touches(strokes: &[f64; 6], ground: &[f64; 2], side: Side) -> bool {
     let down = |side: Side| strokes[side.joint(Cylinder::Vertical)] - ground[side.index()];
     down(side) >= down(side.other()) - 3.5
@@ -183,7 +183,7 @@ fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
                 let wanted = out.joints[side.joint(Cylinder::Vertical)]
                     .unwrap()
                     .reference_mm;
-                // A rise is commanded in one step.
+                // A lift is commanded in a single step.
                 if wanted.to_f64() < before[side.index()] - 12.5 {
                     rises[side.index()] += 1;
                     // The tenth cycle is this one.
@@ -204,7 +204,7 @@ fn a_foot_rises_only_when_the_other_has_been_loaded_for_100_ms() {
 
 #[test]
 fn standing_feet_stay_where_they_are_on_the_ground() {
-    // Straight, back, in a turn and on the spot: the feet go with the ground below them.
+    // Straight, backward, in a turn and on the spot: the feet move with the ground below them.
     for (speed, turn) in [
         (100, "0"),
         (-80, "0"),
@@ -241,7 +241,7 @@ fn standing_feet_stay_where_they_are_on_the_ground() {
                 worst = worst.max(off);
             }
         }
-        // A step of the reference where the leg's geometry is tightest.
+        // One step of the reference, where the leg's geometry is tightest.
         assert!(
             worst < 1.0e-3,
             "{speed} {turn}: {} mm in a cycle",
@@ -306,7 +306,7 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
     // The standing foot is still inside its reach.
     let [x, _] = robot.foot_m(Side::Right);
     assert!(x > 0.012, "{x}");
-    // It continues when there is ground again.
+    // It continues once there is ground again.
     robot.ground[0] = 0.0;
     robot.run(3.0);
     assert!(robot.last.travel.unwrap().wheels[0].velocity_mm_s.to_f64() > 50.0);
@@ -316,7 +316,7 @@ fn no_foot_is_dragged_where_a_swing_takes_long() {
 fn a_hole_is_reached_with_the_nose_down() {
     let mut robot = Robot::new(order(100, "0"));
     robot.run(8.0);
-    // Beyond the 20 mm left below the foot, within the give of the nose.
+    // Deeper than the 20 mm left below the foot, but within the range of the nose.
     robot.ground[0] = 40.0;
     let before = robot.wheels_mm[0];
     robot.run(10.0);
@@ -347,8 +347,8 @@ fn a_walk_that_cannot_go_on_backs_off_three_times_and_stands() {
     panic!("it tries for ever");
 }
 
-/// The tries of a walk whose feet run against walls there, and the time from the first bump until it gives up, s;
-/// `None` if it has not in a minute.
+/// The number of attempts of a walk whose feet run against walls there, and the time from the first bump until it gives
+/// up, s; `None` if it has not given up within a minute.
 fn gives_up(mut robot: Robot, wall_mm: [f64; 2]) -> Option<(u32, f64)> {
     robot.wall_mm = wall_mm;
     let (mut tries, mut since) = (0, None);
@@ -381,11 +381,11 @@ fn what_no_wheel_climbs_is_tried_once_more() {
     let (tries, took_s) = gives_up(walking(), [60.0; 2]).expect("it gives up");
     assert_eq!(tries, 1);
     assert!(took_s < 8.0, "{took_s}");
-    // Before one leg alone it goes on beside it.
+    // In front of one leg only, the robot gets past it.
     assert_eq!(gives_up(walking(), [60.0, 180.0]), None);
 }
 
-/// A try for another cause, shortly before, is not that one.
+/// An attempt shortly before, for another cause, does not count.
 #[test]
 fn what_no_wheel_climbs_is_tried_once_more_after_another_try() {
     let mut robot = walking();
@@ -396,7 +396,7 @@ fn what_no_wheel_climbs_is_tried_once_more_after_another_try() {
     assert_eq!(tries, 1);
 }
 
-/// With its behaviour switched off nothing gives up.
+/// With its behaviour switched off, nothing gives up.
 #[test]
 fn what_no_wheel_climbs_ends_no_walk_whose_behaviour_is_off() {
     let mut robot = walking();
@@ -429,7 +429,7 @@ fn a_stance_ends_before_its_reach_where_the_speed_leaves_time() {
 
 #[test]
 fn a_walk_goes_on_for_longer_than_the_references_can_tell() {
-    // 32 m are the end of their format.
+    // 32 m is the end of their format.
     let mut robot = Robot::new(order(120, "0"));
     robot.run(400.0);
     assert!(robot.wheels_mm[0] > 38_000.0, "{:?}", robot.wheels_mm);

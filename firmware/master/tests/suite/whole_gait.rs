@@ -1,5 +1,4 @@
-//! The three-step test through dispatcher, layer 1, FIFOs, layer 0 and bus,
-//! against fake nodes.
+//! The three-step test through dispatcher, layer 1, FIFOs, layer 0 and bus, with fake nodes.
 
 use crate::common::TestRig;
 use wheeleg_master::MasterConfig;
@@ -15,7 +14,7 @@ use wheeleg_protocol::{Address, LinkLossAction, NodeMode};
 use wheeleg_units::PositionMm;
 
 fn rig() -> TestRig {
-    // The trapezoid comes from the master: the fake wheels make none.
+    // The trapezoid comes from the master, because the fake wheels make none.
     let mut rig = TestRig::new(MasterConfig {
         wheel_drive: WheelDrive::Stream,
         ..MasterConfig::default()
@@ -63,7 +62,7 @@ fn three_steps_cover_three_strokes() {
             assert_eq!(b6.on_link_loss, LinkLossAction::HoldThenExhaust);
         }
         if phase == Phase::Push {
-            // Leg–wheel co-operation: b5 gives way by the wheels' measured travel of the last cycle.
+            // Leg–wheel co-operation: b5 follows the wheel travel measured in the last cycle.
             let b5 = sync.slots.joint(Address::joint(2).unwrap()).unwrap();
             let pushed = (counts - start_counts) as f64 * 942.478 / 104_000.0;
             let found = b5.reference.to_f64();
@@ -106,7 +105,7 @@ fn profile_drive_sends_the_end_of_the_push() {
     rig.run(200);
     let before = rig.last_sync.unwrap().slots.wheel(wheel).unwrap().reference;
     let push = rig.cycle().slots.wheel(wheel).unwrap();
-    // 180 mm = 19 862.7 counts, at once: the board makes the trapezoid.
+    // 180 mm = 19 862.7 counts, immediately: the board makes the trapezoid.
     let distance = push.reference.wrapping_difference(before);
     assert!((distance - 19_863).abs() <= 1, "{distance}");
     assert_eq!(push.velocity_raw, 0);
@@ -219,7 +218,7 @@ fn the_sinusoid_runs_on_one_leg() {
     let side = Side::Left;
     let ticket = rig.submit(Command::FootTrajectory { side, shape });
     rig.run(1257);
-    // Half of 8π s: the foot is at its highest, half way.
+    // Half of 8π s: the foot is at its highest point, half way.
     let highest = rig.node(3).stroke_mm();
     assert!(highest.abs() < 0.05, "{highest}");
     assert!((rig.node(2).stroke_mm() - 90.0).abs() < 0.1);

@@ -1,4 +1,4 @@
-//! A flipped bit in what a joint board keeps between two ticks means Hold at the next tick.
+//! A flipped bit in the state that a joint board keeps between two ticks leads to Hold at the next tick.
 
 use super::no_motion_detector::{MotionModel, MotionWatch};
 use super::node::JointNode;
@@ -70,8 +70,7 @@ fn holds_after(damage: impl FnOnce(&mut Node)) -> bool {
     ticks_to_hold(armed(), 1, damage).is_some()
 }
 
-/// The tick after damage, of `most`, in which the node goes to Hold with its valves
-/// shut.
+/// The tick after damage, up to `most`, in which the node goes to Hold with its valves shut.
 fn ticks_to_hold(mut node: Node, most: u32, damage: impl FnOnce(&mut Node)) -> Option<u32> {
     damage(&mut node);
     (1..=most).find(|tick| {
@@ -98,7 +97,7 @@ fn every_flipped_bit_of_the_reference_is_seen() {
 
 #[test]
 fn damaged_controller_valve_and_target_state_is_seen() {
-    // One hidden sample of position in the history of the velocity estimate.
+    // One hidden position sample in the history of the velocity estimate.
     assert!(holds_after(|node| {
         node.controller.observe(PositionMm::from_int(50));
     }));
@@ -132,13 +131,13 @@ fn every_flipped_bit_of_a_precharge_is_seen() {
         let damage = |node: &mut Node| node.state.precharge.flip(bit);
         assert_eq!(ticks_to_hold(filling(), 1, damage), Some(1), "{bit}");
     }
-    // So is one that was not asked for, and one that is forgotten.
+    // So is a precharge that was not requested, and one that is forgotten.
     assert!(holds_after(|node| node.state.precharge.flip(3)));
     let forgotten = |node: &mut Node| node.state.precharge = Precharge::default();
     assert_eq!(ticks_to_hold(filling(), 1, forgotten), Some(1));
 }
 
-/// What is cleared later must not go on with what was damaged.
+/// After a later clear the node must not continue with damaged state.
 #[test]
 fn after_damage_all_that_holds_a_history_of_strokes_begins_anew() {
     let damages: [fn(&mut Node); 2] = [
@@ -195,7 +194,7 @@ fn a_request_does_not_hide_earlier_damage() {
     }));
 }
 
-/// Whether a node that hears a SYNC after damage to its link holds.
+/// Whether a node that hears a SYNC after damage to its link goes to Hold.
 fn holds_at_sync(damage: impl FnOnce(&mut Node)) -> bool {
     let mut node = armed();
     let sync = |node: &mut Node, cycle: u16| {
@@ -269,7 +268,7 @@ fn damaged_parameters_settings_and_gains_are_seen_by_the_next_tick() {
         };
         let config = JointConfig::new(&gains, Micros(1000)).unwrap();
         node.controller.retune(config);
-        // What the change of the law leaves behind in the state is not the point.
+        // What the change of law leaves behind in the state is irrelevant here.
         node.reseal();
     });
     found_at_once(|node| {
@@ -284,7 +283,7 @@ fn the_predictive_law_is_watched_as_well() {
     let law = JointParam::Law.id();
     let node = || armed_with(JointParameters::default().with(law, 5, true).unwrap());
     assert_eq!(ticks_to_hold(node(), 20, |_| {}), None);
-    // Pressures, motion and valves followed through a tick that never was.
+    // Pressures, motion and valves tracked through a tick that never happened.
     let found = ticks_to_hold(node(), 1, |node| {
         node.controller.external_on_times(&[1000, 0, 0, 0]);
         node.controller.observe(PositionMm::from_int(50));
@@ -300,7 +299,7 @@ fn the_predictive_law_is_watched_as_well() {
     assert_eq!(found, Some(1));
 }
 
-/// What the watch of motion has learnt holds for a stroke and an axis as they were told.
+/// What the motion watch has learnt is valid only for the stroke and axis data of that time.
 #[test]
 fn another_calibration_or_axis_makes_the_watch_of_motion_start_anew() {
     let set = |param: JointParam, value: i32| {

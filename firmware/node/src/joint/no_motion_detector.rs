@@ -36,31 +36,31 @@ use wheeleg_units::{Micros, PositionMm, VelocityMmS};
 
 /// Motion that shows that the piston follows, raw mm (0.5 mm).
 const SHOWN: i32 = 1 << 15;
-/// Error below which no motion is expected, raw mm (4 mm): what the worst of the
-/// laws leaves where its pulses become too short for the valves.
+/// Error below which no motion is expected, raw mm (4 mm): what the worst of the laws leaves where its pulses become
+/// too short for the valves.
 const ERROR: i32 = 4 << 16;
-/// Rounds of standing still after which nothing is known of the air any more.
+/// Rounds at standstill after which nothing is known of the air any more.
 const MINUTE: u16 = u16::MAX / ROUND;
 /// Doubt that is a fault …
 const FAULT: u16 = 200;
-/// … what a round adds that cannot be on a sound axis …
+/// … what a round adds that is impossible on a sound axis …
 const STRONG: u16 = 20;
-/// … and one with the largest force.
+/// … and what a round with the largest force adds.
 const WEAK: u16 = ROUND;
 /// Rounds of sliding over which the force is averaged …
 const MEMORY: u16 = 100 / ROUND;
 /// … and below which nothing is known.
 const LEARNT: u16 = 100 / ROUND;
-/// A piston slides that is faster, raw mm/s (20 mm/s).
+/// The piston slides above this speed, raw mm/s (20 mm/s).
 const SLIDES: i32 = 20 << 16;
-/// One that is slower stands, raw mm/s (10 mm/s); one that turns back does not.
+/// It stands below this speed, raw mm/s (10 mm/s); a piston that reverses does not.
 const STILL: i32 = 10 << 16;
-/// Way before an end of the stroke where the piston may stand, mm.
+/// Distance to an end of the stroke within which the piston may stand, mm.
 const NEAR_END: PositionMm = PositionMm::from_int(3);
-/// The same for the cushions, in which force says nothing of the load, raw mm.
+/// The same for the cushions, in which the force says nothing about the load, raw mm.
 const CUSHION: i32 = 6 << 16;
 
-/// What cannot be on a sound axis that stands, numbered as in the text of this module.
+/// What cannot happen on a sound axis at rest, numbered as in the module's documentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 enum Rule {
@@ -71,7 +71,7 @@ enum Rule {
 }
 
 impl Rule {
-    /// What a round of it adds to the doubt.
+    /// What one round of it adds to the doubt.
     #[inline]
     const fn doubt(self) -> u16 {
         match self {
@@ -130,7 +130,7 @@ impl MotionModel {
         self.air.ambient()
     }
 
-    /// A pulse of the inlet of B or A: its opening, `shortest` to `longest`, and its force, mN.
+    /// A pulse of the inlet of B or A: its opening, limited to `shortest` and `longest`, and its force, mN.
     #[inline]
     pub(super) fn pulse(
         &self,
@@ -142,8 +142,8 @@ impl MotionModel {
         self.air.pulse(b, at, shortest, longest)
     }
 
-    /// Force by which a piston that has moved by `moved` (raw mm, a few millimetres) shifts the
-    /// balance of a precharge: an eighth of the largest per millimetre, mN.
+    /// Force by which a piston that has moved by `moved` (raw mm, a few millimetres) shifts the balance of a precharge:
+    /// an eighth of the largest force per millimetre, mN.
     #[inline]
     pub(super) const fn given_way(&self, moved: i32) -> i32 {
         let (out, _) = self.nearly_all;
@@ -151,7 +151,7 @@ impl MotionModel {
     }
 }
 
-/// What an axis that is driven was to do, and did.
+/// What a driven axis was to do, and what it did.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Driven {
     pub(super) reference: PositionMm,
@@ -159,18 +159,18 @@ pub(super) struct Driven {
     pub(super) velocity: VelocityMmS,
 }
 
-/// What the watch makes of an axis between two ticks.
+/// The motion watch's view of an axis between two ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotionAccount {
-    /// Doubt, as the time that the strongest takes to it.
+    /// Doubt, as the time that the strongest rule takes to reach it.
     pub overdue: Micros,
-    /// Rule that holds now, by its number in the text of this module; 0: none.
+    /// Rule that applies now, by its number in the module's documentation; 0: none.
     pub rule: u8,
-    /// Force that the chambers should make, mN, positive extends.
+    /// Force that the chambers should produce, mN, positive extends.
     pub force: i32,
-    /// Force that the last motions took without friction, mN.
+    /// Force that the last motions required, without friction, mN.
     pub learnt: i32,
-    /// Sliding that it was learnt from, ms; at most 99.
+    /// Duration of the sliding from which it was learnt, ms; at most 99.
     pub slid_ms: u16,
     /// Pressures in A and B, 2^-17 of the supply pressure, absolute.
     pub pressures: [i32; 2],
@@ -182,21 +182,20 @@ pub(super) struct MotionWatch {
     air: Air,
     /// Stroke about which the piston stands, raw mm.
     from: i32,
-    /// Force that the last motions took without friction, mN.
+    /// Force that the last motions required, without friction, mN.
     learnt: i32,
-    /// Rounds of sliding that it was learnt from, at most [`MEMORY`].
+    /// Rounds of sliding from which it was learnt, at most [`MEMORY`].
     slid: u16,
     /// Doubt.
     doubt: u16,
-    /// Rounds that the piston stands.
+    /// Rounds for which the piston has stood still.
     stands: u16,
 }
 
 impl Hash for MotionWatch {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here; small ones in
-        // one word.
+        // Destructured, so that a new field cannot be forgotten here; the small ones share a word.
         let Self {
             air,
             from,
@@ -206,7 +205,7 @@ impl Hash for MotionWatch {
             stands,
         } = self;
         air.hash(state);
-        // A flipped bit of either flips one of the word.
+        // A flipped bit of either flips a bit of the word.
         state.write_i32(*from ^ i32::from(*stands).wrapping_shl(16));
         state.write_i32(*learnt);
         state.write_u32(u32::from(*slid) | u32::from(*doubt).wrapping_shl(16));
@@ -214,7 +213,7 @@ impl Hash for MotionWatch {
 }
 
 impl MotionWatch {
-    /// Of an axis of which nothing is known.
+    /// For an axis of which nothing is known.
     pub(super) const fn new(model: &MotionModel, position: PositionMm) -> Self {
         Self {
             air: Air::unknown(&model.air, position),
@@ -226,15 +225,15 @@ impl MotionWatch {
         }
     }
 
-    /// A tick in which the valves are not the law's, open for `on`: the air is followed, nothing
-    /// is expected, and loads have to be learnt again afterwards.
+    /// A tick in which the law does not drive the valves, which are open for `on`: the air is tracked, nothing is
+    /// expected, and loads have to be learnt again afterwards.
     #[inline(never)]
     pub(super) fn rest(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         let third = self.air.follow(on, position, &model.air, false);
         if *on == [0; 4] {
             self.air.forget();
-            // What may have leaked while it stood under control and was not counted then; and
-            // now, in the tick that has no chamber to follow.
+            // Also counts what may have leaked while the piston stood under control and was not counted then; here, in
+            // the tick in which no chamber is updated.
             let stood = self.stands.min(MINUTE);
             self.air
                 .leak(&model.air, stood.wrapping_add(u16::from(third)));
@@ -245,40 +244,40 @@ impl MotionWatch {
         self.from = position.raw();
     }
 
-    /// Notes the force of both chambers as one to be held. It stands where learnt ones do: while
-    /// no law drives nothing is learnt, and afterwards all of it anew.
+    /// Notes the present force of both chambers as the one to be held. It is stored in place of the learnt one: while
+    /// no law drives nothing is learnt, and afterwards it is learnt afresh.
     pub(super) fn hold_force(&mut self, model: &MotionModel) {
         self.slid = 0;
         self.learnt = self.air.force(&model.air);
     }
 
-    /// What the force of both chambers exceeds the one to be held by, mN, positive extends.
+    /// Excess of the force of both chambers over the one to be held, mN, positive extends.
     #[inline]
     pub(super) fn unbalanced(&self, model: &MotionModel) -> i32 {
         self.air.force(&model.air).saturating_sub(self.learnt)
     }
 
-    /// Lower pressure of the two chambers, 2^-17 of the supply pressure, absolute.
+    /// Lower one of the two chamber pressures, 2^-17 of the supply pressure, absolute.
     #[inline]
     pub(super) fn least_pressure(&self) -> i32 {
         let [a, b] = self.air.pressures();
         a.min(b)
     }
 
-    /// A tick under control sends `on`: the air takes two ticks of a round.
+    /// A tick under control sends `on`. Updating the air takes two ticks of a round.
     #[inline]
     pub(super) fn follow(&mut self, on: &OnTimes, position: PositionMm, model: &MotionModel) {
         let third = self.air.follow(on, position, &model.air, self.stands > 0);
         if third && self.stands >= MINUTE && *on == [0; 4] {
-            // A minute at rest: seals leak.
+            // After a minute at rest: seals leak.
             self.slid = 0;
             self.air.forget();
             self.air.leak(&model.air, 1);
         }
     }
 
-    /// Whether a motion is overdue, judged in the third tick of a round, from what the
-    /// ticks before it did: so it is known before the pulses of this one are made.
+    /// Whether a motion is overdue. This is judged in the third tick of a round, from the ticks before it, so it is
+    /// known before the pulses of this tick are made.
     #[inline]
     pub(super) fn judge(&mut self, driven: &Driven, model: &MotionModel) -> bool {
         if !self.air.ends_round() {
@@ -317,13 +316,13 @@ impl MotionWatch {
         self.stands > 0
     }
 
-    /// Whether a motion is overdue, as the last round has judged.
+    /// Whether a motion is overdue, as judged in the last round.
     #[inline]
     pub(super) const fn is_overdue(&self) -> bool {
         self.doubt >= FAULT
     }
 
-    /// The rule that makes this round of an axis that stands doubtful.
+    /// The rule that makes this round of a standing axis doubtful.
     #[inline]
     fn rule(&self, reference: PositionMm, position: PositionMm, model: &MotionModel) -> Rule {
         if self.air.is_impossible() && self.air.is_comparable(&model.air) {
@@ -356,7 +355,7 @@ impl MotionWatch {
         }
     }
 
-    /// Takes in the force that a sliding piston needs, friction taken off.
+    /// Learns the force that a sliding piston needs, without friction.
     #[inline]
     fn learn(&mut self, speed: i32, position: PositionMm, model: &MotionModel) {
         let inside = position.raw() > CUSHION
@@ -374,7 +373,7 @@ impl MotionWatch {
         } else {
             model.coulomb
         };
-        // Speeds below 2^15 mm/s, whole here: the viscous part is small.
+        // Speeds are below 2^15 mm/s and taken as whole numbers, because the viscous part is small.
         let viscous = (speed >> 16).saturating_mul(model.viscous) >> 8;
         let taken = self
             .air
@@ -390,7 +389,7 @@ impl MotionWatch {
         self.learnt = self.learnt.saturating_add(change);
     }
 
-    /// For tools: what the watch makes of the axis.
+    /// For tools: the watch's view of the axis.
     pub(super) fn account(
         &self,
         reference: PositionMm,

@@ -25,10 +25,10 @@ use wheeleg_units::{Micros, PositionMm, Ticks};
 /// State that only a tick changes, sealed between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TickState {
-    /// What the law is to follow.
+    /// What the law follows.
     pub(super) reference: Reference,
-    /// The command within the slew limit, which supervision compares the piston with: a
-    /// reference that waits for a stuck piston would hide that it is stuck.
+    /// The command within the slew limit, with which supervision compares the piston: a reference that waits for a
+    /// stuck piston would hide that it is stuck.
     pub(super) supervised: PositionMm,
     pub(super) measured: PositionMm,
     pub(super) following: Ticks,
@@ -38,7 +38,7 @@ pub(super) struct TickState {
 }
 
 impl TickState {
-    /// References of an axis that stands at `position`.
+    /// Sets the references of an axis that stands at `position`.
     pub(super) const fn start_from(&mut self, position: PositionMm) {
         self.reference = Reference::at(position);
         self.supervised = position;
@@ -60,11 +60,11 @@ pub struct JointNode<V, S, W> {
     pub(super) monitor: SensorMonitor,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Checksum of what only a request changes.
+    /// Checksum of what only requests change.
     fixed_seal: Checksum,
-    /// Whether the last tick left it to the next.
+    /// Whether the last tick left its check to the next one.
     fixed_waits: bool,
-    /// Checksum of what a tick changes.
+    /// Checksum of what ticks change.
     seal: Checksum,
     target_seal: Checksum,
     pub(super) snapshot: JointSnapshot,
@@ -81,8 +81,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// A board in Boot with all valves shut.
     ///
     /// # Errors
-    /// [`ConfigError::Address`] when the straps do not name a joint,
-    /// [`ConfigError::Parameters`] when the parameters contradict each other.
+    /// [`ConfigError::Address`] if the straps do not name a joint, [`ConfigError::Parameters`] if the parameters
+    /// contradict each other.
     pub fn new(
         identity: NodeIdentity,
         parameters: JointParameters,
@@ -101,8 +101,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         ))
     }
 
-    /// With settings that follow from the parameters. Made in its place: each move on
-    /// the way would be kilobytes of stack.
+    /// With settings that follow from the parameters. Constructed in place: each move on the way would cost kilobytes
+    /// of stack.
     #[inline(always)]
     fn with(
         identity: NodeIdentity,
@@ -145,9 +145,9 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         node
     }
 
-    /// A board with the parameters that its memory kept. Those that are damaged (`None`) or
-    /// contradict each other are not used: the board starts with its defaults and a latched
-    /// fault, so that it can be reached and told better ones.
+    /// A board with the parameters that its memory kept. If these are damaged (`None`) or contradict each other they
+    /// are not used: the board starts with its defaults and a latched fault, so that it can be reached and given better
+    /// ones.
     ///
     /// # Errors
     /// [`ConfigError::Address`], as [`Self::new`].
@@ -162,7 +162,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         if !identity.address.is_joint() {
             return Err(ConfigError::Address);
         }
-        // Looked at and made again: a copy less on the stack than to keep them.
+        // Checked, and computed again below: this takes one copy less on the stack than keeping them.
         let stored = stored.filter(|stored| JointSettings::new(stored).is_some());
         let sound = stored.is_some();
         let parameters = stored.unwrap_or_default();
@@ -176,7 +176,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         Ok(node)
     }
 
-    /// The same board on other hardware of the same kind: how a simulator copies one.
+    /// The same board on other hardware of the same kind, used by a simulator to copy a board.
     #[must_use]
     pub fn on_hardware(self, valves: V, sensor: S, switches: W) -> Self {
         Self {
@@ -187,22 +187,21 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// Takes bytes of the bus, in any chunking; the last of them ended at
-    /// `t_end`. Never panics, for any bytes. Not inlined: the main loop would save the
-    /// registers that it needs, for every tick.
+    /// Takes bytes of the bus, in any chunking; the last of them ended at `t_end`. Never panics, for any bytes. Not
+    /// inlined: the main loop would then save registers for every tick.
     #[inline(never)]
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         receive(self, bytes, t_end);
     }
 
-    /// The next frame to send and when to start; call between two ticks until `None`,
-    /// with which comes what a tick left over.
+    /// The next frame to send and when to start. Call it between two ticks until it returns `None`; that call also
+    /// processes what a tick has deferred.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
         self.core.take_transmission()
     }
 
-    /// One control tick that starts at `now`: latches the inputs, controls,
-    /// writes all four outputs. They act from the next tick edge on.
+    /// One control tick that starts at `now`: latches the inputs, controls, and writes all four outputs, which take
+    /// effect at the next tick edge.
     #[inline(never)]
     pub fn tick(&mut self, now: Micros) -> TickReport {
         let reading = self.sensor.read();
@@ -214,8 +213,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.axis_fault(Fault::StateCorrupt, now);
             self.controller.reset();
             self.controller.set_correction(self.settings.correction);
-            // Nobody knows which stroke was damaged: with the next good reading all that holds
-            // a history of them restarts.
+            // It is unknown which stroke was damaged: with the next good reading everything that keeps a history of
+            // strokes restarts.
             self.monitor.restart();
         }
         // A pin that cannot be read keeps its last debounced level.
@@ -252,8 +251,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// Everything that holds a history of strokes restarts, at the measured one: the piston
-    /// may have moved unseen, and its way here is no motion.
+    /// Restarts everything that keeps a history of strokes, at the measured one: the piston may have moved unseen, and
+    /// how it got here is not a motion.
     #[cold]
     #[inline(never)]
     fn restart_estimators(&mut self) {
@@ -261,7 +260,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.state.motion = MotionWatch::new(&self.settings.motion, self.state.measured);
     }
 
-    /// An output that does not obey: releases all coils.
+    /// An output does not respond: releases all coils.
     #[cold]
     #[inline(never)]
     fn give_up(&mut self, now: Micros) {
@@ -274,14 +273,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.snapshot.pulses = [0; 4];
     }
 
-    /// The tick's work ended at `end`; a tick longer than its period is a
-    /// latched fault.
+    /// The tick's work ended at `end`; a tick longer than its period is a latched fault.
     pub fn tick_done(&mut self, end: Micros) {
         self.core.supervisor.end_tick(end, &self.core.times);
     }
 
-    /// Says why the processor started; call it before the first tick. After a
-    /// watchdog, a brown-out or a processor fault the board has a latched fault.
+    /// States why the processor started; call it before the first tick. After a watchdog, a brown-out or a processor
+    /// fault the board has a latched fault.
     pub fn started_by(&mut self, cause: ResetCause) {
         self.core.started_by(cause);
     }
@@ -291,7 +289,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.core.axis_fault(Fault::SlotOverrun, at);
     }
 
-    /// A frame that was taken was not sent: its slot had passed.
+    /// A frame that was taken was not sent, because its slot had passed.
     pub fn missed_slot(&mut self) {
         self.core.port.missed();
     }
@@ -301,8 +299,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.core.save_is_due()
     }
 
-    /// Stores the parameters in force, which may take a while: the next tick is not
-    /// measured against this one.
+    /// Stores the parameters in force, which may take a while: the next tick is not measured against this one.
     pub fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
         let records = self.parameters.changed_from_default();
         self.core.save(records, store, at);
@@ -313,14 +310,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         &self.snapshot
     }
 
-    /// Doubt whether the piston follows its valves, as the time that the strongest
-    /// doubt takes to it; zero if there is none.
+    /// Doubt whether the piston follows its valves, as the time that the strongest doubt takes to reach it; zero
+    /// without doubt.
     pub const fn motion_overdue(&self) -> Micros {
         self.state.motion.overdue()
     }
 
-    /// What the watch of motion makes of the axis. The firmware sends none of it: it is for
-    /// tests and tools around the node.
+    /// The motion watch's view of the axis. The firmware sends none of it: it is for tests and tools around the node.
     pub fn motion_account(&self) -> MotionAccount {
         let TickState {
             supervised,
@@ -351,7 +347,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.pwm.pulses()
     }
 
-    /// Checksum of what shapes the outputs and is changed by requests alone.
+    /// Checksum of what shapes the outputs and is changed only by requests.
     #[inline(never)]
     fn fixed(&self) -> Checksum {
         Checksum::made(|sum| {
@@ -385,8 +381,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.is_moving_intact() && self.fixed_seal == self.fixed()
     }
 
-    /// The same at the begin of a tick. What only requests change waits for the next tick where the
-    /// law has its work in this one, and never for more than one.
+    /// The same at the beginning of a tick. If the law has its work in this tick, the check of what only requests
+    /// change waits for the next one, but never for more than one tick.
     fn is_intact_now(&mut self) -> bool {
         self.fixed_waits = self.controller.plans() && !self.fixed_waits;
         self.is_moving_intact() && (self.fixed_waits || self.fixed_seal == self.fixed())
@@ -408,8 +404,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.reseal();
     }
 
-    /// A change of sealed state between two ticks. State that was damaged before
-    /// keeps its broken seal, so that the next tick still sees the damage.
+    /// A change of sealed state between two ticks. State that was already damaged keeps its broken seal, so that the
+    /// next tick still sees the damage.
     pub(super) fn change<R>(&mut self, change: impl FnOnce(&mut Self) -> R) -> R {
         let intact = self.is_intact();
         let result = change(self);
@@ -419,8 +415,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         result
     }
 
-    /// Another target between two ticks. It has a seal of its own: a set-point comes in every bus cycle,
-    /// shortly before the reply of the first board is due. A damaged one keeps its broken seal.
+    /// A new target between two ticks. It has a seal of its own, because a set-point comes in every bus cycle, shortly
+    /// before the reply of the first board is due. A damaged target keeps its broken seal.
     pub(super) fn aim(&mut self, target: Target) {
         let intact = self.target_seal == self.aimed();
         self.target = target;
@@ -433,7 +429,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         self.core.axis_fault(fault, now);
     }
 
-    /// Self-test in Boot, faults of the sensor in every other mode.
+    /// Self-test in Boot, sensor faults in every other mode.
     fn supervise_sensor(&mut self, reading: &Reading, now: Micros) {
         let fault = match reading.fault {
             Some(Rejection::Missing | Rejection::Range) => Some(Fault::SensorRange),

@@ -38,7 +38,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             reference_velocity: reference.velocity,
             announced,
         });
-        // The law keeps its reference within the stroke, and its error counts from there.
+        // The law limits its reference to the stroke, and its error counts from there.
         let waits = supervised.saturating_sub(reference.position);
         let behind = output.error.saturating_add(waits);
         let beyond = behind.saturating_abs() > self.allowed_error();
@@ -53,7 +53,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             velocity: output.velocity,
         };
         let overdue = self.state.motion.judge(&driven, &self.settings.motion);
-        // At rest, and in the very tick in which a fault is found, no pulse goes on.
+        // At rest, and in the very tick in which a fault is found, no pulse continues.
         let on_times = if overdue || self.is_behind() {
             self.controller.stopped();
             self.pwm.shut()
@@ -80,8 +80,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         on_times
     }
 
-    /// Following error that may last: a piston that stands lags behind nothing, so its error is
-    /// not that of a motion to come, and a quarter of it must do.
+    /// Following error that is allowed to last. A piston that stands is not lagging, so its error is not due to a
+    /// motion in progress, and a quarter of it is allowed.
     #[inline]
     fn allowed_error(&self) -> PositionMm {
         let allowed = self.settings.following_error;
@@ -92,13 +92,13 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// Whether the following error has lasted its time.
+    /// Whether the following error has lasted for its time.
     fn is_behind(&self) -> bool {
         self.state.following >= self.settings.following_ticks
     }
 
-    /// The fault that the last tick under control has found. It had its valves shut
-    /// then; it is latched in this tick, which has no law to work out beside it.
+    /// The fault that the last tick under control has found. That tick shut the valves; the fault is latched in this
+    /// tick, which has no law to compute at the same time.
     #[inline]
     pub(super) fn found(&self) -> Option<Fault> {
         if self.is_behind() {
@@ -110,8 +110,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// No control: the valves do what the mode says, the reference follows the
-    /// measured stroke, and no precharge is under way.
+    /// No control: the valves follow the mode, the reference follows the measured stroke, and no precharge is under
+    /// way.
     #[cold]
     #[inline(never)]
     pub(super) fn rest(&mut self, now: Micros) -> OnTimes {
@@ -124,15 +124,15 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         } else {
             self.pwm.shut()
         };
-        // What exhausts counts for as long as its coils are on: a little more than it lets out.
+        // During exhaust the on-times count in full: a little more than what is actually let out.
         self.rested(now, on_times, &on_times);
         self.snapshot.limits = LimitBits::NONE;
         on_times
     }
 
-    /// A tick of precharge: an armed axis fills. The reference stays at that of arming, and
-    /// set-points are taken. At its end all valves are shut, and the next tick is controlled,
-    /// from where the piston is: reference := actual.
+    /// A tick of precharge: an armed axis fills its chambers. The reference stays at that of arming, and set-points are
+    /// accepted. At the end all valves are shut, and the next tick is controlled, starting from where the piston is:
+    /// reference := actual.
     #[cold]
     #[inline(never)]
     pub(super) fn fill(&mut self, now: Micros) -> OnTimes {
@@ -157,8 +157,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         on_times
     }
 
-    /// A tick that sends `on_times` without a law, by which the valves are `open` without their
-    /// switching delays, µs.
+    /// A tick that sends `on_times` without a law; the valves are `open` for these times, without their switching
+    /// delays, µs.
     fn rested(&mut self, now: Micros, on_times: OnTimes, open: &OnTimes) {
         self.state.following = Ticks::ZERO;
         let velocity = self.controller.observe(self.state.measured);
@@ -179,10 +179,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// Notes the tick; limits and rest are noted by the caller.
+    /// Records the tick; the caller records limits and rest.
     #[inline]
     fn record(&mut self, now: Micros, velocity: VelocityMmS, duty: Duty, on_times: OnTimes) {
-        // Field by field: a whole one would be made elsewhere and copied.
+        // Field by field: a whole one would be built elsewhere and copied.
         let snapshot = &mut self.snapshot;
         snapshot.at = now;
         snapshot.mode = self.core.mode();
@@ -204,8 +204,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             return self.valves.write(on_times);
         }
         self.valves.write(on_times.map(|on| {
-            // 16 bits each: below 2^32. At most `max`, because an on-time is at
-            // most one tick.
+            // 16 bits each: below 2^32. At most `max`, because an on-time is at most one tick.
             let scaled = u32::from(on)
                 .wrapping_mul(max)
                 .checked_div(JOINT_TICK.get());

@@ -1,28 +1,25 @@
 //! Filling both chambers after arming, before the control law drives.
 //!
-//! After a stop the chambers may be empty. A law that then sees an error drives a piston without
-//! any air to hold it back: it jumps. Therefore an axis first fills both chambers to the precharge
-//! pressure after arming, with the outlets shut, in short pulses of one inlet at a time.
+//! After a stop the chambers may be empty. A law that then sees an error would drive a piston without any air to hold
+//! it back: it jumps. Therefore, after arming, an axis first fills both chambers to the precharge pressure, with the
+//! outlets shut, in short pulses of one inlet at a time.
 //!
-//! * **The piston must not move.** The force of both chambers, as estimated by the air model, is
-//!   kept at its value when arming: the next pulse goes to the chamber that pushes too little. Where
-//!   the two pulses differ in size, it goes to the larger chamber until the coarser pulse fits. If the
-//!   piston moves nevertheless, this balance is shifted against its motion: the chamber that pushed
-//!   it waits, and the other one is filled.
-//! * **A pulse** lasts until its chamber has gained a 64th of the supply pressure. It is no shorter
-//!   than the valve can be opened, and no longer than half a PWM period; each period has one pulse.
-//! * **It ends** when both chambers have reached the pressure, when the piston has moved by more than
-//!   [`WAY`], or after [`LONGEST`]. Then the closed loop takes over at the present position. That is
-//!   the safest continuation: the law holds a leg that rises or sinks, whereas shut valves would
-//!   leave it to the air in its chambers.
+//! * **The piston must not move.** The force of both chambers, as estimated by the air model, is kept at its value when
+//!   arming: the next pulse goes to the chamber that pushes too little. If the two pulses differ in size, it goes to
+//!   the larger chamber until the coarser pulse fits. If the piston moves nevertheless, this balance is shifted against
+//!   its motion: the chamber that pushed it waits, and the other one is filled.
+//! * **A pulse** lasts until its chamber has gained a 64th of the supply pressure. It is no shorter than the valve can
+//!   be opened, and no longer than half a PWM period; each period has one pulse.
+//! * **It ends** when both chambers have reached the pressure, when the piston has moved by more than [`WAY`], or after
+//!   [`LONGEST`]. Then the closed loop takes over at the present position. That is the safest continuation: the law
+//!   holds a leg that rises or sinks, whereas shut valves would leave it to the air in its chambers.
 //!
-//! The content of the chambers at power-up is unknown; the model assumes atmospheric pressure. With
-//! the valves shut the model loses pressure faster than any intact seal does, so that an axis that
-//! has been idle for a while is filled again. Chambers cannot be filled above the supply pressure,
-//! which a cylinder withstands. If the model is wrong, the filling is unbalanced, and the travel of
-//! the piston limits it. Nor does a board have a pressure sensor for the supply: without supply it
-//! counts air that does not arrive, for no longer than with supply, and the lack of motion is found
-//! under control.
+//! The content of the chambers at power-up is unknown; the model assumes atmospheric pressure. With the valves shut the
+//! model loses pressure faster than any intact seal does, so that an axis that has been idle for a while is filled
+//! again. Chambers cannot be filled above the supply pressure, which a cylinder withstands. If the model is wrong, the
+//! filling is unbalanced, and the travel of the piston limits it. Nor does a board have a pressure sensor for the
+//! supply: without supply it counts air that does not arrive, but for no longer than with supply, and the lack of
+//! motion is found under control.
 
 use super::no_motion_detector::MotionWatch;
 use super::settings::TickSettings;
@@ -32,19 +29,18 @@ use wheeleg_control::valve::ValveOpenings;
 use wheeleg_protocol::LogEvent;
 use wheeleg_units::{Micros, PositionMm};
 
-/// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this
-/// project takes to 1 bar).
+/// Longest precharge, ticks of 1 ms (ASSUMED: four times what the slowest axis of this project takes to reach 1 bar).
 const LONGEST: u32 = 2000;
 const _: () = assert!(JOINT_TICK.get() == 1000);
-/// Motion that ends it, raw mm (1.5 mm): the piston then stays below 2 mm (`tests/system/precharge.rs`).
+/// Motion that ends it, raw mm (1.5 mm); the piston then stays below 2 mm (`tests/system/precharge.rs`).
 const WAY: i32 = 3 << 15;
 
-/// A tick of it.
+/// One tick of a precharge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filling {
     /// Openings for the PWM.
     pub(super) openings: ValveOpenings,
-    /// For how much of the tick each valve counts as open, without its switching delays, µs.
+    /// How long in the tick each valve counts as open, without its switching delays, µs.
     pub(super) open: OnTimes,
 }
 
@@ -56,24 +52,22 @@ impl Filling {
     };
 }
 
-/// Bits of the state: ticks that it may still take, ticks until the next pulse is chosen, and
-/// whether the present pulse fills B, otherwise A.
+/// Bits of the state: remaining ticks, ticks until the next pulse is chosen, and whether the present pulse fills B
+/// (otherwise A).
 const LEFT: u32 = 0xFFFF;
 const NEXT: u32 = 0xFF << NEXT_SHIFT;
 const NEXT_SHIFT: u32 = 16;
 const FILLS_B: u32 = 1 << 24;
 
-/// A precharge under way, or none.
-/// The force to be held is kept by the watch of motion, which learns none meanwhile.
+/// A precharge under way, or none. The motion watch keeps the force to be held, and learns none meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Precharge {
-    /// [`LEFT`], [`NEXT`] and [`FILLS_B`]: one word, which is sealed as it is. All zero if
-    /// none is under way.
+    /// [`LEFT`], [`NEXT`] and [`FILLS_B`] in one word, which is sealed as it is. All zero if none is under way.
     state: u32,
 }
 
 impl Precharge {
-    /// Begins one on an axis that has just been armed, unless its setting is none.
+    /// Begins a precharge on an axis that has just been armed, unless it is disabled by its setting.
     pub(super) fn begin(motion: &mut MotionWatch, settings: &TickSettings) -> Self {
         if settings.precharge == 0 {
             return Self::default();
@@ -82,7 +76,7 @@ impl Precharge {
         Self { state: LONGEST }
     }
 
-    /// Whether one is under way.
+    /// Whether a precharge is under way.
     #[inline]
     pub(super) const fn is_under_way(&self) -> bool {
         self.state & LEFT != 0
@@ -93,8 +87,8 @@ impl Precharge {
         (self.state & NEXT).wrapping_shr(NEXT_SHIFT)
     }
 
-    /// What the tick to come does to a piston at `position` that was at `from` when the axis was
-    /// armed; or how it ends, and after how many milliseconds.
+    /// What the coming tick does to a piston at `position` that was at `from` when the axis was armed; or how the
+    /// precharge ends, and after how many milliseconds.
     #[inline(never)]
     pub(super) fn tick(
         &mut self,
@@ -105,14 +99,14 @@ impl Precharge {
         shortest: Micros,
     ) -> Result<Filling, (LogEvent, u16)> {
         let moved = position.saturating_sub(from).raw();
-        // It is called only while some are left.
+        // Called only while some ticks are left.
         self.state = self.state.wrapping_sub(u32::from(self.is_under_way()));
         let left = self.state & LEFT;
         let full = motion.least_pressure() >= settings.precharge;
         let end = if moved.wrapping_abs() > WAY {
             LogEvent::PrechargeMoved
         } else if full && (self.next() == 0 || left == 0) {
-            // Not within a pulse: cut short, it might not open its valve.
+            // Not within a pulse: if cut short, it might not open its valve.
             LogEvent::Precharged
         } else if left == 0 {
             LogEvent::PrechargeLate
@@ -124,7 +118,7 @@ impl Precharge {
         Err((end, taken))
     }
 
-    /// One inlet, for the time of a pulse; the other valves stay shut.
+    /// Opens one inlet for the time of a pulse; the other valves stay shut.
     #[inline]
     fn pulse(
         &mut self,
@@ -135,10 +129,10 @@ impl Precharge {
         shortest: Micros,
     ) -> Filling {
         let model = &settings.motion;
-        // A period of the PWM has one pulse: 10 to 60 ticks.
+        // A PWM period has one pulse: 10 to 60 ticks.
         let period = settings.full_period;
-        // The PWM makes nearly whole periods whole. The coil of a valve that is half a period
-        // open is still off for longer than the shortest gap: t_on is less than half of one.
+        // The PWM extends a nearly full pulse to the whole period. A valve that is open for half a period still has its
+        // coil off for longer than the shortest gap, because t_on is less than half a period.
         let longest = Micros(period.get() >> 1).max(shortest);
         let (time_a, push_a) = model.pulse(false, position, shortest, longest);
         let (time_b, push_b) = model.pulse(true, position, shortest, longest);
@@ -186,9 +180,9 @@ impl Precharge {
     }
 }
 
-/// Whether B is to be filled next, where the force of both chambers is too large by `force` and
-/// a pulse adds `push_a` to it or takes `push_b` off, mN. The coarser pulse, of the smaller
-/// chamber, waits for room: it never goes beyond balance.
+/// Whether B is to be filled next, if the force of both chambers is too large by `force` and a pulse adds `push_a` to
+/// it or takes `push_b` off it, mN. The coarser pulse, that of the smaller chamber, waits until it fits: it never goes
+/// beyond balance.
 #[inline]
 const fn b_is_next(force: i32, push_a: i32, push_b: i32) -> bool {
     if push_a > push_b {
@@ -202,8 +196,8 @@ const fn b_is_next(force: i32, push_a: i32, push_b: i32) -> bool {
 mod tests {
     use super::b_is_next;
 
-    /// Both chambers empty, until 32 pulses are given: the force stays between balance and
-    /// one coarse pulse, and fine pulses make up for coarse ones.
+    /// Both chambers are empty and get 32 pulses: the force stays between balance and one coarse pulse, and fine pulses
+    /// compensate for coarse ones.
     #[test]
     fn the_coarser_pulse_never_goes_beyond_balance() {
         for (push_a, push_b) in [(50, 50), (100, 30), (30, 100), (1, 7), (7, 1), (60, 59)] {
@@ -233,7 +227,7 @@ mod tests {
     fn room_for_just_one_pulse_is_used() {
         // A is coarser: it just reaches balance, or would exceed it by 1 mN.
         assert!(!b_is_next(-100, 100, 30) && b_is_next(-99, 100, 30));
-        // B is coarser, or as coarse.
+        // B is coarser, or equally coarse.
         assert!(b_is_next(100, 30, 100) && !b_is_next(99, 30, 100));
         assert!(b_is_next(50, 50, 50) && !b_is_next(49, 50, 50) && !b_is_next(0, 50, 50));
     }

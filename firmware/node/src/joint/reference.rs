@@ -5,17 +5,16 @@
 //! reference(k) = reference(k−1) + limit(wanted(k) − reference(k−1), ± slew step)
 //! ```
 //!
-//! When a SYNC is missed, the wanted reference stands still at the end of the
-//! cycle until the watchdog decides. While the joint is disarmed, the
-//! reference follows the measured stroke, and a precharge ends with the measured one; so the
-//! first reference of the law is the actual position, and from there the slew limit holds: no jump after
-//! an arm, wherever the set-point is.
+//! When a SYNC is missed, the wanted reference stops at the end of the cycle until the watchdog decides. While the
+//! joint is disarmed, the reference follows the measured stroke, and a precharge ends at the measured stroke. So the
+//! first reference of the law is the actual position, and from there the slew limit applies: no jump after arming,
+//! wherever the set-point is.
 //!
-//! The predictive law follows the reference generator of `wheeleg_control::law::reference_generator` instead, if
-//! its acceleration is set; supervision goes on to compare the piston with the reference above.
+//! If its acceleration is set, the predictive law follows the reference generator of
+//! `wheeleg_control::law::reference_generator` instead; supervision still compares the piston with the reference above.
 //!
-//! The next reference of a slot is counted down to the tick and handed to the
-//! control law. The predictive law fills and vents ahead of it; the others do not use it.
+//! The next reference of a slot is counted down to the tick and passed to the control law. The predictive law fills and
+//! vents ahead of it; the others do not use it.
 
 use super::settings::TickSettings;
 use crate::JOINT_TICK;
@@ -29,16 +28,16 @@ use wheeleg_units::{PositionMm, Ticks, VelocityMmS, divide_signed};
 /// Ticks of one bus cycle.
 const CYCLE_TICKS: u32 = CYCLE_US / JOINT_TICK.get();
 
-/// Ticks in a second.
+/// Ticks per second.
 const TICKS_PER_SECOND: i32 = 1_000_000 / JOINT_TICK.get() as i32;
 const _: () = assert!(1_000_000 % JOINT_TICK.get() == 0);
 
-/// What the bus wants.
+/// What the bus requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Target {
     reference: PositionMm,
     velocity: VelocityMmS,
-    /// The next reference, if the slot has one; all zero otherwise.
+    /// The next reference, if the slot has one; otherwise all zero.
     next: Announced,
     has_next: bool,
     age: u32,
@@ -47,8 +46,8 @@ pub(super) struct Target {
 impl Hash for Target {
     #[inline]
     fn hash<H: Hasher>(&self, state: &mut H) {
-        // Taken apart, so that a new field cannot be forgotten here. Without jumps;
-        // that there is a next reference is a bit of the age.
+        // Destructured, so that a new field cannot be forgotten here. Without branches: whether there is a next
+        // reference is a bit of the age.
         let Self {
             reference,
             velocity,
@@ -68,7 +67,7 @@ impl Hash for Target {
 }
 
 impl Target {
-    /// Stand still at `position`.
+    /// Stands still at `position`.
     pub(super) fn at(position: PositionMm) -> Self {
         Self {
             reference: position,
@@ -96,12 +95,12 @@ impl Target {
         self.reference
     }
 
-    /// A tick that does not use it.
+    /// A tick that does not use the target.
     pub(super) const fn grow_older(&mut self) {
         self.age = self.age.saturating_add(1);
     }
 
-    /// Wanted reference and velocity of this tick, then one tick older.
+    /// Wanted reference and velocity of this tick; then makes the target one tick older.
     fn advance(&mut self) -> (PositionMm, VelocityMmS) {
         let moving = self.age < CYCLE_TICKS;
         let ticks = self.age.min(CYCLE_TICKS);
@@ -124,11 +123,10 @@ impl Target {
     }
 }
 
-/// Way at `velocity`, raw mm/s, over `ticks`, at most one bus cycle; rounded
-/// toward zero.
+/// Distance at `velocity`, raw mm/s, over `ticks`, at most one bus cycle; rounded toward zero.
 fn travel(velocity: i32, ticks: u32) -> i32 {
-    // Up to the velocities of the wire, and beyond, the product fits 32 bits, and
-    // the division is a multiplication.
+    // Up to the velocities of the wire format, and beyond, the product fits 32 bits, and the division is compiled to a
+    // multiplication.
     if let Ok(ticks) = i32::try_from(ticks)
         && let Some(product) = velocity.checked_mul(ticks)
     {
@@ -144,8 +142,8 @@ fn travel(velocity: i32, ticks: u32) -> i32 {
 pub(super) struct TickReference {
     /// The command within the slew limit.
     pub(super) supervised: PositionMm,
-    /// Where the piston is expected to be on its way: the same, within what lies between piston and command. One
-    /// that was held up, and is told to come back, is not expected to go on first.
+    /// Where the piston is expected to be on its way: the same, limited to the range between piston and command. A
+    /// piston that was held up and is commanded back is not expected to go further first.
     pub(super) expected: PositionMm,
     /// What the law follows.
     pub(super) reference: Reference,
@@ -153,8 +151,7 @@ pub(super) struct TickReference {
     pub(super) slew_limited: bool,
 }
 
-/// Next reference on the way to the target, from the `supervised` and the followed one of the last
-/// tick.
+/// Next reference on the way to the target, from the `supervised` reference and the followed one of the last tick.
 pub(super) fn advance(
     supervised: PositionMm,
     last: Reference,
@@ -216,7 +213,7 @@ mod tests {
             .tick
     }
 
-    /// At 20 mm with 100 mm/s, and 50 mm announced for so many cycles later.
+    /// At 20 mm with 100 mm/s, and 50 mm announced for this many cycles later.
     fn moving(announced_cycles: Option<u8>) -> Target {
         let next = announced_cycles.map(|cycles| NextReference {
             reference: PositionMm::from_int(50).to_wire(),
@@ -231,7 +228,7 @@ mod tests {
         })
     }
 
-    /// The references of the ticks after a set-point, from where it begins.
+    /// The references of the ticks after a set-point, from where it starts.
     fn follow(mut target: Target) -> impl Iterator<Item = TickReference> {
         let settings = settings();
         let mut last = PositionMm::from_int(20);
@@ -252,7 +249,7 @@ mod tests {
                 VelocityMmS::from_int(velocity),
                 "tick {k}"
             );
-            // 100 mm/s are 0.1 mm in a tick.
+            // 100 mm/s is 0.1 mm per tick.
             let tenths = f64::from(k.min(CYCLE_TICKS));
             let off = tick.reference.position.to_f64() - (20.0 + tenths / 10.0);
             assert!(off.abs() < 1e-4, "tick {k}: {off}");
@@ -260,8 +257,8 @@ mod tests {
         }
     }
 
-    /// A piston that is held up at 20 mm is told to go out, and after 0.2 s to come back, or to go less far: it is not
-    /// expected to go on first, although the reference within the slew limit is still on its way back.
+    /// A piston that is held up at 20 mm is commanded out, and after 0.2 s back, or out less far: it is not expected to
+    /// go further first, although the reference within the slew limit is still on its way back.
     #[test]
     fn a_piston_that_is_told_to_come_back_is_not_expected_to_go_on() {
         let settings = settings();

@@ -26,7 +26,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
 
     fn armed(&mut self) {
         self.change(|node| {
-            // Here, and not only in ticks at rest: disarming and arming may fall between two.
+            // Here, and not only in ticks at rest: disarming and arming may fall between two ticks.
             node.state.start_from(node.state.measured);
             node.state.following = Ticks::ZERO;
             node.target = Target::at(node.state.measured);
@@ -42,7 +42,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
         let was_tracking = self.core.mode() == Mode::Tracking;
         match setpoint.filter(|slot| slot.track) {
             Some(setpoint) => {
-                // Refused unless armed: a set-point moves nothing by itself.
+                // Refused unless armed: a set-point alone moves nothing.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
                     self.aim(Target::from_setpoint(&setpoint));
                 }
@@ -78,7 +78,7 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> Application for JointNode<V
             Message::OpenAllValves(command) => {
                 let event = match command.mode {
                     OpenMode::Exhaust => Event::OpenAllValves,
-                    // Inlets never open over something that went wrong.
+                    // Inlets are never opened after something went wrong.
                     OpenMode::BlowThrough
                         if !self.core.supervisor.faults().latched().is_empty() =>
                     {
@@ -134,11 +134,10 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         }
     }
 
-    /// The board command of the paper: a reference outside the SYNC slots, for
-    /// an armed axis that does not track.
+    /// The board command of the paper: a reference outside the SYNC slots, for an armed axis that is not tracking.
     fn position_reference(&mut self, command: &PositionReference) -> Result<(), NackReason> {
         match self.core.mode() {
-            // It would wait beyond its deadline.
+            // It would wait past its deadline.
             Mode::Armed if self.state.precharge.is_under_way() => return Err(NackReason::Busy),
             Mode::Armed => {}
             Mode::Tracking => return Err(NackReason::WrongMode),
@@ -159,27 +158,26 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
     /// Sets one parameter, or changes nothing.
     #[inline(never)]
     fn set_parameter(&mut self, id: u16, raw: i32, at: Micros) -> Result<(), NackReason> {
-        // With other units or limits the watches restart; what they have found stands.
+        // The watches restart with other units or limits, but what they have found remains valid.
         if let Some(fault) = self.found() {
             self.axis_fault(fault, at);
         }
         let disarmed = self.core.mode().is_disarmed();
         let trial = self.parameters.with(id, raw, disarmed)?;
-        // By reference: each move of the settings would be hundreds of bytes of code.
+        // By reference: each move of the settings would cost hundreds of bytes of code.
         let Some(settings) = &JointSettings::new(&trial) else {
             return Err(NackReason::OutOfRange);
         };
         self.change(|node| {
             let sensor_differs = settings.tick.sensor != node.settings.sensor;
             if sensor_differs {
-                // Another calibration moves the stroke without a motion: neither
-                // a rate fault nor a velocity. The new one has to prove itself
-                // before the board may arm.
+                // Another calibration moves the stroke without a motion: this is neither a rate fault nor a velocity.
+                // The new calibration has to prove itself before the board may arm.
                 node.monitor.restart();
                 node.controller.reset();
             }
             if sensor_differs || settings.tick.motion != node.settings.motion {
-                // Other units, other places: nothing that was learnt holds.
+                // Other units or positions: nothing that was learnt remains valid.
                 node.state.motion = MotionWatch::new(&settings.tick.motion, node.state.measured);
             }
             if settings.tick.correction != node.settings.correction {

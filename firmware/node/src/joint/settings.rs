@@ -1,4 +1,4 @@
-//! Parameters of a joint board as the application uses them.
+//! Parameters of a joint board in the form that the application uses.
 
 use core::hash::Hash;
 
@@ -16,19 +16,18 @@ use wheeleg_control::valve::{ValveMode, ValveOpenings, allocate};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_units::{AdcCode, Duty, Micros, PositionMm, Ticks, VelocityMmS, divide_signed};
 
-/// Margin by which a valve pulse must exceed the switching delay, µs (ASSUMED:
-/// a tenth of the VQ110's 3.5 ms).
+/// Margin by which a valve pulse must exceed the switching delay, µs (ASSUMED: a tenth of the VQ110's 3.5 ms).
 const PULSE_MARGIN: Micros = Micros(350);
 
-/// Longest PWM period with which chambers are filled: a pulse of a 64th of the supply in each makes
-/// 1 bar in 1.6 of the 2 s that a precharge may take (`joint_precharge.rs`).
+/// Longest PWM period at which chambers are filled: with one pulse of a 64th of the supply per period they reach 1 bar
+/// in 1.6 s of the 2 s that a precharge may take (`joint_precharge.rs`).
 const PRECHARGE_PERIOD: Micros = Micros(60_000);
 
 /// Longest literal blow-through (ASSUMED: empties a 2 l reservoir).
 const BLOW_THROUGH_TIME: Micros = Micros::from_millis(5000);
 
-/// Everything that follows from the parameters, worked out when they change.
-/// The controller, the PWM and the supervision keep theirs; the board keeps `tick`.
+/// Everything that follows from the parameters, computed when they change. The controller, the PWM and the supervision
+/// keep their parts; the board keeps `tick`.
 #[derive(Clone, Debug)]
 pub struct JointSettings {
     /// Control law.
@@ -52,31 +51,30 @@ pub struct TickSettings {
     pub slew_step: PositionMm,
     /// Velocity of a reference at the slew limit.
     pub slew_rate: VelocityMmS,
-    /// Generator of the predictive law's reference; `None`: the command within the slew limit.
+    /// Generator of the predictive law's reference; `None`: the law follows the command within the slew limit.
     pub generator: Option<GeneratorConfig>,
-    /// Following error that is a fault when it lasts …
+    /// Following error that is a fault if it lasts …
     pub following_error: PositionMm,
     /// … for this many ticks.
     pub following_ticks: Ticks,
     /// What is expected of the piston.
     pub motion: MotionModel,
-    /// Absolute pressure to which both chambers are filled after arming, 2^-17 of the supply
-    /// pressure; 0: none.
+    /// Absolute pressure to which both chambers are filled after arming, 2^-17 of the supply pressure; 0: no precharge.
     pub precharge: i32,
     /// Outlet openings of a staged exhaust.
     pub staged_exhaust: ValveOpenings,
-    /// Openings of a valve that stays open.
+    /// Opening of a valve that stays open.
     pub full_period: Micros,
 }
 
 impl JointSettings {
-    /// Works out the settings; `None` when parameters contradict each other.
+    /// Computes the settings; `None` if parameters contradict each other.
     pub fn new(parameters: &JointParameters) -> Option<Self> {
         use JointParam as P;
         let raw = |parameter| parameters.get(parameter);
         let micros = |parameter| Micros(u32::try_from(raw(parameter)).unwrap_or(0));
         let millis = |parameter| Micros::from_millis(u32::try_from(raw(parameter)).unwrap_or(0));
-        // The table permits codes alone (a test says so).
+        // The table permits only codes (checked by a test).
         let code = |parameter| AdcCode::new(raw(parameter) as u16);
         let position = |parameter| PositionMm::from_raw(raw(parameter));
 
@@ -138,8 +136,8 @@ impl JointSettings {
     }
 }
 
-/// The reference generator that these parameters ask for. The other laws follow the command: it
-/// is the step that makes their error.
+/// The reference generator that these parameters demand. The other laws follow the command, because the step makes
+/// their error.
 fn generator(parameters: &JointParameters, law: Law) -> Option<GeneratorConfig> {
     use JointParam as P;
     let acceleration = parameters.get(P::ReferenceAcceleration) >> 16;
@@ -150,7 +148,7 @@ fn generator(parameters: &JointParameters, law: Law) -> Option<GeneratorConfig> 
     })
 }
 
-/// The gains of the control crate from raw parameters; formats agree row by row.
+/// The gains of the control crate from raw parameters; the formats agree row by row.
 fn gains(parameters: &JointParameters) -> JointGains {
     use JointParam as P;
     let gain = |parameter| Gain::from_bits(parameters.get(parameter));
@@ -212,9 +210,9 @@ fn gains(parameters: &JointParameters) -> JointGains {
     }
 }
 
-/// Pressure of a precharge of so many raw bar (gauge) on this supply (raw kPa, absolute), in the
-/// unit of [`TickSettings::precharge`]; `None` if it is more than seven eighths of the supply, which
-/// no account of the air is sure to reach, or if the pulses come too seldom to reach 1 bar in time.
+/// Pressure of a precharge to `bar` (raw bar, gauge) on this supply (raw kPa, absolute), in the unit of
+/// [`TickSettings::precharge`]. `None` if it is more than seven eighths of the supply, which the air model is not sure
+/// to reach, or if the pulses are too infrequent to reach 1 bar in time.
 fn precharge(bar: i32, gains: &JointGains, motion: &MotionModel) -> Option<i32> {
     if bar == 0 {
         return Some(0);
@@ -230,7 +228,7 @@ fn precharge(bar: i32, gains: &JointGains, motion: &MotionModel) -> Option<i32> 
     (absolute <= SUPPLY / 8 * 7).then_some(absolute)
 }
 
-/// A rate in raw mm/s as raw mm per joint tick, rounded down, at least one step.
+/// A rate in raw mm/s as raw mm per joint tick, rounded down, but at least one step.
 fn per_tick(rate_raw: i32) -> PositionMm {
     let product = i64::from(rate_raw).saturating_mul(i64::from(JOINT_TICK.get()));
     let step = divide_signed(product, 1_000_000);
@@ -274,7 +272,7 @@ mod tests {
 
     #[test]
     fn bounds_of_the_table_are_accepted_by_the_control_law() {
-        // Rows of the law, each at both ends, with their partners out of the way.
+        // Rows of the law, each at both limits, with the parameters related to them out of the way.
         for parameter in JointParam::ALL {
             let row = parameter.info();
             for raw in [row.min, row.max] {

@@ -1,4 +1,4 @@
-//! Parameters in two flash pages, of which one is always whole.
+//! Parameters in two flash pages, of which one is always complete.
 //!
 //! # Format of a page
 //!
@@ -10,12 +10,11 @@
 //! | 1…n | one record: parameter number (16 bit), zero (16 bit), raw value (32 bit, signed) |
 //! | n + 1 | CRC-32C of the words before it, and its complement |
 //!
-//! A save goes to the page that does not hold the newest set: erase, records,
-//! and last of all the word with the CRC. So a power cut at any instant leaves
-//! either the old set or the new one; in the first save of a blank store, which has no old set, one
-//! that counts as damaged. A save erases one page and no more: erasing stalls the processor for
-//! most of the time after which a link counts as lost. Words torn by the cut are unreadable or
-//! anything at all; the CRC decides.
+//! A save goes to the page that does not hold the newest set: erase, then the records, and last the word with the CRC.
+//! So a power cut at any instant leaves either the old set or the new one; during the first save of a blank store,
+//! which has no old set, it leaves one that counts as damaged. A save erases only one page, because erasing stalls the
+//! processor for most of the time after which a link counts as lost. Words torn by the cut are unreadable or contain
+//! anything; the CRC decides.
 
 #[cfg(test)]
 mod tests;
@@ -29,10 +28,10 @@ use wheeleg_protocol::param::{JointParam, WheelParam};
 pub const PAGES: usize = 2;
 /// 64-bit words of a page.
 pub const WORDS: usize = 256;
-/// Records that a page holds.
+/// Number of records that fit a page.
 pub const RECORDS_MAX: usize = WORDS - 2;
 
-/// Records of the largest set that a board makes: every parameter it has.
+/// Records of the largest set that a board saves: all its parameters.
 const SET_MAX: usize = if JointParam::COUNT > WheelParam::COUNT {
     JointParam::COUNT
 } else {
@@ -42,7 +41,7 @@ const _: () = assert!(SET_MAX <= RECORDS_MAX);
 
 const MAGIC: u16 = 0x5757;
 
-/// The flash did not do what it was asked.
+/// The flash did not carry out an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashError;
 
@@ -57,7 +56,7 @@ pub trait Flash {
     /// [`FlashError`] if the hardware reports one.
     fn erase(&mut self, page: usize) -> Result<(), FlashError>;
 
-    /// Writes an erased word; or zero over any word, which needs no erasure (RM0440 §3.3.7).
+    /// Writes an erased word, or zero over any word, which needs no erasure (RM0440 §3.3.7).
     ///
     /// # Errors
     /// [`FlashError`] if the hardware reports one.
@@ -104,7 +103,7 @@ impl From<FlashError> for SaveError {
     }
 }
 
-/// A whole set in one of the pages.
+/// A complete set in one of the pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Whole {
     page: usize,
@@ -129,18 +128,16 @@ impl<F: Flash> ParameterStore for Store<F> {
 }
 
 impl<F: Flash> Store<F> {
-    /// A store in these pages, whatever they hold.
+    /// A store in these pages, whatever their content.
     pub const fn new(flash: F) -> Self {
         Self { flash }
     }
 
-    /// Puts every record of the newest whole set over `defaults`, in the order in
-    /// which they were saved; gives the result and the set's sequence number, or
-    /// `None` if there is no whole set.
+    /// Applies every record of the newest complete set to `defaults`, in the order in which they were saved. Returns
+    /// the result and the set's sequence number, or `None` if there is no complete set.
     ///
-    /// A word torn by a power cut may read differently each time. So the records
-    /// count only if the checksum holds for what `put` was really given, and the
-    /// other page is looked at where it does not: never a part of a set.
+    /// A word torn by a power cut may read differently each time. So the records count only if the checksum matches
+    /// what `put` was actually given; otherwise the other page is tried. The result is never part of a set.
     pub fn load<T: Copy>(
         &self,
         defaults: T,
@@ -155,11 +152,11 @@ impl<F: Flash> Store<F> {
         })
     }
 
-    /// The parameters of a board: the newest whole set over `defaults`, or those of a blank
-    /// store; `None` if what it holds is damaged, or a record is one that `with` refuses.
+    /// The parameters of a board: the newest complete set applied to `defaults`, or the defaults for a blank store.
+    /// `None` if the content is damaged, or if `with` refuses a record.
     ///
-    /// A newest set that was damaged later cannot be told from one whose save a power cut
-    /// ended: the older set counts.
+    /// A newest set that was damaged later cannot be distinguished from one whose save was ended by a power cut: the
+    /// older set is used.
     pub fn parameters<T: Copy, R>(
         &self,
         defaults: T,
@@ -174,17 +171,15 @@ impl<F: Flash> Store<F> {
         }
     }
 
-    /// Whether no save was ever begun.
+    /// Whether no save was ever started.
     fn is_blank(&self) -> bool {
         (0..PAGES).all(|page| self.flash.read(page, 0) == Some(u64::MAX))
     }
 
-    /// Saves a set. Erasing takes about 22 ms on the board's part, in which the
-    /// processor stands still.
+    /// Saves a set. Erasing takes about 22 ms on the board's part, during which the processor stands still.
     ///
     /// # Errors
-    /// [`SaveError::TooMany`] before anything is erased, [`SaveError::Flash`] with
-    /// the old set still in place.
+    /// [`SaveError::TooMany`] before anything is erased, [`SaveError::Flash`] with the old set still in place.
     pub fn save(&mut self, records: &[Record]) -> Result<u32, SaveError> {
         if records.len() > RECORDS_MAX {
             return Err(SaveError::TooMany);
@@ -193,8 +188,8 @@ impl<F: Flash> Store<F> {
         let page = newest.map_or(0, |copy| 1_usize.saturating_sub(copy.page));
         let sequence = newest.map_or(0, |copy| copy.sequence.wrapping_add(1));
         if newest.is_none() {
-            // What can hardly be read may look whole some day, with any number: without its
-            // first word it never does.
+            // A page that can hardly be read may look complete some day, with any number; without its first word it
+            // never does.
             self.flash.write(1, 0, 0)?;
         }
         self.flash.erase(page)?;
@@ -208,7 +203,7 @@ impl<F: Flash> Store<F> {
         let commit = u64::from(crc) | u64::from(!crc) << 32;
         self.flash
             .write(page, records.len().saturating_add(1), commit)?;
-        // What hardware reports is believed only as far as it can be read back.
+        // What the hardware reports is trusted only if it can be read back.
         match self.whole(page) {
             Some(copy) if copy.sequence == sequence => Ok(sequence),
             _ => Err(SaveError::Flash),
@@ -239,13 +234,13 @@ impl<F: Flash> Store<F> {
         }
     }
 
-    /// The set in a page, if it is whole.
+    /// The set in a page, if it is complete.
     fn whole(&self, page: usize) -> Option<Whole> {
         self.read(page, |_| {})
     }
 
-    /// Hands the records of a page to `take`; gives the set if it was whole. A copy of
-    /// it for each caller: with a call through a pointer the stack has no bound.
+    /// Passes the records of a page to `take`; returns the set if it was complete. There is a copy for each caller,
+    /// because with a call through a pointer the stack has no bound.
     fn read(&self, page: usize, mut take: impl FnMut(Record)) -> Option<Whole> {
         let header = self.flash.read(page, 0)?;
         let count = usize::from((header >> 16) as u16);

@@ -5,7 +5,7 @@ use core::cell::Cell;
 use proptest::prelude::*;
 use std::vec::Vec;
 
-/// How far the operation that the power cut hits gets.
+/// How far the operation hit by the power cut gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Torn {
     /// It has not begun.
@@ -14,7 +14,7 @@ enum Torn {
     Half,
     /// A word has a double error; half of a page does.
     Unreadable,
-    /// It was just complete.
+    /// It was just completed.
     All,
 }
 
@@ -23,10 +23,10 @@ const TORN: [Torn; 4] = [Torn::Nothing, Torn::Half, Torn::Unreadable, Torn::All]
 #[derive(Clone, Debug)]
 struct Mock {
     pages: [Vec<Option<u64>>; PAGES],
-    /// Operations until the power is cut, and what becomes of the last one.
+    /// Operations until the power is cut, and what happens to the last one.
     cut: Option<(usize, Torn)>,
     erasures: usize,
-    /// A word, the readings for which it lasts, and what it reads as afterwards.
+    /// A word, the number of readings for which it lasts, and what it reads as afterwards.
     fades: Option<(usize, usize, Cell<u32>, Option<u64>)>,
 }
 
@@ -40,13 +40,13 @@ impl Mock {
         }
     }
 
-    /// Whether the operation is done; `Err` with what is left of it at the cut.
+    /// Whether the operation is done; `Err` with what the cut leaves of it.
     fn power(&mut self) -> Result<(), Torn> {
         match &mut self.cut {
             None => Ok(()),
             Some((0, torn)) => {
                 let torn = *torn;
-                // Everything after the cut does nothing.
+                // After the cut nothing has any effect.
                 self.cut = Some((0, Torn::Nothing));
                 Err(torn)
             }
@@ -88,7 +88,7 @@ impl Flash for Mock {
         let cell = &mut self.pages[page][word];
         let done = matches!(power, Ok(()) | Err(Torn::All));
         if done && value != 0 && *cell != Some(u64::MAX) {
-            // A word may be written once per erasure, but with zeros (RM0440 §3.3.7).
+            // A word may be written once per erasure, except with zeros (RM0440 §3.3.7).
             return Err(FlashError);
         }
         *cell = match power {
@@ -151,7 +151,7 @@ fn the_newest_set_is_loaded_and_pages_take_turns() {
 fn sequence_numbers_wrap() {
     let mut store = Store::new(Mock::new());
     store.save(&set(1, 3)).unwrap();
-    // The first save had number 0; give it the last one there is.
+    // The first save had number 0; give it the last possible number.
     let page = &mut store.flash.pages[0];
     let header = page[0].unwrap() & 0xFFFF_FFFF | 0xFFFF_FFFF << 32;
     page[0] = Some(header);
@@ -170,7 +170,7 @@ fn sequence_numbers_wrap() {
 fn a_power_cut_at_any_word_leaves_the_old_set_or_the_new_one() {
     let new = set(99, 30);
     for saves in [0, 1, 2, 3] {
-        // First word of the other page if there is no set, erasure, header, 30 records, commit word.
+        // First word of the other page if there is no set, then erasure, header, 30 records, commit word.
         let operations = 33 + usize::from(saves == 0);
         let (before, old) = after(saves);
         let old = if saves > 0 { old } else { Default::default() };
@@ -194,7 +194,7 @@ fn a_power_cut_at_any_word_leaves_the_old_set_or_the_new_one() {
                 } else {
                     kept += 1;
                 }
-                // The board starts again and saves as if nothing had been.
+                // The board starts again and saves as if nothing had happened.
                 let mut store = Store::new(flash);
                 store.save(&new).unwrap();
                 assert_eq!(loaded(&store.flash).1, new);
@@ -234,8 +234,8 @@ fn one_flipped_bit_anywhere_makes_the_copy_worthless() {
     }
 }
 
-/// Found by the fuzz target `store`: the new set got number 0, and the page that
-/// could not be read when it was saved was newer again when it could.
+/// Found by the fuzz target `store`: the new set got number 0, and the page that could not be read when it was saved
+/// was newer again once it could be read.
 #[test]
 fn a_set_that_comes_back_from_the_dead_does_not_win_over_what_was_saved_since() {
     let (mut flash, _) = after(4);
@@ -247,8 +247,8 @@ fn a_set_that_comes_back_from_the_dead_does_not_win_over_what_was_saved_since() 
     assert_eq!(loaded(&store.flash), (Some(0), set(99, 4)));
 }
 
-/// The records before the word that could not be read any more were once handed
-/// over, and stayed, with defaults for the rest.
+/// Once, the records before the word that had become unreadable were handed over and stayed, with defaults for the
+/// rest.
 #[test]
 fn a_word_that_fades_while_it_is_read_leaves_no_part_of_a_set() {
     for saves in [1, 2] {
@@ -256,7 +256,7 @@ fn a_word_that_fades_while_it_is_read_leaves_no_part_of_a_set() {
         let page = saves as usize - 1;
         let older = if saves == 2 { set(0, 30) } else { Vec::new() };
         for word in 0..32 {
-            // Readings of this word until it cannot be read, or reads wrong.
+            // Number of readings of this word until it cannot be read, or reads wrong.
             for readings in 0..3 {
                 for then in [None, Some(0)] {
                     let mut flash = flash.clone();
@@ -282,7 +282,7 @@ proptest! {
     }
 }
 
-/// The processor stands still for each erasure: two of them are as long as the link may be silent.
+/// The processor stands still for each erasure: two of them take as long as the link may be silent.
 #[test]
 fn a_save_erases_one_page_whatever_the_store_holds() {
     let (whole, _) = after(2);
@@ -322,8 +322,7 @@ fn a_page_has_room_for_254_records_and_a_board_saves_every_parameter_that_it_has
     }
 }
 
-/// What a board makes of its memory: records of numbers below 0x0105 it takes, their number
-/// and their sum.
+/// What a board makes of its memory: it accepts records with numbers below 0x0105; returns their count and their sum.
 fn board(flash: &Mock) -> Option<(i32, i32)> {
     let with = |(count, sum): &(i32, i32), id: u16, raw: i32| {
         let known = id < 0x0105;
@@ -344,7 +343,7 @@ fn a_board_tells_a_blank_memory_from_a_damaged_one() {
     let mut store = Store::new(Mock::new());
     store.save(&records).unwrap();
     assert_eq!(board(&store.flash), Some((4, 28)));
-    // Every flipped bit and every torn word of the only set there is.
+    // Every flipped bit and every torn word of the only set.
     for word in 0..=5 {
         let mut torn = store.flash.clone();
         torn.pages[0][word] = None;
@@ -355,18 +354,18 @@ fn a_board_tells_a_blank_memory_from_a_damaged_one() {
             assert_eq!(board(&damaged), None, "{word} {bit}");
         }
     }
-    // With an older one that is whole, that one.
+    // With an older complete set, that one is used.
     let older = store.flash.clone();
     store.save(&[records[0]]).unwrap();
     assert_eq!(board(&store.flash), Some((1, 7)));
     store.flash.pages[1][1] = None;
     assert_eq!(board(&store.flash), board(&older));
-    // A record that the board refuses is no set of this board.
+    // A set with a record that the board refuses is not a set of this board.
     store.save(&[Record { id: 0x0109, raw: 1 }]).unwrap();
     assert_eq!(board(&store.flash), None);
 }
 
-/// A page with these words and the checksum that belongs to them.
+/// A page with these words and a matching checksum.
 fn page(words: &[u64]) -> Mock {
     let mut flash = Mock::new();
     let mut digest = Checksum::default();
@@ -385,7 +384,7 @@ fn a_page_that_is_not_of_this_format_is_none_whatever_its_checksum_says() {
     let record = 0x0102 | 5 << 32;
     let sound = loaded(&page(&[header, record]));
     assert_eq!(sound, (Some(7), vec![Record { id: 0x0102, raw: 5 }]));
-    // Another magic, and each of the bits between number and value.
+    // Another magic number, and each of the bits between number and value.
     assert_eq!(loaded(&page(&[header ^ 0x100, record])).0, None);
     for bit in 16..32 {
         let found = loaded(&page(&[header, record | 1 << bit]));

@@ -1,15 +1,13 @@
 //! Encoder loss and reversal, detected from drive and counts.
 //!
-//! A motor that is driven hard enough must turn, in the direction of the drive. A sample is
-//! suspicious if the drive is at least [`DRIVE_PERCENT`] and the count does not change or runs
-//! against it. If all samples of [`WINDOW`] are suspicious, that is a fault, unless the wheel ran
-//! against the drive and has slowed down: then it is being braked, and the window restarts. A
-//! blocked wheel is a fault by the same rule.
+//! A motor that is driven hard enough must turn, in the direction of the drive. A sample is suspicious if the drive is
+//! at least [`DRIVE_PERCENT`] and the count does not change or runs against it. If all samples of [`WINDOW`] are
+//! suspicious, that is a fault, unless the wheel ran against the drive and has slowed down: then it is being braked,
+//! and the window restarts. A blocked wheel is a fault by the same rule.
 
 use wheeleg_units::Micros;
 
-/// Drive from which a motor must turn, per cent (ASSUMED: a loaded 16 W motor
-/// with 260:1 starts at about 15 %).
+/// Drive from which a motor must turn, per cent (ASSUMED: a loaded 16 W motor with 260:1 starts at about 15 %).
 const DRIVE_PERCENT: u8 = 40;
 
 /// Time of suspicion that is a fault; within the 100 ms of the fault matrix.
@@ -23,8 +21,8 @@ pub(super) struct EncoderWatch {
 }
 
 impl EncoderWatch {
-    /// Takes the drive that acted during the last sample and the counts it
-    /// brought; true when the encoder is faulty.
+    /// Takes the drive that acted during the last sample and the resulting counts; returns true if the encoder is
+    /// faulty.
     pub(super) fn sample(&mut self, drive_percent: i8, counts: i32, tick: Micros) -> bool {
         let driven = drive_percent.unsigned_abs() >= DRIVE_PERCENT;
         // Standing still is neither direction.
@@ -69,7 +67,7 @@ mod tests {
         assert_eq!(first_fault(|n| (100, -(n as i32) / 4)), Some(LIMIT));
         assert_eq!(first_fault(|n| (-100, n as i32 / 4)), Some(LIMIT));
         assert!(LIMIT * TICK.get() <= 100_000);
-        // A sample of which the window is a multiple.
+        // A sample time that divides the window.
         let mut watch = EncoderWatch::default();
         let found = (1..=200).find(|_| watch.sample(100, 0, Micros(500)));
         assert_eq!(found, Some(180));

@@ -1,4 +1,4 @@
-//! A flipped bit in what a wheel board keeps between two samples means Hold at the next sample.
+//! A flipped bit in the state that a wheel board keeps between two samples leads to Hold at the next sample.
 
 use super::motion::Target;
 use super::node::WheelNode;
@@ -89,7 +89,7 @@ fn damaged_configuration_is_seen_by_the_next_sample() {
     found_at_once(|node| node.control_mode = WheelControlMode::ProportionalVelocity);
 }
 
-/// What is cleared later must not go on with what was damaged.
+/// After a later clear the node must not continue with damaged state.
 #[test]
 fn after_damage_the_controller_begins_anew_with_its_parameters() {
     let damages: [fn(&mut Node); 3] = [
@@ -184,7 +184,7 @@ impl Encoder for Short {
 #[test]
 fn a_count_longer_than_the_counter_survives_a_flip_in_any_of_its_copies() {
     type Node = WheelNode<Motor, Short, NoSwitches, NoDumpValve>;
-    // Beyond 16 bits both ways: 400 counts a sample, and back.
+    // Beyond 16 bits in both directions: 400 counts per sample, and back.
     let turned = |node: &mut Node, samples: std::ops::Range<u32>, by: u16| {
         for sample in samples {
             node.encoder.0 = node.encoder.0.wrapping_add(by);
@@ -218,7 +218,7 @@ fn a_count_longer_than_the_counter_survives_a_flip_in_any_of_its_copies() {
                     0 => flip(&mut node.state.actual),
                     1 => flip(&mut node.counts[0]),
                     2 => flip(&mut node.counts[1]),
-                    // Damage elsewhere has no part in it, or one beside that of a copy.
+                    // Damage elsewhere does not matter here, even together with that of a copy.
                     3 => node.state.drive ^= 1,
                     _ => {
                         node.state.drive ^= 1;

@@ -1,17 +1,16 @@
 //! From the set-points of the bus to commands of the wheel controller.
 //!
-//! Position mode: the wanted position moves on with the velocity of its
-//! set-point for at most one bus cycle; the command follows it by at most the
-//! maximum speed per sample, and starts at the actual position when the board
-//! arms. Trapezoidal mode: a changed reference starts a profile as soon as none
-//! runs. Velocity modes: the velocity of the set-point.
+//! Position mode: the wanted position advances with the velocity of its set-point for at most one bus cycle. The
+//! command follows it by at most the maximum speed per sample, and starts at the actual position when the board arms.
+//! Trapezoidal mode: a changed reference starts a profile as soon as none is running. Velocity modes: the velocity of
+//! the set-point.
 
 use super::settings::WheelSettings;
 use wheeleg_control::wheel::{WheelCommand, WheelController, WheelMode, WheelVelocity};
 use wheeleg_protocol::{WheelControlMode, WheelSetpoint};
 use wheeleg_units::WheelCount;
 
-/// What the bus wants of the wheel.
+/// What the bus requests of the wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Target {
     pub(super) position: WheelCount,
@@ -21,7 +20,7 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// Stand still at `position`.
+    /// Stands still at `position`.
     pub(super) const fn at(position: WheelCount) -> Self {
         Self {
             position,
@@ -30,7 +29,7 @@ impl Target {
         }
     }
 
-    /// Turn at a velocity.
+    /// Turns at a velocity.
     pub(super) const fn turning(position: WheelCount, velocity_raw: i16) -> Self {
         Self {
             position,
@@ -47,7 +46,7 @@ impl Target {
         }
     }
 
-    /// Wanted position of this sample, then one sample older.
+    /// Wanted position of this sample; then makes the target one sample older.
     fn advance(&mut self, cycle_ticks: u32) -> WheelCount {
         let samples = i64::from(self.age.min(cycle_ticks));
         let sixteenths = i64::from(self.velocity_raw).saturating_mul(samples);
@@ -60,14 +59,13 @@ impl Target {
 /// What limited the command of this sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct MotionLimits {
-    /// The command was slowed to the maximum speed, or the velocity step to
-    /// what the controller takes.
+    /// The command was slowed to the maximum speed, or the velocity step to what the controller accepts.
     pub(super) rate: bool,
 }
 
-/// Puts the controller into `mode`, standing still at the actual position.
+/// Puts the controller into `mode`, at standstill at the actual position.
 ///
-/// Trapezoidal mode stands in position control until a profile is started.
+/// Trapezoidal mode stays in position control until a profile is started.
 pub(super) fn engage(controller: &mut WheelController, mode: WheelControlMode, actual: WheelCount) {
     let enter = match mode {
         WheelControlMode::Idle => WheelMode::Idle,
@@ -75,9 +73,8 @@ pub(super) fn engage(controller: &mut WheelController, mode: WheelControlMode, a
         WheelControlMode::ProportionalVelocity => WheelMode::ProportionalVelocity,
         WheelControlMode::IntegralVelocity => WheelMode::IntegralVelocity,
     };
-    // From idle, with a sample timer that the settings have checked, none of
-    // these is refused; if one were, the controller would stay in idle, which
-    // drives nothing.
+    // From idle, with a sample timer that the settings have checked, none of these is refused. If one were, the
+    // controller would stay in idle, which drives nothing.
     let _ = controller.apply(WheelCommand::Idle);
     let _ = controller.apply(WheelCommand::Position(actual));
     let _ = controller.apply(WheelCommand::FinalPosition(actual));
@@ -85,15 +82,14 @@ pub(super) fn engage(controller: &mut WheelController, mode: WheelControlMode, a
     let _ = controller.apply(WheelCommand::Enter(enter));
 }
 
-/// Hands speed and acceleration to the controller, which refuses them while a
-/// profile runs.
+/// Passes speed and acceleration to the controller, which refuses them while a profile is running.
 #[inline]
 pub(super) fn tune_profile(controller: &mut WheelController, settings: &WheelSettings) {
     let _ = controller.apply(WheelCommand::MaximumVelocity(settings.max_speed));
     let _ = controller.apply(WheelCommand::Acceleration(settings.acceleration));
 }
 
-/// Gives the controller the command of this sample.
+/// Passes the command of this sample to the controller.
 #[inline]
 pub(super) fn command(
     controller: &mut WheelController,
@@ -131,7 +127,7 @@ pub(super) fn command(
                 .apply(WheelCommand::IntegralVelocity(wanted))
                 .is_err()
             {
-                // Too large a step for the chip: by way of zero.
+                // Too large a step for the chip: go via zero.
                 limits.rate = true;
                 let _ = controller.apply(WheelCommand::IntegralVelocity(0));
             }

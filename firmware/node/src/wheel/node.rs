@@ -25,9 +25,9 @@ const BOOT_TICKS: Ticks = Ticks(10);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct TickState {
     pub(super) actual: WheelCount,
-    /// Drive written last, per cent.
+    /// Last drive that was written, per cent.
     pub(super) drive: i8,
-    /// Mean drive of the last samples, per cent × 2^8.
+    /// Mean drive over the last samples, per cent × 2^8.
     pub(super) drive_mean: i32,
     /// Drive from which the ramp of a stop starts, per cent.
     pub(super) ramp_from: i8,
@@ -51,12 +51,11 @@ pub struct WheelNode<M, E, P, D> {
     pub(super) controller: WheelController,
     pub(super) target: Target,
     pub(super) state: TickState,
-    /// Copies of the count in `state`: a counter shorter than the count cannot give it
-    /// back once it is damaged.
+    /// Copies of the count in `state`: once the count is damaged, a counter shorter than it cannot restore it.
     pub(super) counts: [WheelCount; 2],
-    /// Checksum of what only a request changes.
+    /// Checksum of what only requests change.
     fixed_seal: Checksum,
-    /// Checksum of what a sample changes.
+    /// Checksum of what samples change.
     seal: Checksum,
     pub(super) snapshot: WheelSnapshot,
     switches: Debounce<SWITCH_TICKS>,
@@ -70,8 +69,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
     /// A board in Boot with its drive off, in position control when armed.
     ///
     /// # Errors
-    /// [`ConfigError::Address`] when the straps do not name a wheel,
-    /// [`ConfigError::Parameters`] when the parameters contradict each other.
+    /// [`ConfigError::Address`] if the straps do not name a wheel, [`ConfigError::Parameters`] if the parameters
+    /// contradict each other.
     pub fn new(
         identity: NodeIdentity,
         parameters: WheelParameters,
@@ -109,9 +108,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         Ok(node)
     }
 
-    /// A board with the parameters that its memory kept. Those that are damaged (`None`) or
-    /// contradict each other are not used: the board starts with its defaults and a latched
-    /// fault, so that it can be reached and told better ones.
+    /// A board with the parameters that its memory kept. If these are damaged (`None`) or contradict each other they
+    /// are not used: the board starts with its defaults and a latched fault, so that it can be reached and given better
+    /// ones.
     ///
     /// # Errors
     /// [`ConfigError::Address`], as [`Self::new`].
@@ -141,26 +140,24 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         Ok(node)
     }
 
-    /// Present tick: the sample time of the controller, µs. The board's timer
-    /// takes it over after every tick.
+    /// Present tick: the sample time of the controller, µs. The board's timer adopts it after every tick.
     pub const fn tick_period_us(&self) -> u32 {
         self.settings.times.tick.get()
     }
 
-    /// Takes bytes of the bus, in any chunking; the last of them ended at
-    /// `t_end`. Never panics, for any bytes.
+    /// Takes bytes of the bus, in any chunking; the last of them ended at `t_end`. Never panics, for any bytes.
     pub fn on_bus_bytes(&mut self, bytes: &[u8], t_end: Micros) {
         receive(self, bytes, t_end);
     }
 
-    /// The next frame to send and when to start; call between two ticks until `None`,
-    /// with which comes what a tick left over.
+    /// The next frame to send and when to start. Call it between two ticks until it returns `None`; that call also
+    /// processes what a tick has deferred.
     pub fn take_transmission(&mut self) -> Option<Transmission> {
         self.core.take_transmission()
     }
 
-    /// One sample that starts at `now`: latches the inputs, controls, writes
-    /// the outputs. They act from the next tick edge on.
+    /// One sample that starts at `now`: latches the inputs, controls, and writes the outputs, which take effect at the
+    /// next tick edge.
     pub fn tick(&mut self, now: Micros) -> TickReport {
         let mut actual = self.encoder.count(self.state.actual);
         let switches = self.switch_pins.read();
@@ -171,7 +168,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             self.state.actual = self.undamaged_count();
             actual = self.encoder.count(self.state.actual);
             self.axis_fault(Fault::StateCorrupt, now);
-            // What is cleared later must not go on with what was damaged.
+            // After a later clear the node must not continue with damaged state.
             self.controller = WheelController::new();
             self.tune();
         }
@@ -218,7 +215,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             self.state.drive = 0;
             let _ = self.write(dump_open);
         }
-        // The controller's output and the limits are noted where they are made.
+        // The controller's output and the limits are recorded where they are computed.
         let snapshot = &mut self.snapshot;
         snapshot.at = now;
         snapshot.mode = self.core.mode();
@@ -235,14 +232,13 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         }
     }
 
-    /// The tick's work ended at `end`; a tick longer than its period is a
-    /// latched fault.
+    /// The tick's work ended at `end`; a tick longer than its period is a latched fault.
     pub fn tick_done(&mut self, end: Micros) {
         self.core.supervisor.end_tick(end, &self.core.times);
     }
 
-    /// Says why the processor started; call it before the first tick. After a
-    /// watchdog, a brown-out or a processor fault the board has a latched fault.
+    /// States why the processor started; call it before the first tick. After a watchdog, a brown-out or a processor
+    /// fault the board has a latched fault.
     pub fn started_by(&mut self, cause: ResetCause) {
         self.core.started_by(cause);
     }
@@ -252,7 +248,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.core.axis_fault(Fault::SlotOverrun, at);
     }
 
-    /// A frame that was taken was not sent: its slot had passed.
+    /// A frame that was taken was not sent, because its slot had passed.
     pub fn missed_slot(&mut self) {
         self.core.port.missed();
     }
@@ -262,8 +258,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.core.save_is_due()
     }
 
-    /// Stores the parameters in force, which may take a while: the next tick is not
-    /// measured against this one.
+    /// Stores the parameters in force, which may take a while: the next tick is not measured against this one.
     pub fn save(&mut self, store: &mut impl ParameterStore, at: Micros) {
         let records = self.parameters.changed_from_default();
         self.core.save(records, store, at);
@@ -279,7 +274,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.core.mode()
     }
 
-    /// Controller mode that the board takes when armed.
+    /// Controller mode that the board enters when armed.
     pub const fn control_mode(&self) -> WheelControlMode {
         self.control_mode
     }
@@ -294,18 +289,18 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         &self.parameters
     }
 
-    /// Hands parameters to the controller.
+    /// Passes parameters to the controller.
     pub(super) fn tune(&mut self) {
         let settings = &self.settings;
         let _ = self.controller.apply(WheelCommand::Filter(settings.filter));
         let _ = self
             .controller
             .apply(WheelCommand::SampleTimer(settings.timer));
-        // Refused while a profile runs; the next one takes them before it starts.
+        // Refused while a profile is running; the next profile takes them before it starts.
         tune_profile(&mut self.controller, settings);
     }
 
-    /// Checksum of what shapes the outputs and is changed by requests alone.
+    /// Checksum of what shapes the outputs and is changed only by requests.
     #[inline(never)]
     fn fixed(&self) -> Checksum {
         Checksum::of(&(
@@ -328,8 +323,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.seal.holds(&self.moving()) && self.fixed_seal == self.fixed()
     }
 
-    /// The count of the sample before, whichever one of its three copies is damaged: each
-    /// bit as two of them have it.
+    /// The count of the previous sample, even if one of its three copies is damaged: a majority vote bit by bit.
     #[cold]
     fn undamaged_count(&self) -> WheelCount {
         let [a, b] = self.counts.map(WheelCount::get);
@@ -349,8 +343,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         self.reseal();
     }
 
-    /// A change of sealed state between two samples. State that was damaged
-    /// before keeps its broken seal, so that the next sample still sees it.
+    /// A change of sealed state between two samples. State that was already damaged keeps its broken seal, so that the
+    /// next sample still sees the damage.
     pub(super) fn change<R>(&mut self, change: impl FnOnce(&mut Self) -> R) -> R {
         let intact = self.is_intact();
         let result = change(self);
@@ -360,7 +354,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         result
     }
 
-    /// Another target between two samples. Only what every sample changes is checked and sealed again.
+    /// A new target between two samples. Only what every sample changes is checked and sealed again.
     pub(super) fn aim(&mut self, target: Target) {
         let intact = self.seal.holds(&self.moving());
         self.target = target;

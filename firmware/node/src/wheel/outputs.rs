@@ -10,10 +10,9 @@ use wheeleg_units::{Micros, Ticks};
 
 /// Fractional bits of the mean drive.
 const MEAN_FRACTION_BITS: u32 = 8;
-/// Samples over which the drive is averaged, as a power of two: 64, or 33 ms at
-/// the default sample time. The lead filter answers one encoder edge with up
-/// to 16 counts, so a single sample says little about the drive that keeps the
-/// wheel turning, and a ramp from it could speed a wheel up.
+/// Samples over which the drive is averaged, as a power of two: 64, or 33 ms at the default sample time. The lead
+/// filter answers one encoder edge with up to 16 counts, so a single sample says little about the drive that keeps the
+/// wheel turning, and a ramp starting from it could accelerate a wheel.
 const MEAN_SHIFT: u32 = 6;
 
 /// Exponential mean of the drive, per cent × 2^8, rounded towards −∞.
@@ -23,11 +22,10 @@ const fn mean(mean: i32, percent: i8) -> i32 {
     mean.saturating_add(newest.saturating_sub(mean) >> MEAN_SHIFT)
 }
 
-/// Drive from which the ramp of a stop starts, per cent: the smaller of the mean
-/// and the newest drive, and none where they disagree on the direction. So the
-/// ramp neither follows a single sample nor undoes braking that has begun.
+/// Drive from which the ramp of a stop starts, per cent: the smaller of the mean and the newest drive, and zero if they
+/// differ in direction. So the ramp neither follows a single sample nor undoes braking that has begun.
 fn ramp_from(mean: i32, newest: i8) -> i8 {
-    // The mean of per cents is one.
+    // The mean of percentages is itself a percentage.
     let mean = (mean >> MEAN_FRACTION_BITS) as i8;
     match (mean > 0, newest > 0) {
         (true, true) => mean.min(newest),
@@ -36,7 +34,7 @@ fn ramp_from(mean: i32, newest: i8) -> i8 {
     }
 }
 
-/// Drive of a ramp from `from` per cent with `left` of its `whole` time to go.
+/// Drive of a ramp from `from` per cent, with `left` of its `whole` time remaining.
 fn ramped(from: i8, left: Micros, whole: Micros) -> i8 {
     // A ramp takes 0.4 s at most: the product is below 2^26.
     let scaled = i32::from(from).saturating_mul(left.get() as i32);
@@ -53,7 +51,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             &mut self.target,
             &self.settings,
         );
-        // Made where it is kept.
+        // Computed in place.
         self.snapshot.control = self.controller.step(&WheelInput {
             actual: self.state.actual,
             limit: false,
@@ -72,21 +70,21 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             Ticks::ZERO
         };
         if self.is_behind() {
-            // Nor has a stop that comes before the next sample anything to ramp down.
+            // A stop before the next sample has nothing to ramp down, either.
             self.state.drive = 0;
             self.state.drive_mean = 0;
             self.state.ramp_from = 0;
         }
     }
 
-    /// Whether the following error has lasted its time. The drive is off in the sample
-    /// that finds it; it is latched in the next one, which has no law to work out beside it.
+    /// Whether the following error has lasted for its time. The drive is off in the sample that finds this; the fault
+    /// is latched in the next one, which has no law to compute at the same time.
     #[inline]
     pub(super) fn is_behind(&self) -> bool {
         self.state.following >= self.settings.following_ticks
     }
 
-    /// No control: ramp to standstill in Hold, nothing otherwise.
+    /// No control: ramps to a standstill in Hold, otherwise off.
     pub(super) fn rest(&mut self, now: Micros) {
         self.state.following = Ticks::ZERO;
         self.target = Target::at(self.state.actual);
@@ -97,9 +95,8 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
             stop: false,
         });
         self.snapshot.limits = LimitBits::NONE;
-        // After a fault of the axis its drive may be what runs away: no ramp.
-        // None either for a stop of what was stopped: a ramp cleared and braked
-        // anew between two ticks would begin again.
+        // After a fault of the axis its drive may be what runs away: no ramp. Nor for a stop of an axis that had
+        // already been stopped: a ramp that is cleared and braked again between two ticks would start afresh.
         let ramps = self.core.mode() == Mode::Hold
             && self.core.supervisor.held_from_drive()
             && self.core.supervisor.disarm_reason() != DisarmReason::Fault;
@@ -120,9 +117,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         motor.and(dump)
     }
 
-    /// The wheel has armed: closed loop at standstill where it is.
+    /// The wheel has armed: closed loop at standstill at its present position.
     pub(super) fn engage(&mut self) {
-        // Nothing is driven yet: a stop before the next sample has nothing to ramp.
+        // Nothing is driven yet: a stop before the next sample has nothing to ramp down.
         self.state.drive_mean = 0;
         self.state.ramp_from = 0;
         self.target = Target::at(self.state.actual);

@@ -34,7 +34,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> Application for Whe
         let was_tracking = self.core.mode() == Mode::Tracking;
         match setpoint.filter(|slot| slot.track) {
             Some(setpoint) => {
-                // Refused unless armed: a set-point moves nothing by itself.
+                // Refused unless armed: a set-point alone moves nothing.
                 if self.core.supervisor.apply(Event::SetpointValid, at).is_ok() {
                     self.aim(Target::from_setpoint(&setpoint));
                 }
@@ -156,8 +156,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         }
     }
 
-    /// Motion outside the SYNC slots: for an armed wheel that does not track,
-    /// and before the deadline.
+    /// Motion outside the SYNC slots is for an armed wheel that is not tracking, and before the deadline.
     fn check_motion(&self, deadline_cycle: u16) -> Result<(), NackReason> {
         match self.core.mode() {
             Mode::Armed => {}
@@ -186,8 +185,7 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         }
     }
 
-    /// Changes the controller mode, unless the wheel tracks. An armed wheel then
-    /// stops and keeps its place.
+    /// Changes the controller mode, unless the wheel is tracking. An armed wheel then stops and holds its position.
     fn select_mode(&mut self, mode: WheelControlMode) -> Result<(), NackReason> {
         if self.core.mode() == Mode::Tracking {
             return Err(NackReason::WrongMode);
@@ -203,9 +201,9 @@ impl<M: MotorDrive, E: Encoder, P: SwitchBank, D: DumpValve> WheelNode<M, E, P, 
         Ok(())
     }
 
-    /// Sets all of the parameters, or changes nothing.
+    /// Sets all of these parameters, or changes nothing.
     fn set_parameters(&mut self, changes: &[(u16, i32)], at: Micros) -> Result<(), NackReason> {
-        // Under other limits the error may be none; what was found stands.
+        // Under other limits there may be no error, but what was found remains valid.
         if self.is_behind() {
             self.axis_fault(Fault::FollowingError, at);
         }

@@ -1,4 +1,4 @@
-//! Parameters of a wheel board as the application uses them.
+//! Parameters of a wheel board in the form that the application uses.
 
 use crate::parameters::WheelParameters;
 use crate::supervisor::{SupervisionTimes, watchdog};
@@ -11,7 +11,7 @@ use wheeleg_units::{Micros, Ticks};
 /// Clock of the virtual HCTL-1100: 2 MHz, its maximum (data sheet p. 1).
 const CLOCK_HZ: u32 = 2_000_000;
 
-/// Everything that follows from the parameters, worked out when they change.
+/// Everything that follows from the parameters, computed when they change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct WheelSettings {
     /// Digital filter.
@@ -28,15 +28,14 @@ pub struct WheelSettings {
     pub stop_ramp: Micros,
     /// Samples of one bus cycle.
     pub cycle_ticks: u32,
-    /// Following error, counts, that is a fault when it lasts …
+    /// Following error, counts, that is a fault if it lasts …
     pub following_error: u32,
     /// … for this many samples.
     pub following_ticks: Ticks,
 }
 
 impl WheelSettings {
-    /// Works out the settings for a controller mode; `None` when the sample
-    /// timer is below the minimum of the mode.
+    /// Computes the settings for a controller mode; `None` if the sample timer is below the minimum of the mode.
     pub fn new(parameters: &WheelParameters, mode: WheelControlMode) -> Option<Self> {
         use WheelParam as P;
         let raw = |parameter| u32::try_from(parameters.get(parameter)).unwrap_or(0);
@@ -72,14 +71,13 @@ impl WheelSettings {
     }
 }
 
-/// Sample time of a timer value at the virtual clock, whole microseconds:
-/// 8 (T + 1), exact at 2 MHz.
+/// Sample time of a timer value at the virtual clock, in whole microseconds: 8 (T + 1), exact at 2 MHz.
 pub(super) fn sample_time(timer: SampleTimer) -> Micros {
     let nanos = timer.period_ns(CLOCK_HZ);
     Micros(u32::try_from(nanos.checked_div(1000).unwrap_or(0)).unwrap_or(u32::MAX))
 }
 
-/// The controller's name of a mode on the wire.
+/// The controller mode for a mode of the wire protocol.
 pub(super) const fn control_mode(mode: WheelControlMode) -> WheelMode {
     match mode {
         WheelControlMode::Idle => WheelMode::Idle,

@@ -7,7 +7,7 @@ use crate::observer::pressure::Pressures;
 use crate::tuning::OPENING_LONGEST;
 use wheeleg_units::Micros;
 
-/// Valves so wide that their finest pulse is more than break-away friction.
+/// Valves so wide that their finest pulse makes more than break-away friction.
 fn model() -> AxisModel {
     let data = AxisData {
         conductance: "0.4".parse().expect("a number"),
@@ -28,12 +28,12 @@ fn balanced(model: &AxisModel) -> Observer {
     at(model, allocation::targets(model, 0))
 }
 
-/// A target so many bands from a piston at 90 mm.
+/// A target this many bands from a piston at 90 mm.
 fn bands_off(model: &AxisModel, bands: i32) -> i32 {
     (90 << 16) + bands * model.band
 }
 
-/// Change of force of these openings, mN, to first order.
+/// Change of force that these openings make, mN, to first order.
 fn made(model: &AxisModel, observer: &Observer, openings: [i32; 4]) -> f64 {
     let share = |valve: usize| {
         let valves = pulse_planner::valves(model, observer);
@@ -62,7 +62,7 @@ fn valves_are_coarse_if_a_pulse_is_more_than_friction_holds_and_the_mass_is_smal
     }
 }
 
-/// Within 20 bands and below 120 mm/s; they end beyond 80 bands.
+/// Steps begin within 20 bands and below 120 mm/s; they end beyond 80 bands.
 #[test]
 fn steps_begin_near_the_target_and_slow() {
     let model = model();
@@ -87,7 +87,8 @@ fn steps_begin_near_the_target_and_slow() {
     assert!(goes_on(79) && goes_on(-79) && !goes_on(81) && !goes_on(-81));
 }
 
-/// In the second period at rest; the pulses are then sent to their end, whatever the piston does, but for a standstill.
+/// A step starts in the second period at rest; its pulses are then sent to their end whatever the piston does, unless a
+/// standstill intervenes.
 #[test]
 fn a_step_waits_for_the_piston_and_is_sent_whole() {
     let model = model();
@@ -99,7 +100,7 @@ fn a_step_waits_for_the_piston_and_is_sent_whole() {
     let next = |inching: &mut Inching, observer: &Observer| {
         inching.update(&model, observer, target, 1 << 20)
     };
-    // Neither while it moves, nor while a pulse is to change the pressure.
+    // It waits while the piston moves, and while a pulse is still to change the pressure.
     observer.motion.speed = 4 << 16;
     assert_eq!(next(&mut inching, &observer), Some(Inch::Wait));
     observer.motion.speed = 0;
@@ -130,7 +131,7 @@ fn a_step_waits_for_the_piston_and_is_sent_whole() {
     assert_eq!(away, Inching::default());
 }
 
-/// By the formula of the text, on either side and with one valve: 0.6 k_air |e| + Fc.
+/// By the documented formula, on either side and with one valve: 0.6 k_air |e| + Fc.
 #[test]
 fn a_step_makes_the_force_of_the_text() {
     let model = model();
@@ -154,8 +155,8 @@ fn a_step_makes_the_force_of_the_text() {
     }
 }
 
-/// The pair makes what is asked for to a hundredth of a finest pulse, each of its pulses is one that can be made, and
-/// it is filled below the middle and vented above it.
+/// The pair makes the demanded force to a hundredth of a finest pulse, each of its pulses can be made, and the chambers
+/// are filled below the middle and vented above it.
 #[test]
 fn a_force_below_the_finest_pulses_is_made_by_a_pair() {
     let model = AxisModel {
@@ -186,7 +187,7 @@ fn a_force_below_the_finest_pulses_is_made_by_a_pair() {
             assert!(off.abs() < grain, "{level} {error}: {off} of {wanted}");
         }
     }
-    // From 0.8 of the finest on it is one pulse.
+    // From 0.8 of the finest pulse on, one pulse is used.
     let observer = balanced(&model);
     let [fill, vent, ..] = pulse_planner::valves(&model, &observer);
     let drive = (observer.expected().a, fill, vent);
@@ -200,7 +201,7 @@ fn a_force_below_the_finest_pulses_is_made_by_a_pair() {
     assert_eq!((sent(79), sent(81)), (2, 1));
 }
 
-/// No shorter than the finest pulse, and no longer than 60 ms.
+/// An opening is no shorter than the finest pulse, and no longer than 60 ms.
 #[test]
 fn an_opening_is_bounded_on_both_sides() {
     let model = model();

@@ -1,4 +1,4 @@
-//! The force demand against the formulas of the text.
+//! The force demand, compared with the documented formulas.
 
 use super::*;
 use crate::axis::AxisData;
@@ -11,12 +11,12 @@ fn model() -> AxisModel {
     AxisModel::new(&AxisData::default(), Micros(1000)).expect("the default")
 }
 
-/// A piston at 90 mm under a force demand for a reference `error_mm` away, with a load and speeds, mm/s.
+/// Demand for a piston at 90 mm and a reference `error_mm` away, with a load and speeds, mm/s.
 fn demanded(model: &AxisModel, error_mm: f64, load: i32, speed: i32, wanted: i32) -> i32 {
     demanded_after(model, 0, error_mm, load, [speed, wanted])
 }
 
-/// The same after so many periods of 10 mm/s half a millimetre off the target.
+/// The same after this many periods at 10 mm/s, half a millimetre from the target.
 fn demanded_after(
     model: &AxisModel,
     periods: u16,
@@ -53,8 +53,8 @@ fn demanded_after(
     demand.force(model, law.ramp, &law.standstill)
 }
 
-/// In balance a piston at its target needs nothing but the load's counterpart; friction comes with the speed
-/// that is wanted, in proportion up to 10 mm/s.
+/// In balance, a piston at its target needs only the counterpart of the load. Friction is added with the wanted speed,
+/// in proportion up to 10 mm/s.
 #[test]
 fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
     let model = AxisModel::new(
@@ -66,7 +66,7 @@ fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
     )
     .expect("in range");
     assert_eq!(demanded(&model, 0.0, 20_000, 0, 0), -20_000);
-    // At the speed that is wanted, at the place that the reference has in the dead time: friction alone.
+    // At the wanted speed, where the reference will be after the dead time: friction alone.
     let at = |speed: i32| {
         let lead = f64::from(speed) * f64::from(model.dead_time_reference) / 2_f64.powi(32);
         demanded(&model, -lead, 0, speed, speed)
@@ -83,19 +83,18 @@ fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
     }
 }
 
-/// The less force a load leaves for braking, the slower the approach; it never stops, and the acceleration is
-/// limited.
+/// The less force a load leaves for braking, the slower the approach, but it never stops; the acceleration is limited.
 #[test]
 fn what_a_load_leaves_for_braking_slows_the_approach() {
     let model = model();
     let gains = SpeedGains::new(&model, model.mass);
     let mass = f64::from(model.mass) / 65_536.0;
-    // Far away at rest: the limit of the acceleration, and break-away.
+    // Far away and at rest: the limit of the acceleration, and break-away friction.
     let far = f64::from(demanded(&model, 80.0, 0, 0, 0));
     let top = f64::from(model.top_speed) / 65_536.0 * f64::from(model.viscous) / 256.0;
     let limit = 2.5 * f64::from(gains.brake) * mass + 15e3 + top;
     assert!((far / limit - 1.0).abs() < 0.02, "{far} {limit}");
-    // The speed at which no force but friction and load is asked for, 20 mm before the target.
+    // The speed 20 mm before the target at which the demand is only friction and load.
     let speed_at = |load: i32| {
         (1..700)
             .find(|speed| {
@@ -116,8 +115,8 @@ fn what_a_load_leaves_for_braking_slows_the_approach() {
     }
 }
 
-/// A millimetre off, at rest and in motion: what is asked for beside friction is halved with the period in which patience
-/// ends, for the default axis with a piston of 40 kg, and not with one of 1.5 kg.
+/// A millimetre off, at rest and in motion: beyond friction, the demand is halved from the period in which patience
+/// ends, for the default axis with a piston of 40 kg, but not with one of 1.5 kg.
 #[test]
 fn half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pulse() {
     let of = |gain: i32| f64::from(gain) / 256.0;
@@ -128,7 +127,7 @@ fn half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pu
         };
         let model = AxisModel::new(&data, Micros(1000)).expect("in range");
         let gains = SpeedGains::new(&model, model.mass);
-        // Slow enough for the limit of the acceleration.
+        // Slow enough to stay within the limit of the acceleration.
         for speed in [0, 20, -20] {
             let after = |periods| f64::from(demanded_after(&model, periods, 1.0, 0, [speed, 0]));
             let pull = -of(gains.slope) * f64::from(speed);
@@ -145,7 +144,8 @@ fn half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pu
     }
 }
 
-/// Five break-away forces in a second while it sticks; nothing between; four tenths less in each period of sliding.
+/// Five break-away forces per second while the piston sticks; no change in between; four tenths less in each period of
+/// sliding.
 #[test]
 fn the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides() {
     let model = model();
@@ -188,7 +188,7 @@ fn the_ramp_grows_while_the_piston_sticks_and_falls_when_it_slides() {
     for (speed, reference_speed) in [(4, 0), (9, 0), (0, 2)] {
         assert_eq!(newton(ramped(speed, reference_speed, 50)), 0.0, "{speed}");
     }
-    // A period at a speed takes four tenths from it, from 10 mm/s on.
+    // From 10 mm/s on, a period takes four tenths off it.
     let left_at = |speed: i32| {
         let mut ramp = ramped(0, 0, 50);
         let mut law = Predictive::new(&model);

@@ -33,7 +33,7 @@ fn seen<R>(off: i32, speed: i32, look: impl FnOnce(&Approach) -> R) -> R {
     })
 }
 
-/// The states that a piston takes there for so many periods.
+/// The states of a piston there over this many periods.
 fn states(standstill: &mut Standstill, off: i32, speed: i32, periods: u32) -> Vec<State> {
     states_of(&model(), standstill, off, speed, periods)
 }
@@ -102,8 +102,8 @@ fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_ta
     assert_eq!(moved.state, State::Servo);
 }
 
-/// Hunting beside its target, a piston gets a wider band after 0.88 s, up to 2.4 bands; and each
-/// gentle entry into it is answered by a pause.
+/// A piston that hunts beside its target gets a wider band after 0.88 s, up to 2.4 bands, and each gentle entry into it
+/// is answered by a pause.
 #[test]
 fn patience_widens_the_band_and_waits_for_an_oscillation() {
     let rests_at = |off: i32, hunting: u32| {
@@ -114,7 +114,7 @@ fn patience_widens_the_band_and_waits_for_an_oscillation() {
     assert!(!rests_at(15, 200) && rests_at(15, 300));
     assert!(rests_at(28, 500) && !rests_at(30, 500));
     let mut standstill = aimed();
-    // Entered at 10 mm/s, which is too fast to be caught: once in two periods, as long as there is patience.
+    // Entries at 10 mm/s, too fast to be caught, every second period, while patience lasts.
     for _ in 0..50 {
         assert_eq!(states(&mut standstill, 60, 10, 1), [State::Servo]);
         assert_eq!(states(&mut standstill, 5, 10, 1), [State::Servo]);
@@ -126,7 +126,7 @@ fn patience_widens_the_band_and_waits_for_an_oscillation() {
         waits.iter().filter(|s| **s == State::Pause).count(),
         usize::from(expected)
     );
-    // One that is fast, or is far off, is not waited for.
+    // A piston that is fast or far off is not waited for.
     for (off, speed, state) in [
         (5, 39, State::Pause),
         (5, 41, State::Servo),
@@ -141,19 +141,19 @@ fn patience_widens_the_band_and_waits_for_an_oscillation() {
 
 #[test]
 fn friction_that_stops_the_piston_in_the_band_is_left_to_do_so() {
-    // 1.5 kg; 10 N of friction, of which 0.85 count; no net force: 8.5 N over the way.
+    // 1.5 kg; 10 N of friction, of which 0.85 is used; no net force: 8.5 N over the distance.
     let stops = |off: i32, speed: i32| {
         seen(off, speed, |now| {
             Approach { force: 0, ..*now }.stops_within(&model(), hundredths(12))
         })
     };
-    // v²/2 × 1.5 kg = 8.5 N × 1 mm: 106 mm/s; ± 0.12 mm are ± 6 %.
+    // v²/2 × 1.5 kg = 8.5 N × 1 mm: 106 mm/s; ± 0.12 mm is ± 6 %.
     assert!(stops(-100, 106) && stops(100, -106) && stops(-100, 102) && stops(-100, 111));
     assert!(!stops(-100, 98) && !stops(-100, 115) && !stops(100, 106));
     assert!(!stops(-150, 130), "further than twelve bands away");
 }
 
-/// Near is within 24 bands of 0.12 mm, for more than four periods.
+/// Near means within 24 bands of 0.12 mm for more than four periods.
 #[test]
 fn patience_begins_within_24_bands() {
     let near = |off: i32, periods: u32| {
@@ -164,7 +164,7 @@ fn patience_begins_within_24_bands() {
     assert!(near(285, 5) && !near(285, 4) && !near(291, 50));
 }
 
-/// A piston that has left its place has had its patience; a new target is approached with a new one.
+/// A piston that has left its place has used up its patience; a new target is approached with a fresh one.
 #[test]
 fn a_new_target_has_a_patience_of_its_own() {
     let near = |target_mm: i32| {
@@ -189,8 +189,8 @@ fn a_new_target_has_a_patience_of_its_own() {
     assert_eq!(near(190), 0, "98 mm from it");
 }
 
-/// However wide the band of an axis, it widens to 0.4 mm at most; and one that has widened to 0.36 mm
-/// is left at 0.45 mm, not at twice that; one that is as wide as 0.4 mm is left by half a narrow band beyond.
+/// However wide the band of an axis, it widens to 0.4 mm at most. A band that has widened to 0.36 mm is left at 0.45
+/// mm, not at twice its width; one of 0.4 mm is left half a narrow band beyond it.
 #[test]
 fn a_wide_band_is_released_within_the_bar() {
     let banded = |hundredths: f64| {
@@ -218,13 +218,13 @@ fn a_wide_band_is_released_within_the_bar() {
     assert!(!leaves(&wide, 49) && leaves(&wide, 51));
 }
 
-/// A force that leaves less than a quarter of the friction is not to be counted on.
+/// A force that leaves less than a quarter of the friction means that friction cannot be relied on.
 #[test]
 fn friction_that_a_force_takes_away_stops_nothing() {
-    // Of 8.5 N there are 2.4 or 2.6 left.
+    // Of the 8.5 N, 2.4 or 2.6 N are left.
     let stops = |force: i32| {
         seen(-100, 0, |now| {
-            // What the friction that is left stops just at the target.
+            // The speed that the remaining friction stops just at the target.
             let left = f64::from(8_500 - force) / 1e3;
             let speed = (2.0 * left / 1.5 / 1e3).sqrt() * 1e3;
             let motion = Motion {
@@ -242,7 +242,7 @@ fn friction_that_a_force_takes_away_stops_nothing() {
     assert!(stops(5_900) && !stops(6_100));
 }
 
-/// Standing still beside the band, it does not wait for all of the oscillation.
+/// A piston that stands still beside the band does not wait for the whole oscillation.
 #[test]
 fn a_pause_beside_the_band_is_short() {
     let waits = |speed: i32| {
@@ -258,7 +258,7 @@ fn a_pause_beside_the_band_is_short() {
     assert_eq!((waits(0), waits(5)), (9, 79));
 }
 
-/// The friction that is fed forward fades over 0.5 s once patience is over.
+/// The friction feed-forward fades over 0.5 s once patience is over.
 #[test]
 fn friction_fades_where_the_piston_does_not_come_to_rest() {
     let faded = |periods: u32| {
@@ -279,7 +279,7 @@ fn a_seat_is_a_state_of_its_own() {
     assert!(standstill.valves_closed() && standstill.holds());
 }
 
-/// Against the period of mass and air springs in SI units, on cylinders of this project.
+/// Compares with the period of mass and air springs in SI units, on cylinders of this project.
 #[test]
 fn an_oscillation_is_that_of_the_mass_on_the_air() {
     // Bore, rod, stroke, mm; dead volumes, cm³; supply, kPa.

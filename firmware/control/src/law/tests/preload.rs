@@ -1,4 +1,4 @@
-//! What an announced move asks for.
+//! What an announced move demands.
 
 use super::*;
 
@@ -13,7 +13,7 @@ fn announced(reference: i16, after: u32, now: JointInput) -> JointInput {
     }
 }
 
-/// A law that has seen its piston stand at `position` mm for so many ticks, with valves open for these times.
+/// A law that has seen its piston stand at `position` mm for this many ticks, with valves open for these times.
 fn held(model: &AxisModel, ticks: u16, position: i16, on: [u16; 4]) -> Predictive {
     let mut law = Predictive::new(model);
     for _ in 0..ticks {
@@ -23,7 +23,7 @@ fn held(model: &AxisModel, ticks: u16, position: i16, on: [u16; 4]) -> Predictiv
     law
 }
 
-/// An announced move is awaited by the edge of slipping, and forgotten with its end.
+/// An announced move is awaited at the edge of slipping; the preload is forgotten when the announcement ends.
 #[test]
 fn an_announced_move_vents_the_counter_chamber() {
     let model = model();
@@ -40,8 +40,8 @@ fn an_announced_move_vents_the_counter_chamber() {
     assert_eq!(law.preload, Preload::default());
 }
 
-/// Once the force of a preload is there, an estimate of the load that wanders by less than half of the friction sends
-/// no pulse; one by more does.
+/// Once the force of a preload is reached, a load estimate that drifts by less than half of the friction sends no
+/// pulse; a larger drift does.
 #[test]
 fn a_preload_that_is_there_sends_no_pulse() {
     let model = model();
@@ -65,7 +65,7 @@ fn a_preload_that_is_there_sends_no_pulse() {
     assert!(pulses(7_000) > 0);
 }
 
-/// One that has reached its force acts again once more than half of the 10 N of friction is missing.
+/// A preload that has reached its force acts again once more than half of the 10 N of friction is missing.
 #[test]
 fn a_preload_acts_again_where_half_the_friction_is_missing() {
     let awaited = |missing: i32| {
@@ -82,8 +82,8 @@ fn a_preload_acts_again_where_half_the_friction_is_missing() {
     }
 }
 
-/// From an end stop against which a full chamber has held it a move is awaited by pressures about the mean, under
-/// any load: the force alone would be there as soon as the other chamber is as full.
+/// At an end stop against which a full chamber has held the piston, a move is awaited with pressures about the mean,
+/// under any load: the force alone would be reached as soon as the other chamber is as full.
 #[test]
 fn a_preload_is_there_once_the_counter_chamber_has_vented() {
     let model = model();
@@ -107,8 +107,8 @@ fn a_preload_is_there_once_the_counter_chamber_has_vented() {
     }
 }
 
-/// An announced move finds the piston in balance, or pushed along: half of the friction is missing at most, and no pulse
-/// is sent; pushed the other way by however little, it is turned round.
+/// If an announced move finds the piston in balance, or pushed along, at most half of the friction is missing, and no
+/// pulse is sent. However little it is pushed the other way, the force is reversed.
 #[test]
 fn a_preload_from_balance_sends_nothing() {
     let awaited = |net: i32| {
@@ -125,7 +125,7 @@ fn a_preload_from_balance_sends_nothing() {
     }
 }
 
-/// One that acts goes on while more than an eighth of the 10 N of friction is missing.
+/// A preload that acts continues while more than an eighth of the 10 N of friction is missing.
 #[test]
 fn a_preload_acts_until_an_eighth_of_the_friction_is_missing() {
     let awaited = |missing: i32| {
@@ -141,7 +141,7 @@ fn a_preload_acts_until_an_eighth_of_the_friction_is_missing() {
     assert!(matches!(awaited(1_300), Some(Awaited::Force(_))));
 }
 
-/// Half of the friction towards the target, and what the load takes away.
+/// Half of the friction towards the target, less the load.
 #[test]
 fn the_force_of_a_preload_is_half_the_friction() {
     let awaited = |reference_mm: i16, load: i32| {
@@ -156,7 +156,7 @@ fn the_force_of_a_preload_is_half_the_friction() {
     assert_eq!(awaited(150, 12_000), Some(Awaited::Force(-7_000)));
 }
 
-/// Two bands from where it stood, it has begun to move.
+/// Two bands from where it stood, the piston has begun to move.
 #[test]
 fn a_preload_ends_when_the_piston_has_moved_by_two_bands() {
     let model = model();

@@ -6,13 +6,12 @@ use super::{FuzzyError, mean_i32, mean_i64};
 /// A rule base of two inputs: `consequents[i][j]` is the singleton of the rule
 /// "first input is set i AND second input is set j".
 ///
-/// Full scale of a consequent is the table's own; the joint law reads
-/// ±32 767 as ±1.
+/// The table chooses the full scale of its consequents; the joint law reads ±32 767 as ±1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GridRules<const FIRST: usize, const SECOND: usize> {
     first: Partition<FIRST>,
     second: Partition<SECOND>,
-    /// Both inputs are fans: four rules at most fire.
+    /// Both inputs are fans, so that at most four rules fire.
     fan: bool,
     consequents: [[i16; SECOND]; FIRST],
 }
@@ -72,8 +71,7 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         self.fan
     }
 
-    /// As [`Self::infer`], of a base that [is a fan](Self::is_fan): the four rules
-    /// around the point.
+    /// As [`Self::infer`], for a base that [is a fan](Self::is_fan): evaluates the four rules around the point.
     #[inline]
     pub(crate) fn infer_fan(&self, first: i16, second: i16) -> i16 {
         let a = self.first.pair(first);
@@ -103,8 +101,8 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         ];
         let mut numerator = 0_i32;
         let mut denominator = 0_i32;
-        // Neighbours in a fan add up to at most levels + 1, so the four weights
-        // to at most 2 × levels + 4, and the sum to below 2^31.
+        // Neighbours in a fan add up to at most levels + 1. So the four weights add up to at most 2 × levels + 4, and
+        // the sum stays below 2^31.
         for (weight, y) in weights.into_iter().zip([y00, y01, y10, y11]) {
             let weight = weight as i32;
             numerator = numerator.wrapping_add(weight.wrapping_mul(i32::from(y)));
@@ -113,7 +111,7 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
         mean_i32(numerator, denominator)
     }
 
-    /// All rules: for sets that overlap more than their neighbours.
+    /// Evaluates all rules, for sets that overlap more than their neighbours.
     #[inline(never)]
     fn infer_all(&self, first: i16, second: i16) -> i16 {
         let mut second_levels = [0_u16; SECOND];
@@ -134,8 +132,8 @@ impl<const FIRST: usize, const SECOND: usize> GridRules<FIRST, SECOND> {
     }
 }
 
-/// Weighted sum and weight of one row. Of any length and in one copy: unrolled, it
-/// would be a kilobyte of an image that may never use it.
+/// Weighted sum and weight of one row. It takes any length and exists once: unrolled, it would cost a kilobyte in an
+/// image that may never use it.
 #[inline(never)]
 fn weigh(level: u16, others: &[u16], row: &[i16]) -> (i64, i64) {
     others

@@ -67,8 +67,8 @@ impl<const INPUTS: usize, const SETS: usize, const RULES: usize> RuleList<INPUTS
         Ok(Self { partitions, rules })
     }
 
-    /// The weighted mean of the singletons at a point; 0 where no rule fires.
-    /// Inputs are limited to the domains. Never panics.
+    /// The weighted mean of the singletons at a point; 0 if no rule fires. Inputs are limited to the domains. Never
+    /// panics.
     #[must_use]
     pub fn infer(&self, inputs: [i16; INPUTS]) -> i16 {
         let mut levels = [[0_u16; SETS]; INPUTS];
@@ -87,7 +87,7 @@ impl<const INPUTS: usize, const SETS: usize, const RULES: usize> RuleList<INPUTS
                     weight = weight.min(row.get(usize::from(set)).copied().unwrap_or(0));
                 }
             }
-            // 300 rules × 2^14 × 2^15 stay far inside 64 bits.
+            // 300 rules × 2^14 × 2^15 is far below 64 bits.
             let weight = i64::from(weight);
             numerator = numerator.wrapping_add(weight.wrapping_mul(i64::from(rule.consequent)));
             denominator = denominator.wrapping_add(weight);

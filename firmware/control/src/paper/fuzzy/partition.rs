@@ -14,9 +14,8 @@ pub const CHIP_LEVELS: u16 = 15;
 
 /// A triangular set, as the chip stores it: vertex, left and right semi-base.
 ///
-/// Membership is full at the vertex and falls linearly to zero over the
-/// semi-base on each side. A semi-base of 0 is a vertical side; with the vertex
-/// at an end of the domain that gives the outermost set.
+/// Membership is full at the vertex and falls linearly to zero over the semi-base on each side. A semi-base of 0 is a
+/// vertical side; with the vertex at an end of the domain this makes the outermost set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Triangle {
     /// Where membership is full.
@@ -52,9 +51,8 @@ impl Side {
     /// levels × 2^16 + width / 2 <= 2^30 + 2^15.
     #[inline]
     fn level(self, distance: u32, levels: u32) -> u32 {
-        // Past the side, its end: one value without a branch. There the fall is
-        // all of `levels` and never more, because width × slope is levels × 2^16 within
-        // half a width.
+        // Beyond the side, its end is used: the same value without a branch. There the fall is `levels` and never more,
+        // because width × slope is levels × 2^16 within half a width.
         let distance = distance.min(self.width);
         let fall = distance
             .wrapping_mul(self.slope)
@@ -80,8 +78,7 @@ pub struct Partition<const N: usize> {
     right: [Side; N],
 }
 
-/// Two neighbouring sets and their memberships at a point: every set that is
-/// active in a fan.
+/// Two neighbouring sets and their memberships at a point: the only sets that are active in a fan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pair {
     pub(super) index: usize,
@@ -111,8 +108,8 @@ impl<const N: usize> Partition<N> {
         Self::with_len(low, high, sets, N, levels)
     }
 
-    /// As [`Partition::with_levels`], of the first `len` sets alone: inputs of
-    /// one [`super::RuleList`] may have different numbers of sets.
+    /// As [`Partition::with_levels`], using only the first `len` sets: inputs of one [`super::RuleList`] may have
+    /// different numbers of sets.
     ///
     /// # Errors
     /// See [`FuzzyError`].
@@ -173,8 +170,8 @@ impl<const N: usize> Partition<N> {
         if first >= low as i32 || last <= high as i32 {
             return Err(FuzzyError::Gap);
         }
-        // Below the first vertex and above the last only one set may be active
-        // for the fast path; the pair search needs x between two vertices.
+        // For the fast path only one set may be active below the first vertex and above the last; the pair search needs
+        // x between two vertices.
         fan = fan && vertices[0] == low && vertices[len - 1] == high;
         Ok(Self {
             low,
@@ -188,8 +185,8 @@ impl<const N: usize> Partition<N> {
         })
     }
 
-    /// Evenly spaced sets that cross at half membership, from `low` to `high`.
-    /// The spacing is rounded to whole units where the domain does not divide.
+    /// Evenly spaced sets that cross at half membership, from `low` to `high`. The spacing is rounded to whole units
+    /// where the domain does not divide evenly.
     ///
     /// # Errors
     /// See [`FuzzyError`]; `N` must be at least 2.
@@ -216,8 +213,8 @@ impl<const N: usize> Partition<N> {
         Self::fan(vertices)
     }
 
-    /// Sets whose sides reach exactly to the neighbouring vertices, so that
-    /// memberships add up to one. The domain is first to last vertex.
+    /// Sets whose sides reach exactly to the neighbouring vertices, so that memberships add up to one. The domain runs
+    /// from the first to the last vertex.
     ///
     /// # Errors
     /// See [`FuzzyError`]; `N` must be at least 2.
@@ -273,7 +270,7 @@ impl<const N: usize> Partition<N> {
         self.len as usize
     }
 
-    /// Never: a partition has at least one set.
+    /// Always false: a partition has at least one set.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len == 0
@@ -298,8 +295,8 @@ impl<const N: usize> Partition<N> {
         }
     }
 
-    /// Membership of `input`, limited to the domain, in set `index`: 0…levels.
-    /// An index beyond the last set gives 0.
+    /// Membership of `input`, limited to the domain, in set `index`: 0…levels. Returns 0 for an index beyond the last
+    /// set.
     #[inline]
     #[must_use]
     pub fn membership(&self, index: usize, input: i16) -> u16 {
@@ -319,12 +316,11 @@ impl<const N: usize> Partition<N> {
         side.level(offset.unsigned_abs(), u32::from(self.levels)) as u16
     }
 
-    /// Memberships of `input` in the sets, one after another. In one copy, not
-    /// unrolled: for rule bases whose cost does not matter.
+    /// Memberships of `input` in all sets. It exists once and is not unrolled, for rule bases whose cost does not
+    /// matter.
     #[inline(never)]
     pub(super) fn memberships(&self, input: i16, levels: &mut [u16]) {
-        // A range instead of `enumerate`, whose counter is an overflow check that
-        // keeps a panic in the image.
+        // A range instead of `enumerate`, whose counter has an overflow check that leaves a panic in the image.
         for (index, level) in (0..N).zip(levels) {
             *level = self.membership(index, input);
         }
@@ -333,11 +329,11 @@ impl<const N: usize> Partition<N> {
     /// The two sets around `input` in a fan of all `N` sets.
     #[inline]
     pub(super) fn pair(&self, input: i16) -> Pair {
-        // Inner vertices at or below the input, by halves. Bounds from `N` alone, so
-        // that the loop unrolls and the look-ups below need no check.
+        // Binary search for the last inner vertex at or below the input. The bounds depend on `N` alone, so that the
+        // loop unrolls and the look-ups below need no check.
         let (mut index, mut rest) = (0_usize, N.saturating_sub(2));
         while rest > 0 {
-            // Of `rest` vertices behind `index`: whether the middle one is below.
+            // Whether the middle one of the `rest` vertices behind `index` is at or below the input.
             let half = rest.wrapping_add(1).wrapping_shr(1);
             let middle = index.wrapping_add(half);
             let vertex = self.vertices.get(middle).copied().unwrap_or(i16::MAX);
@@ -362,8 +358,8 @@ impl<const N: usize> Partition<N> {
                 upper: 0,
             };
         };
-        // Beyond the domain one distance is negative and counts as none; the other is
-        // beyond the side, which reaches no further than to the neighbour.
+        // Beyond the domain one distance is negative and counts as zero; the other is beyond the side, which reaches no
+        // further than the neighbour.
         let distance = |from: i16, to: i16| i32::from(to).wrapping_sub(i32::from(from)).max(0);
         let lower = fall.level(distance(low, input) as u32, levels);
         let upper = rise.level(distance(input, high) as u32, levels);

@@ -9,18 +9,18 @@ use crate::layer1::params::in_stroke;
 use crate::layer1::units::um_to_mm;
 use crate::setpoint::{Cylinder, LegPlan};
 
-/// A reach whose cylinders are slower than this …
+/// A reach has run against something if its cylinders are slower than this …
 const STALLED_MM_S: VelocityMmS = VelocityMmS::from_int(10);
-/// … for so many cycles (100 ms), …
+/// … for this many cycles (100 ms), …
 const STALLED: u16 = 10;
-/// … from so many after its begin on (250 ms), has run against something; so has a foot that touches
-/// then, or for more than [`STALLED`] cycles before. b5 waits where the foot touches: a joint's board
-/// takes a longer push without motion for a fault of the axis.
+/// … starting this many cycles after its beginning (250 ms); so has a foot that touches after that time, or earlier for
+/// more than [`STALLED`] cycles. b5 waits where the foot touches, because a joint's board takes a longer push without
+/// motion for a fault of the axis.
 const STARTED: u16 = 25;
-/// The foot goes back by so much over the ground …
+/// The foot goes back by this much over the ground …
 const BACK_MM: PositionMm = PositionMm::from_int(15);
-/// … for so many cycles (250 ms), in which it is lifted and the wheels slow down: they would push it
-/// against what it has met.
+/// … for this many cycles (250 ms), in which it is lifted and the wheels slow down; otherwise they would push it
+/// against the obstacle.
 const BACK: u16 = 25;
 
 /// The reach of a foot.
@@ -31,28 +31,28 @@ pub(super) struct Bump {
     touched: u16,
     met: bool,
     place: Option<Place>,
-    /// Cycles for which it goes on to go back there.
+    /// Remaining cycles of going back there.
     back: u16,
 }
 
-/// Where b5 waits, or goes back to.
+/// Where b5 waits, or to where it goes back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
-    /// Its stroke, if the robot stands.
+    /// Its stroke, if the robot were standing.
     stroke_mm: PositionMm,
-    /// What the wheel of this side has gone since, µm.
+    /// How far the wheel of this side has moved since, µm.
     way_um: i64,
-    /// Travel of that wheel then, µm.
+    /// Travel of that wheel at the start, µm.
     travel_um: i64,
 }
 
 impl Bump {
-    /// It has just run against something.
+    /// Whether it has just run against something.
     pub(super) const fn met(&self) -> bool {
         self.met
     }
 
-    /// Reference of b5 while the foot waits, or goes back.
+    /// Reference of b5 while the foot waits or goes back.
     pub(super) fn place_mm(&self) -> Option<PositionMm> {
         let place = self.place?;
         Some(in_stroke(
@@ -60,8 +60,8 @@ impl Bump {
         ))
     }
 
-    /// One cycle; `wanted_mm` is the reference of b5, `nailed` a foot with nails. Whether the foot has
-    /// run against something.
+    /// One cycle; `wanted_mm` is the reference of b5, `nailed` a foot with nails. Returns whether the foot has run
+    /// against something.
     pub(super) fn update(
         &mut self,
         plan: LegPlan,

@@ -1,4 +1,4 @@
-//! B6 lost contact and B2 tip guard: feet that should stand and do not.
+//! B6 lost contact and B2 tip guard: feet that should stand but do not.
 
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
@@ -9,24 +9,24 @@ use crate::setpoint::{LegPlan, WHEELS, WalkPlan};
 
 /// Cycles with all switches open after which a standing foot has lost the ground (50 ms).
 const LOST: u16 = 5;
-/// A leg extends after lost ground by so much in a cycle (100 mm/s) …
+/// After losing the ground a leg extends by this much per cycle (100 mm/s) …
 const FOLLOW_MM: PositionMm = PositionMm::from_int(1);
-/// … and so far.
+/// … up to this far.
 const FARTHEST_MM: PositionMm = PositionMm::from_int(20);
-/// The same while no foot carries: a leg that extends lifts the nose.
+/// The same while no foot carries load: a leg that extends then lifts the nose.
 const TIPPING_MM: PositionMm = PositionMm::from_int(10);
-/// Cycles without any foot on the ground after which the wheels give way (200 ms): what holds the nose
-/// up is their torque.
+/// Number of cycles without any foot on the ground after which the wheels give way (200 ms), because their torque is
+/// what holds the nose up.
 const GIVES_WAY: u16 = 20;
-/// Pace while a foot looks for the ground.
+/// Pace while a foot searches for the ground.
 const HALF: I16F16 = I16F16::lit("0.5");
 
-/// What is known of the feet's hold.
+/// State of the feet's contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Contact {
     /// Cycles for which all switches have been open without a break.
     open: [u16; WHEELS],
-    /// What a leg has extended after lost ground in this stance.
+    /// How far a leg has extended in this stance after losing the ground.
     followed_mm: [PositionMm; WHEELS],
     lost: [bool; WHEELS],
     deep: [bool; WHEELS],
@@ -34,22 +34,22 @@ pub(super) struct Contact {
 }
 
 impl Contact {
-    /// A foot stands on nothing and follows the ground.
+    /// Whether each foot stands on nothing and follows the ground.
     pub(super) const fn lost(&self) -> [bool; WHEELS] {
         self.lost
     }
 
-    /// It has followed as far as it may.
+    /// Whether each foot has followed as far as it may.
     pub(super) const fn deep(&self) -> [bool; WHEELS] {
         self.deep
     }
 
-    /// The wheels hold the nose up: they are to give way.
+    /// Whether the wheels hold the nose up and should give way.
     pub(super) fn gives_way(&self) -> bool {
         self.tipping && self.open.iter().all(|open| *open > GIVES_WAY)
     }
 
-    /// What legs have extended.
+    /// How far the legs have extended.
     pub(super) const fn followed_mm(&self) -> [PositionMm; WHEELS] {
         self.followed_mm
     }
@@ -77,7 +77,7 @@ impl Contact {
             *open = if touches { 0 } else { open.saturating_add(1) };
             *hangs = plan.leg(side) == LegPlan::Stance && *open > LOST;
         }
-        // Whatever they are about: one that swings carries nothing either.
+        // Whatever the legs are doing: a swinging foot carries nothing, either.
         let none_carries = self.open.iter().all(|open| *open > LOST);
         let tips = enabled.contains(Behaviour::TipGuard) && none_carries;
         let mut acts = [None; 3];

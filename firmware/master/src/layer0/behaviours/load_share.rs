@@ -1,7 +1,7 @@
-//! B10 load share: two legs that both stand are to work alike.
+//! B10 load share: two legs that both stand should share the work equally.
 //!
-//! The only sign of a leg's load is how its vertical cylinder works: the one with the greater effort
-//! over the last half second gives way, the other follows.
+//! The only sign of a leg's load is the effort of its vertical cylinder: the one with the greater effort, smoothed over
+//! 0.32 s, gives way, and the other follows.
 
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
@@ -10,11 +10,11 @@ use super::{SIDES, Senses, eased};
 use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, WHEELS, WalkPlan};
 
-/// Difference of the efforts that is none.
+/// Difference of the efforts below which they count as equal.
 const ALIKE: I16F16 = I16F16::lit("0.2");
-/// Effort counts over so many cycles, as a power of two (0.32 s).
+/// Number of cycles over which the effort is smoothed, as a power of two (0.32 s).
 const SMOOTH: u32 = 5;
-/// A leg gives way, or back, by so much in a cycle (30 mm/s for both), up to so much.
+/// A leg gives way, or returns, by this much per cycle (30 mm/s for both), up to this much.
 const STEP_MM: PositionMm = PositionMm::from_raw(9_830);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(10);
 
@@ -22,19 +22,19 @@ const FARTHEST_MM: PositionMm = PositionMm::from_int(10);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct LoadShare {
     effort: [I16F16; WHEELS],
-    /// What each leg stands longer.
+    /// How much longer each leg stands.
     longer_mm: [PositionMm; WHEELS],
     shares: bool,
 }
 
 impl LoadShare {
-    /// What legs stand longer.
+    /// How much longer each leg stands.
     pub(super) const fn longer_mm(&self) -> [PositionMm; WHEELS] {
         self.longer_mm
     }
 
-    /// Nothing is shared any more: forgets all but what the legs stand longer, which goes as slowly
-    /// as it came.
+    /// Nothing is shared any more: forgets everything except how much longer the legs stand, which is reduced as slowly
+    /// as it grew.
     pub(super) fn rest(&mut self) {
         *self = Self {
             longer_mm: self.longer_mm.map(|longer| eased(longer, STEP_MM)),
@@ -53,7 +53,7 @@ impl LoadShare {
             self.rest();
             for (side, longer) in SIDES.into_iter().zip(&mut self.longer_mm) {
                 if matches!(plan.leg(side), LegPlan::Lower(_)) {
-                    // It stands anew where it touches.
+                    // It stands afresh where it touches.
                     *longer = PositionMm::ZERO;
                 }
             }

@@ -1,5 +1,5 @@
-//! What a walking robot does by itself: eleven behaviours, each a state and an update over what
-//! the boards say in their slots. They go on when layer 1 stands still.
+//! What a walking robot does by itself: eleven behaviours, each a state and an update from what the boards report in
+//! their slots. They continue when layer 1 stops.
 //!
 //! | | behaviour | file |
 //! |---|---|---|
@@ -12,8 +12,8 @@
 //! | B10 | load share | `load_share` |
 //! | B11 | stroke governor | layer 1: only the gait knows how long a swing will take |
 //!
-//! What each wants of the wheels meets in `pace`; the first in priority wins, which among speeds is
-//! the slowest. `orphan` goes on for a layer 1 that stands still.
+//! The demands of all behaviours on the wheels are combined in `pace`; the one with the highest priority wins, which
+//! among speeds is the slowest. `orphan` takes over for a layer 1 that has stopped.
 
 mod bump;
 mod contact;
@@ -49,7 +49,7 @@ use slip::Slip;
 use stuck::Stuck;
 use touchdown::Touchdown;
 
-/// What a joint board says in its slot.
+/// What a joint board reports in its slot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointSense {
     /// Stroke.
@@ -58,7 +58,7 @@ pub struct JointSense {
     pub velocity_mm_s: VelocityMmS,
     /// Duty of the drive.
     pub duty: Duty,
-    /// The drive is at its limit.
+    /// The duty is at its limit.
     pub saturated: bool,
 }
 
@@ -75,16 +75,16 @@ impl JointSense {
     }
 }
 
-/// What a wheel board says in its slot.
+/// What a wheel board reports in its slot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WheelSense {
     /// Travel of the rim since start-up, µm.
     pub travel_um: i64,
-    /// Command of the motor, -100 to 100 %.
+    /// Motor command, -100 to 100 %.
     pub effort_percent: i16,
 }
 
-/// All that the behaviours sense, made of slot replies alone.
+/// Everything that the behaviours sense, derived from slot replies alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Senses {
     /// Switches of the feet, in each leg's frame.
@@ -139,7 +139,7 @@ pub struct Behaving {
 const SIDES: [Side; WHEELS] = [Side::Left, Side::Right];
 
 impl Behaving {
-    /// At rest; those of the set may act.
+    /// At rest; those in the set may act.
     #[must_use]
     pub fn new(enabled: Behaviours, geometry: WalkGeometry) -> Self {
         Self {
@@ -161,8 +161,8 @@ impl Behaving {
         }
     }
 
-    /// Changes the set of those that may act. What one that may no longer has made of a reference
-    /// goes as slowly as it came, or with the stance.
+    /// Changes the set of behaviours that may act. What a disabled behaviour has added to a reference is removed as
+    /// slowly as it was added, or with the end of the stance.
     pub fn enable(&mut self, enabled: Behaviours) {
         self.enabled = enabled;
         self.acts.enabled = enabled;
@@ -176,20 +176,19 @@ impl Behaving {
         };
     }
 
-    /// How often each has acted.
+    /// How often each behaviour has acted.
     #[must_use]
     pub const fn tally(&self) -> &Tally {
         &self.tally
     }
 
-    /// What layer 1 is told.
+    /// What is reported to layer 1.
     #[must_use]
     pub const fn acts(&self) -> &Acts {
         &self.acts
     }
 
-    /// Takes note of a cycle of a walk; to be called once per cycle. `setpoints` are those that
-    /// held in it.
+    /// Observes a cycle of a walk; to be called once per cycle. `setpoints` are those that were in force in it.
     pub fn observe(
         &mut self,
         senses: &Senses,
@@ -240,7 +239,7 @@ impl Behaving {
                 }
                 match act {
                     Some(act) => tell(act),
-                    // Where the ground was expected it is counted, and nothing told.
+                    // Ground where it was expected is counted, but not reported.
                     None if lands => expected = expected.saturating_add(1),
                     None => {}
                 }
@@ -290,8 +289,8 @@ impl Behaving {
         };
     }
 
-    /// No walk. What a behaviour has made of references goes slowly where the robot stands in the
-    /// last ones; where these end, at once. What the wheels were held back stays.
+    /// No walk is under way. What behaviours have added to references is removed slowly while the robot stands in the
+    /// last ones, and at once where these end. The travel that was withheld from the wheels stays withheld.
     fn rest(&mut self, phase: Phase) {
         let (mut slip, mut load_share, mut overload) = (self.slip, self.load_share, self.overload);
         if matches!(phase, Phase::Idle | Phase::Hold) {
@@ -318,8 +317,8 @@ impl Behaving {
         self.pace.give_way(false);
     }
 
-    /// The set-point of joint index 0..6 after what the behaviours make of it, with what the walk is
-    /// about; where none is under way, what is left of them.
+    /// The set-point of joint index 0..6 after the behaviours, given the plan of the walk; without a walk, after what
+    /// remains of them.
     #[must_use]
     pub fn apply(
         &self,
@@ -364,19 +363,19 @@ impl Behaving {
         self.overload.apply(joint, out)
     }
 
-    /// The wheels of a walk, at the pace that the behaviours allow. `fresh`: layer 1 has just given
-    /// these references; otherwise it is late, and the wheels go on as they did.
+    /// The wheels of a walk, at the pace that the behaviours allow. `fresh`: layer 1 has just provided these
+    /// references; otherwise it is late, and the wheels continue as before.
     pub fn lead(&mut self, travel: TravelSetpoint, walks: bool, fresh: bool) -> TravelSetpoint {
         self.pace.lead(travel, walks, fresh)
     }
 
-    /// Layer 1 stands still: the wheels slow down to a stop.
+    /// Layer 1 has stopped: the wheels slow down to a stop.
     pub(super) fn stop_wheels(&mut self) {
         self.pace.wish(I16F16::ZERO);
     }
 }
 
-/// What is left of something that is to go by `step` in a cycle.
+/// What is left of a value that is reduced by `step` per cycle.
 fn eased(mm: PositionMm, step: PositionMm) -> PositionMm {
     mm.saturating_sub(mm.limit(PositionMm::ZERO.saturating_sub(step), step))
 }

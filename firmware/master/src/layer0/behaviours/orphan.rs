@@ -1,8 +1,7 @@
 //! A walk whose layer 1 has stopped: what layer 0 does with the last references.
 //!
-//! Standing feet move with the ground until the wheels have stopped. When layer 1 is given up, a
-//! foot in the air is set down where it is; then the robot stands, and its behaviours continue for a
-//! while ([`CARRIED`]).
+//! Standing feet move with the ground until the wheels have stopped. When layer 1 is given up, a foot in the air is set
+//! down where it is; then the robot stands, and its behaviours continue for a while ([`CARRIED`]).
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -16,22 +15,22 @@ use crate::setpoint::{
     Setpoints, WHEELS,
 };
 
-/// Cycles for which a walk is carried on after layer 1 has been given up (5 s): it stands after 0.6 s,
-/// and answers ground that gives way for the rest. Then no leg moves any more.
+/// Number of cycles for which a walk is carried on after layer 1 has been given up (5 s): the robot stands after 0.6 s,
+/// and reacts to ground that gives way for the rest. After that no leg moves any more.
 pub(in crate::layer0) const CARRIED: u16 = 500;
 
-/// What is remembered for a layer 1 that stops.
+/// What is remembered in case layer 1 stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::layer0) struct Orphan {
-    /// Stroke of b6 at which each leg stood last.
+    /// Stroke of b6 at which each leg last stood.
     stood_mm: [PositionMm; WHEELS],
     ways: Ways,
-    /// Layer 1 has been given up, for so many cycles: what it may still say is ignored.
+    /// Layer 1 has been given up, this many cycles ago; whatever it may still send is ignored.
     pub(in crate::layer0) given_up: Option<u16>,
 }
 
 impl Orphan {
-    /// Takes note of references that layer 1 has just given.
+    /// Notes references that layer 1 has just provided.
     pub(in crate::layer0) fn note(&mut self, setpoints: &Setpoints, acts: &Acts) {
         self.ways = Ways::default();
         let Some(plan) = setpoints.walk else {
@@ -51,7 +50,7 @@ impl Orphan {
         }
     }
 
-    /// A cycle without layer 1: changes its last references.
+    /// A cycle without layer 1: updates its last references.
     pub(in crate::layer0) fn carry(
         &mut self,
         setpoints: &mut Setpoints,
@@ -75,7 +74,7 @@ impl Orphan {
                 LegPlan::Stance => {
                     follow(joints, side, moved, geometry);
                     let deep = acts.deep.get(at).copied().unwrap_or(false);
-                    // Until then layer 1 may come back, and go on from what it knows.
+                    // Until it is given up, layer 1 may come back and continue from what it knows.
                     if deep && given_up {
                         let beyond = acts.beyond_mm.get(at).copied().unwrap_or_default();
                         change(joints.get_mut(side.joint(Cylinder::Vertical)), |b6| {
@@ -124,7 +123,7 @@ impl Orphan {
     }
 }
 
-/// A standing foot goes with the ground.
+/// A standing foot moves with the ground.
 fn follow(
     joints: &mut [Option<JointSetpoint>; JOINTS],
     side: Side,
@@ -136,7 +135,7 @@ fn follow(
         let joint = joints.get(side.joint(cylinder)).copied().flatten();
         joint.unwrap_or_default().reference_mm
     });
-    // A robot that stands would creep by the rounding of every cycle.
+    // Otherwise a standing robot would creep by the rounding of every cycle.
     let led = foot_m(geometry, side, strokes).filter(|_| moved != Twist::default());
     let led = led.and_then(|foot| {
         let ([x, y], [dx, dy]) = (foot, moved.ground_m_s(geometry, side, foot));
@@ -151,7 +150,7 @@ fn follow(
     }
 }
 
-/// Changes a reference that is there; it has no speed of its own any more.
+/// Changes a reference if there is one, and removes its velocity.
 fn change(slot: Option<&mut Option<JointSetpoint>>, with: impl FnOnce(&mut JointSetpoint)) {
     if let Some(Some(joint)) = slot {
         joint.velocity_mm_s = VelocityMmS::ZERO;

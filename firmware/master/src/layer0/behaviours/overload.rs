@@ -1,7 +1,7 @@
-//! B1 overload: a cylinder that pulls at its limit and does not move.
+//! B1 overload: a cylinder that works at its limit and does not move.
 //!
-//! Its valves would shut with the pull trapped if it only held; it goes back a little instead, and
-//! stays there until its leg does something else. A blocked wheel is `stuck`'s.
+//! If it only held, its valves would shut with the force trapped. Instead it goes back a little, and stays there until
+//! its leg does something else. A blocked wheel is handled by `stuck`.
 
 use core::mem::discriminant;
 
@@ -12,13 +12,13 @@ use crate::behaviour::{Act, Behaviour, Behaviours};
 use crate::layer1::params::STROKE_MM;
 use crate::setpoint::{JOINTS, JointSetpoint, LegPlan, WHEELS, WalkPlan};
 
-/// An axis that has been at its limit for so many cycles (0.5 s) …
+/// An axis that has been at its limit for this many cycles (0.5 s) …
 const LIMITED: u16 = 50;
-/// … and has moved less than this is overloaded.
+/// … and has moved by less than this is overloaded.
 const MOVED_MM: PositionMm = PositionMm::from_int(5);
-/// It goes back by so much: most of the pull is gone.
+/// It goes back by this much, which removes most of the force.
 const BACK_MM: PositionMm = PositionMm::from_int(5);
-/// Afterwards it may go so much farther from there with every cycle (300 mm/s).
+/// Afterwards its reference may move this much further from there in every cycle (300 mm/s).
 const FREE_MM: PositionMm = PositionMm::from_int(3);
 
 /// Where an axis holds.
@@ -26,16 +26,16 @@ const FREE_MM: PositionMm = PositionMm::from_int(3);
 struct Held {
     /// Stroke.
     at_mm: PositionMm,
-    /// How far from there its reference may be; `None`: it holds.
+    /// How far from there its reference may be; `None`: the axis holds.
     free_mm: Option<PositionMm>,
 }
 
 /// An axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Axis {
-    /// Cycles at its limit.
+    /// Number of cycles at its limit.
     limited: u16,
-    /// Stroke from which its motion counts.
+    /// Stroke from which its motion is measured.
     from_mm: PositionMm,
     held: Option<Held>,
 }
@@ -45,7 +45,7 @@ impl Axis {
         matches!(self.held, Some(Held { free_mm: None, .. }))
     }
 
-    /// Lets go: its reference gets free little by little.
+    /// Lets go: its reference is freed gradually.
     fn release(&mut self) {
         self.limited = 0;
         if let Some(held) = &mut self.held {
@@ -53,7 +53,7 @@ impl Axis {
         }
     }
 
-    /// One cycle on the way from where it was held.
+    /// One cycle of moving away from where it was held.
     fn get_free(&mut self) {
         if let Some(Held {
             free_mm: Some(free),
@@ -89,7 +89,7 @@ impl Overload {
         }
     }
 
-    /// One cycle; tells of the first axis that it finds overloaded.
+    /// One cycle; reports the first axis that it finds overloaded.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
@@ -140,7 +140,7 @@ impl Overload {
         told
     }
 
-    /// The set-point of an axis: where it is overloaded, where it holds.
+    /// The set-point of an axis, limited to where it holds if it is overloaded.
     pub(super) fn apply(&self, joint: usize, setpoint: JointSetpoint) -> JointSetpoint {
         let Some(held) = self.axes.get(joint).and_then(|axis| axis.held) else {
             return setpoint;

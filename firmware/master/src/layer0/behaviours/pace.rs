@@ -1,24 +1,24 @@
 //! The wheels of a walk, at the pace that the behaviours allow.
 //!
-//! Where no foot carries, what holds the nose up is the torque of the wheels: wheels that are held keep
-//! it up, legs that extend do not reach the ground. So they go back until a foot carries.
+//! If no foot carries load, the torque of the wheels is what holds the nose up: wheels that are held keep it up, and
+//! legs that extend do not reach the ground. So the wheels go back until a foot carries load.
 //!
-//! Layer 1 gives the position that the wheels should have. Travel that the behaviours withhold is
-//! given up, not caught up. While layer 1 is late the wheels continue as before, and slow down if it
-//! stays away; the distance covered in the meantime is not taken back.
+//! Layer 1 provides the position that the wheels should have. Travel that the behaviours withhold is given up, not
+//! caught up. While layer 1 is late the wheels continue as before, and slow down if it stays away; the distance covered
+//! in the meantime is not taken back.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::setpoint::{TravelSetpoint, WHEELS, WheelTravel};
 
-/// Change of a wheel's speed in a cycle while the pace changes: 0.3 m/s².
+/// Change of a wheel's speed per cycle while the pace changes: 0.3 m/s².
 const STEP_MM_S: I16F16 = I16F16::lit("3");
 /// Wheels that give way do so at this speed …
 const BACK_MM_S: I16F16 = I16F16::lit("50");
-/// … and by so much, mm: about blocked wheels the chassis turns by 30 degrees.
+/// … and by this much, mm: with blocked wheels the chassis turns about them by 30 degrees.
 const BACK_MM: I16F16 = I16F16::lit("80");
-/// How often they do is counted over a way of half a metre.
+/// How often they do so is counted over half a metre.
 const COUNTED_MM: I16F16 = I16F16::lit("500");
 /// Bus cycle, s.
 const CYCLE_S: I16F16 = I16F16::lit("0.01");
@@ -27,20 +27,20 @@ const CYCLE_S: I16F16 = I16F16::lit("0.01");
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pace {
     segment: Option<u16>,
-    /// Travel that layer 1 has told last.
+    /// Travel as last provided by layer 1.
     told_mm: [PositionMm; WHEELS],
-    /// Travel that the wheels were led, and at which speed, mm/s.
+    /// Travel that was commanded to the wheels, and its speed, mm/s.
     led_mm: [PositionMm; WHEELS],
     led_mm_s: [I16F16; WHEELS],
-    /// Layer 1 told nothing in the last cycle.
+    /// Layer 1 provided nothing in the last cycle.
     late: bool,
     share: I16F16,
     wish: I16F16,
-    /// The wheels are to give way, do so at this speed, mm/s, and have done so, mm.
+    /// Whether the wheels should give way, at which speed they do, mm/s, and by how much they have, mm.
     gives_way: bool,
     back_mm_s: I16F16,
     back_mm: I16F16,
-    /// How often they have given way, and the way since the first time, mm.
+    /// How often they have given way, and the travel since the first time, mm.
     gave: u8,
     since_mm: I16F16,
 }
@@ -65,17 +65,17 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Share of the walk's speed that the wheels have.
+    /// The wheels' share of the walk's speed.
     pub(super) const fn share(&self) -> I16F16 {
         self.share
     }
 
-    /// The share that is wanted, 0 to 1.
+    /// The wanted share, 0 to 1.
     pub(super) fn wish(&mut self, share: I16F16) {
         self.wish = share;
     }
 
-    /// Whether the wheels are to give way: what holds the nose up is their torque.
+    /// Whether the wheels should give way, because their torque holds the nose up.
     pub(super) fn give_way(&mut self, gives_way: bool) {
         if gives_way && !self.gives_way {
             self.gave = self.gave.saturating_add(1);
@@ -83,17 +83,17 @@ impl Pace {
         self.gives_way = gives_way;
     }
 
-    /// How often the wheels have given way on the last half metre.
+    /// How often the wheels have given way over the last half metre.
     pub(super) const fn gave_way(&self) -> u8 {
         self.gave
     }
 
-    /// Counts anew.
+    /// Restarts the count.
     pub(super) fn forget(&mut self) {
         self.gave = 0;
     }
 
-    /// What the wheels are led in a cycle, mm, counts from the first time that they gave way.
+    /// Adds the wheels' travel of a cycle, mm, which counts from the first time that they gave way.
     fn count_way(&mut self, step_mm: I16F16) {
         self.since_mm = match self.gave {
             0 => I16F16::ZERO,
@@ -104,7 +104,7 @@ impl Pace {
         }
     }
 
-    /// What the wheels are led back in a cycle, mm.
+    /// How far the wheels go back in a cycle, mm.
     pub(super) fn back_mm(&self) -> PositionMm {
         PositionMm::new(self.back_mm_s.saturating_mul(CYCLE_S))
     }
@@ -121,7 +121,7 @@ impl Pace {
             self.told_mm = [PositionMm::ZERO; WHEELS];
             self.led_mm = [PositionMm::ZERO; WHEELS];
         }
-        // Before the share: wheels stop before they go back.
+        // Before the share is updated: wheels stop before they go back.
         let goes_back = self.back_mm_s > I16F16::ZERO;
         self.slew_back(walks);
         if walks {
@@ -166,8 +166,7 @@ impl Pace {
         out
     }
 
-    /// Brings the speed at which the wheels give way as near to what is wanted as their acceleration
-    /// allows.
+    /// Brings the speed at which the wheels give way as close to the wanted one as their acceleration allows.
     fn slew_back(&mut self, walks: bool) {
         let stopped = self.share == I16F16::ZERO;
         let goes = walks && stopped && self.gives_way && self.back_mm < BACK_MM;
@@ -184,11 +183,11 @@ impl Pace {
         };
     }
 
-    /// Brings the share as near to the wish as the acceleration of the wheels allows, whatever
-    /// layer 1 makes of their speed meanwhile.
+    /// Brings the share as close to the wish as the acceleration of the wheels allows, whatever layer 1 does with their
+    /// speed meanwhile.
     fn slew(&mut self, travel: &TravelSetpoint, goes_back: bool) {
         if self.share == I16F16::ONE && self.wish == I16F16::ONE {
-            // Nothing is held back: layer 1 has its own limits.
+            // Nothing is withheld: layer 1 has its own limits.
             return;
         }
         let (mut least, mut most) = (I16F16::ZERO, I16F16::ONE);
@@ -197,13 +196,13 @@ impl Pace {
             least = least.max(slowest);
             most = most.min(fastest);
         }
-        // Where two wheels do not agree, slowly.
+        // If two wheels disagree, the lower share wins.
         let wish = if goes_back { I16F16::ZERO } else { self.wish };
         self.share = wish.max(least).min(most);
     }
 }
 
-/// Shares of a wheel's speed, 0 to 1, that are within [`STEP_MM_S`] of the speed that it was led at.
+/// Shares of a wheel's speed, 0 to 1, that are within [`STEP_MM_S`] of its last commanded speed.
 fn shares(wheel: &WheelTravel, led_mm_s: I16F16) -> [I16F16; 2] {
     let speed = wheel.velocity_mm_s.get();
     let (speed, led) = if speed < I16F16::ZERO {

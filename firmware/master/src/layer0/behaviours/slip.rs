@@ -1,8 +1,8 @@
-//! B7 slip: wheels that turn faster than the standing legs go with the ground.
+//! B7 slip: wheels that turn faster than the standing legs move with the ground.
 //!
-//! Both are ways of the feet over the last 0.3 s: as the wheels tell it, turns included, and as the
-//! legs do, yaw included. A foot that holds cannot go on faster than the robot; wheels that slip do.
-//! If feet and wheels slip alike nothing on board can tell.
+//! Both are distances of the feet over the last 0.3 s: according to the wheels, turns included, and according to the
+//! legs, yaw included. A foot that holds cannot move faster than the robot; wheels that slip do. If feet and wheels
+//! slip alike, nothing on board can tell.
 
 use fixed::types::I16F16;
 use wheeleg_units::PositionMm;
@@ -14,41 +14,41 @@ use crate::contact::Side;
 use crate::layer1::walk::{Twist, WalkGeometry};
 use crate::setpoint::{LegPlan, WHEELS, WalkPlan};
 
-/// Cycles over which ways are compared (0.3 s).
+/// Number of cycles over which the distances are compared (0.3 s).
 const WINDOW: usize = 30;
-/// Way of the ground below which nothing is compared, m (20 mm/s).
+/// Distance of the ground below which nothing is compared, m (20 mm/s).
 const LEAST_M: f32 = 0.006;
-/// A leg counts when it has stood for so many cycles (0.3 s): before, its b5 still follows from where
-/// it landed.
+/// A leg counts once it has stood for this many cycles (0.3 s): before that its b5 is still moving from where it
+/// landed.
 const STOOD: u16 = 30;
-/// Slip above which for so many cycles (0.3 s) the legs pull, and below which they have pulled
-/// enough. A foot that settles in sand looks like slip for a shorter time: told at once, it was 12
-/// false alarms in 60 s on the level.
+/// Slip above which for [`LASTS`] cycles (0.3 s) the legs pull, and below which ([`HOLDS`]) they have pulled enough. A
+/// foot that settles in sand looks like slip for a shorter time: without the delay there were 12 false alarms in 60 s
+/// on level ground.
 const SLIPS: I16F16 = I16F16::lit("0.15");
 const LASTS: u16 = 30;
 const HOLDS: I16F16 = I16F16::lit("0.10");
-/// Slip at which wheels pull most in the soils that we have: more of it only digs them in, and they
-/// slow down. Below it the slip follows from the pull that is asked for, not from the speed.
+/// Slip at which wheels pull most in the soils that are modelled: more of it only digs them in, so they slow down.
+/// Below it the slip follows from the pull that is demanded, not from the speed.
 const BEST: I16F16 = I16F16::lit("0.75");
-/// Change of the pace in a cycle, down and up, and its smallest.
+/// Decrease and increase of the pace per cycle, and its smallest value.
 const SLOWER: I16F16 = I16F16::lit("0.02");
 const FASTER: I16F16 = I16F16::lit("0.005");
 const LEAST: I16F16 = I16F16::lit("0.3");
-/// The lead of a pulling leg's b5 changes by so much in a cycle (50 mm/s), up to so much.
+/// The lead of a pulling leg's b5 changes by this much per cycle (50 mm/s), up to this much.
 const PULL_MM: PositionMm = PositionMm::from_raw(1 << 15);
 const FARTHEST_MM: PositionMm = PositionMm::from_int(30);
 
-/// Ways of a cycle, m.
+/// Motions in a cycle, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Way {
-    /// The robot's, as its wheels tell.
+    /// Motion of the robot, according to its wheels.
     robot: Twist,
-    /// The ground's below the feet that count, and that of these feet; means, seen from the robot.
+    /// Motion of the ground below the feet that count, and of these feet; means, as seen from the robot.
     ground: [f32; 2],
     feet: [f32; 2],
 }
 
-/// What is known of the wheels' hold.
+/// State of the wheels' grip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Slip {
     ways_m: [Way; WINDOW],
@@ -62,7 +62,7 @@ pub(super) struct Slip {
     above: u16,
     slips: bool,
     pace: I16F16,
-    /// What b5 leads by, positive where it pulls the robot forward.
+    /// Lead of b5, positive where it pulls the robot forward.
     lead_mm: [PositionMm; WHEELS],
 }
 
@@ -88,12 +88,12 @@ impl Slip {
         self.pace
     }
 
-    /// What b5 of a leg leads by, positive where it pulls the robot forward.
+    /// Lead of b5 of a leg, positive where it pulls the robot forward.
     pub(super) fn lead_mm(&self, side: Side) -> PositionMm {
         self.lead_mm.get(side.index()).copied().unwrap_or_default()
     }
 
-    /// No leg pulls any more: forgets all but the leads, which go as slowly as they came.
+    /// No leg pulls any more: forgets everything but the leads, which are reduced as slowly as they grew.
     pub(super) fn rest(&mut self) {
         *self = Self {
             lead_mm: self.lead_mm.map(|lead| eased(lead, PULL_MM)),
@@ -101,7 +101,7 @@ impl Slip {
         };
     }
 
-    /// One cycle; tells when the wheels begin to slip.
+    /// One cycle; reports when the wheels begin to slip.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
@@ -144,7 +144,7 @@ impl Slip {
         (self.slips && !before).then_some(Act::Slip)
     }
 
-    /// Brings the leads of the legs nearer to what is wanted.
+    /// Brings the leads of the legs closer to the wanted ones.
     fn pull(&mut self, plan: &WalkPlan, geometry: &WalkGeometry) {
         let robot = self.total().robot;
         for (side, lead) in SIDES.into_iter().zip(&mut self.lead_mm) {
@@ -160,7 +160,7 @@ impl Slip {
         }
     }
 
-    /// Ways of this cycle.
+    /// Motions in this cycle.
     fn way(&mut self, senses: &Senses, plan: &WalkPlan, geometry: &WalkGeometry) -> Way {
         let mut way = Way {
             robot: moved(geometry, self.ways.since(senses)),
@@ -191,7 +191,7 @@ impl Slip {
         way
     }
 
-    /// Ways of the whole window.
+    /// Motions over the whole window.
     fn total(&self) -> Way {
         let mut all = Way::default();
         for way in &self.ways_m {
@@ -203,8 +203,7 @@ impl Slip {
         all
     }
 
-    /// Slip, 0 to 1: the share of the ground's way that the feet have not gone along with. 0 where the wheels
-    /// hardly turn.
+    /// Slip, 0 to 1: the share of the ground's motion that the feet have not followed. 0 if the wheels hardly turn.
     fn measure(&self) -> f32 {
         let all = self.total();
         let dot = |[ax, ay]: [f32; 2], [bx, by]: [f32; 2]| ax * bx + ay * by;

@@ -1,4 +1,4 @@
-//! B9 stuck: a robot that is driven and does not get on. What it then tries is layer 1's.
+//! B9 stuck: a robot that is driven but makes no progress. What it then tries is up to layer 1.
 
 use wheeleg_units::PositionMm;
 
@@ -7,47 +7,47 @@ use super::{SIDES, Senses};
 use crate::behaviour::{Behaviour, Behaviours};
 use crate::setpoint::{Cylinder, LegPlan, Setpoints, WHEELS, WalkPlan};
 
-/// A standing leg that has moved by less than this, …
+/// There is no progress if the standing legs have moved by less than this, …
 const PROGRESS_MM: PositionMm = PositionMm::from_int(5);
-/// … or wheels that have turned by less than this, µm, …
+/// … or the wheels have turned by less than this, µm, …
 const PROGRESS_UM: i64 = 10_000;
-/// … in so many cycles (3 s) make no progress: legs that step on the spot move, too.
+/// … in this many cycles (3 s): legs that step on the spot move, too.
 const PATIENCE: u16 = 300;
-/// So many swings in a row that ran against something make no progress, whatever wheels and legs
-/// do: before a wall both may slip alike.
+/// This many consecutive swings that ran against something are no progress, whatever wheels and legs do: in front of a
+/// wall both may slip alike.
 const BUMPED: u8 = 3;
-/// So often wheels that give way on half a metre get it nowhere: soft ground carries the nose up again and again.
+/// Wheels that give way this often within half a metre make no progress: soft ground lifts the nose again and again.
 const GAVE_WAY: u8 = 5;
-/// After a robot has been stuck so many of both are enough, until its wheels have gone so far, µm (0.5 m).
+/// After a robot has been stuck, this many of either are enough, until its wheels have moved this far, µm (0.5 m).
 const AGAIN: u8 = 2;
 const AGAIN_UM: i64 = 500_000;
-/// Motor command that is all that a wheel has, %, …
+/// A wheel is blocked if its motor command is above this, nearly its maximum, %, …
 const EFFORT_PERCENT: u16 = 90;
-/// … at less than this share of the speed asked for, 1/n, …
+/// … at less than this share of the demanded speed, 1/n, …
 const SPEED_SHARE: i64 = 5;
-/// … for so many cycles (1 s).
+/// … for this many cycles (1 s).
 const BLOCKED: u16 = 100;
 
 /// Progress of a walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Stuck {
-    /// Strokes of yaw and b5 from which progress counts.
+    /// Strokes of yaw and b5 from which progress is measured.
     anchor: [[PositionMm; 2]; WHEELS],
-    /// There is something to count from.
+    /// There is something to measure from.
     begun: bool,
     /// A leg has moved since the last progress.
     moved: bool,
-    /// Travel of the wheels from which progress counts, µm.
+    /// Travel of the wheels from which progress is measured, µm.
     anchor_um: [i64; WHEELS],
-    /// How often the wheels have given way of late.
+    /// How often the wheels have given way recently.
     gave_way: u8,
-    /// Cycles since a standing leg has moved.
+    /// Number of cycles without progress.
     idle: u16,
-    /// The swing of a leg has run against something.
+    /// The present swing of each leg has run against something.
     bumped: [bool; WHEELS],
-    /// Swings in a row that have.
+    /// Number of consecutive swings that have.
     bumps: u8,
-    /// Travel of the wheels when the robot was stuck last, µm.
+    /// Travel of the wheels when the robot was last stuck, µm.
     stuck_um: Option<[i64; WHEELS]>,
     /// Cycles for which a wheel has been blocked.
     blocked: [u16; WHEELS],
@@ -55,13 +55,13 @@ pub(super) struct Stuck {
 }
 
 impl Stuck {
-    /// How often the wheels have given way of late.
+    /// Sets how often the wheels have given way recently.
     pub(super) const fn wheels_gave_way(&mut self, times: u8) {
         self.gave_way = times;
     }
 
-    /// One cycle; whether the robot is stuck. It is told again after as long a time. `landed`: feet
-    /// that have just come down; `bumps`: that have just run against something.
+    /// One cycle; returns whether the robot is stuck, and again after the same time. `landed`: feet that have just come
+    /// down; `bumps`: feet that have just run against something.
     pub(super) fn update(
         &mut self,
         senses: &Senses,
@@ -103,7 +103,7 @@ impl Stuck {
         stuck
     }
 
-    /// Counts the swings in a row that ran against something.
+    /// Counts the consecutive swings that ran against something.
     fn count(&mut self, landed: [bool; WHEELS], bumps: [bool; WHEELS]) {
         for ((bumped, landed), bump) in self.bumped.iter_mut().zip(landed).zip(bumps) {
             *bumped |= bump;
@@ -118,7 +118,7 @@ impl Stuck {
         }
     }
 
-    /// Whether a standing leg and a wheel have moved since they were last found to have.
+    /// Whether a standing leg and a wheel have moved since the last progress.
     fn progress(&mut self, senses: &Senses, plan: &WalkPlan) -> bool {
         for (side, anchor) in SIDES.into_iter().zip(&mut self.anchor) {
             let stroke = |cylinder| senses.joint(side, cylinder).unwrap_or_default().stroke_mm;
@@ -148,7 +148,7 @@ impl Stuck {
         progress
     }
 
-    /// Whether a wheel gives all that it has, and hardly turns.
+    /// Whether a wheel works at its maximum and hardly turns.
     fn blocked(&mut self, senses: &Senses, setpoints: &Setpoints) -> bool {
         let mut blocked = false;
         let wheels = self.ways.since(senses).into_iter().zip(senses.wheels);

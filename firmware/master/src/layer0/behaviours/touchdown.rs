@@ -1,7 +1,6 @@
-//! B3 touchdown and B4 search: a foot that goes down.
+//! B3 touchdown and B4 search: a foot being lowered.
 //!
-//! Fast to 10 mm above where ground is expected, then at 100 mm/s until a switch closes, or the leg
-//! is at its full length.
+//! Fast to 10 mm above where ground is expected, then at 100 mm/s until a switch closes or the leg is at full length.
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -11,40 +10,40 @@ use crate::contact::Side;
 use crate::layer1::params::{STROKE_MM, in_stroke};
 use crate::setpoint::{APPROACH_MM, Landing, LegPlan, NO_GROUND, PRESS_MM};
 
-/// Slow way in a cycle: 100 mm/s.
+/// Distance per cycle of the slow part: 100 mm/s.
 const SEARCH_MM: PositionMm = PositionMm::from_int(1);
-/// The slow way goes on when the piston is as near as this.
+/// The slow part advances when the piston is within this distance of its reference.
 const NEAR_MM: PositionMm = PositionMm::from_int(5);
-/// A leg is at its full length from here on.
+/// A leg is at full length from this stroke on.
 const FULL_MM: PositionMm = PositionMm::from_int(178);
-/// Ground so far from where it was expected is told.
+/// Ground this far from where it was expected is reported.
 const SURPRISE_MM: PositionMm = PositionMm::from_int(20);
-/// A piston slower than this …
+/// A piston has arrived if it is slower than this …
 const STILL_MM_S: VelocityMmS = VelocityMmS::from_int(10);
-/// … for so many cycles, after so many, has arrived.
+/// … for [`STILL`] cycles, once [`BEGUN`] cycles have passed.
 const STILL: u16 = 10;
 const BEGUN: u16 = 10;
-/// A foot with nails that touches above the ground that is expected, and whose piston is as slow as
-/// that for so many cycles (50 ms), stands on a rock: its nails do not go in.
+/// A foot with nails that touches above the expected ground, and whose piston is that slow for this many cycles (50
+/// ms), stands on a rock: its nails do not penetrate.
 const STOPPED: u16 = 5;
 
-/// A foot that goes down.
+/// A foot being lowered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Touchdown {
-    /// Reference of b6; `None`: the foot does not go down.
+    /// Reference of b6; `None`: the foot is not being lowered.
     at_mm: Option<PositionMm>,
     cycles: u16,
     still: u16,
     stopped: u16,
-    /// Stroke at which the foot has met the ground that it still touches. A touch of one cycle may
-    /// be a graze: ground is what is felt in two in a row.
+    /// Stroke at which the foot met the ground that it still touches. A touch of one cycle may be a graze; ground is
+    /// what is felt in two consecutive cycles.
     met_mm: Option<PositionMm>,
     landing: Landing,
 }
 
-/// Where the slow way begins, and where the foot stops that does not search.
+/// Where the slow part begins, and where a foot that does not search stops.
 const fn limits_mm(from_mm: PositionMm, enabled: Behaviours) -> [PositionMm; 2] {
-    // A foot that is not stopped by its switches presses on below the ground that is expected.
+    // A foot that is not stopped by its switches presses on below the expected ground.
     let plan_mm = in_stroke(from_mm.saturating_add(APPROACH_MM).saturating_add(PRESS_MM));
     let begin = if enabled.contains(Behaviour::Touchdown) {
         from_mm
@@ -64,14 +63,14 @@ impl Touchdown {
         self.landing
     }
 
-    /// Reference of b6 for a foot that goes down from `from_mm` on.
+    /// Reference of b6 for a foot that is lowered from `from_mm` on.
     pub(super) fn reference(&self, from_mm: PositionMm, enabled: Behaviours) -> PositionMm {
         let [begin, _] = limits_mm(from_mm, enabled);
         self.at_mm.unwrap_or(begin)
     }
 
-    /// One cycle with the plan of the leg, its b6 and whether a switch is closed. `nailed`: nails
-    /// touch before the sole does.
+    /// One cycle with the plan of the leg, its b6, and whether a switch is closed. `nailed`: nails touch before the
+    /// sole does.
     pub(super) fn update(
         &mut self,
         side: Side,
@@ -92,7 +91,7 @@ impl Touchdown {
         let count = |cycles: u16, on| if on { cycles.saturating_add(1) } else { 0 };
         self.still = count(self.still, still);
         self.stopped = count(self.stopped, still && touches);
-        // Above the ground that is expected it may be the nails alone.
+        // Above the expected ground it may be only the nails.
         let nails = nailed && b6.stroke_mm < from_mm.saturating_add(APPROACH_MM);
         let touches = touches && (!nails || self.stopped >= STOPPED);
         let arrived = b6.stroke_mm >= at.saturating_sub(PRESS_MM) || self.still >= STILL;
@@ -128,7 +127,7 @@ impl Touchdown {
             };
         }
         if !searches && at >= end && self.still >= STILL {
-            // Nobody looks whether there is ground.
+            // It is not checked whether there is ground.
             self.landing = Landing::Down(at.saturating_sub(PRESS_MM));
             return None;
         }

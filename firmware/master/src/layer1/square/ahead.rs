@@ -10,8 +10,8 @@ use crate::setpoint::{Cylinder, NextReference};
 impl SquareGait {
     /// Next move of a joint after `at`, if it begins within 254 cycles.
     ///
-    /// For a square wave the reference jumps to the given value when the count
-    /// runs out; for the push it begins to move towards it.
+    /// For a square wave the reference jumps to the given value when the count runs out; for the push it starts to move
+    /// towards it.
     pub(super) fn ahead(
         &self,
         side: Side,
@@ -20,8 +20,7 @@ impl SquareGait {
     ) -> Option<NextReference> {
         let p = &self.params;
         let up = PositionMm::ZERO;
-        // The present step and the two after it: an alternating leg moves at
-        // least once in them.
+        // The present step and the two after it; an alternating leg moves at least once in them.
         for later in 0..3_u16 {
             let step = at.step.saturating_add(later);
             if step >= self.steps {

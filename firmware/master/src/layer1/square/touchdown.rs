@@ -1,24 +1,23 @@
-//! Guarded touchdown: a foot that is near the ground is lowered slowly.
+//! Guarded touchdown: a foot near the ground is lowered slowly.
 //!
-//! The reference of b6 jumps to a stroke above the ground, where the foot arrives fast. From
-//! there it goes on at the touchdown speed, to the full stroke. The ground is expected where the
-//! foot stood before it rose.
+//! The reference of b6 jumps to a stroke above the ground, where the foot arrives fast. From there it continues at the
+//! touchdown speed, to the full stroke. The ground is expected where the foot stood before it was lifted.
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
 use crate::layer1::units::us_to_seconds;
 use crate::setpoint::Phase;
 
-/// Height above the expected ground from which on a foot is slow. A foot that stands is up to
-/// 4 mm lower than where it meets the ground, and the foot is to be slow for 10 mm.
+/// Height above the expected ground below which a foot is slow. A standing foot is up to 4 mm lower than where it meets
+/// the ground, and the foot is to be slow for 10 mm.
 pub const GUARD_MM: PositionMm = PositionMm::from_int(15);
-/// As near to the begin of the slow part a foot has arrived there.
+/// A foot within this distance of the start of the slow part has arrived there.
 const ARRIVED_MM: PositionMm = PositionMm::from_int(3);
 
-/// The way down of one foot.
+/// The lowering of one foot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touchdown {
-    /// Full stroke: where the way ends.
+    /// Full stroke, where the lowering ends.
     end_mm: PositionMm,
     /// Zero: the reference jumps to the end.
     speed_mm_s: VelocityMmS,
@@ -27,14 +26,14 @@ pub(super) struct Touchdown {
     way: Way,
 }
 
-/// Part of the way.
+/// Part of the lowering.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     /// In the air.
     Up,
-    /// Down to above the ground.
+    /// Down to a point above the ground.
     Fast,
-    /// On from there since `since_us`; the reference, mm.
+    /// From there on, since `since_us`; the reference, mm.
     Slow {
         since_us: u64,
         reference_mm: PositionMm,

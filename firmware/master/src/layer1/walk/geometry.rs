@@ -1,7 +1,7 @@
 //! Where a foot can stand, and how the ground passes below the moving robot.
 //!
-//! Lengths in m, angles in rad, `f32`; X forward and Y left. A foot's place is told from the yaw
-//! axis O4 of its leg, in the robot's axes.
+//! Lengths in m, angles in rad, `f32`; X forward and Y left. The position of a foot is relative to the yaw axis O4 of
+//! its leg, in the robot's axes.
 
 use wheeleg_kinematics::LegParameters;
 use wheeleg_units::VelocityMmS;
@@ -12,16 +12,16 @@ use crate::contact::Side;
 /// Dimensions of the robot that a walk needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WalkGeometry {
-    /// Yaw axes ahead of the wheel axle, m.
+    /// Distance of the yaw axes ahead of the wheel axle, m.
     pub hip_x_m: f32,
-    /// Left yaw axis left of the middle, m.
+    /// Distance of the left yaw axis to the left of the middle, m.
     pub hip_y_m: f32,
-    /// Distance of the wheels' middles, m.
+    /// Distance between the middles of the wheels, m.
     pub track_m: f32,
-    /// Length of the nails below a sole, m: a foot moves ahead when they are out of the ground.
+    /// Length of the nails below a sole, m: a foot moves forward only when they are out of the ground.
     pub nail_m: f32,
-    /// Dimensions of a leg. Its strokes are those that commands are limited to
-    /// ([`crate::layer1::params::STROKE_MM`]), whatever stands here.
+    /// Dimensions of a leg. Its strokes are limited to those of commands ([`crate::layer1::params::STROKE_MM`]),
+    /// whatever is given here.
     pub leg: LegParameters<f32>,
 }
 
@@ -67,8 +67,7 @@ impl WalkGeometry {
         self.radius_min_m() + STROKE_M - MARGIN_M
     }
 
-    /// Tangent of the farthest planned yaw of a leg: the same share of the stroke of the yaw
-    /// cylinder with any crank.
+    /// Tangent of the farthest planned yaw of a leg: the same share of the yaw cylinder's stroke for any crank.
     fn yaw_tangent(&self) -> f32 {
         YAW_TANGENT * (CRANK_M / self.leg.crank_m)
     }
@@ -76,10 +75,10 @@ impl WalkGeometry {
 
 /// Stroke of b5, m.
 const STROKE_M: f32 = 0.18;
-/// Stroke kept free at either end of b5, m: what a stance may stray.
+/// Stroke kept free at either end of b5, m, as room for deviations of a stance.
 const MARGIN_M: f32 = 0.0075;
-/// Tangent of the farthest planned yaw of a leg with this crank, m: 14.6° of the 18° that its
-/// cylinder turns, because the way of a foot in a turn is bent.
+/// Tangent of the farthest planned yaw of a leg with this crank, m: 14.6° of the 18° that its cylinder turns it,
+/// because the path of a foot is curved in a turn.
 const YAW_TANGENT: f32 = 0.26;
 const CRANK_M: f32 = 0.29;
 
@@ -134,7 +133,7 @@ const fn sign(side: Side) -> f32 {
     }
 }
 
-/// A stance as it is planned: where it begins and how long it lasts at this motion.
+/// A planned stance: where it begins and how long it lasts at this motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stance {
     /// Foothold, m.
@@ -169,7 +168,7 @@ pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stanc
     let out = far / libm::sqrtf(1.0 + yaw * yaw);
     let duration_s = longest_s(out);
     let dx = ux * duration_s;
-    // Drawn towards the robot it begins far out; pushed away from it, it ends there.
+    // If drawn towards the robot it begins far out; if pushed away from it, it ends there.
     let begin = if dx <= 0.0 { out } else { out - dx };
     Stance {
         begin_m: [begin, -tangent(out, duration_s) * begin],
@@ -177,7 +176,7 @@ pub(super) fn stance(twist: Twist, geometry: &WalkGeometry, side: Side) -> Stanc
     }
 }
 
-/// Time until a foot that stands at `foot` reaches the edge of its leg's reach, s.
+/// Time until a foot standing at `foot` reaches the edge of its leg's reach, s.
 pub(super) fn time_left_s(
     twist: Twist,
     geometry: &WalkGeometry,
@@ -223,8 +222,8 @@ mod tests {
         },
     };
 
-    /// The robot with another crank, its yaw cylinder moved with it, and the feet so far out with
-    /// b5 drawn back.
+    /// The robot with another crank, its yaw cylinder moved accordingly, and with the feet this far out when b5 is
+    /// drawn back.
     fn with_leg(crank_m: f32, radius_m: f32) -> WalkGeometry {
         let mut other = G;
         other.leg.crank_m = crank_m;
@@ -264,7 +263,7 @@ mod tests {
         let again = Twist::of_wheels(&G, rims);
         assert!((again.forward_m_s - 0.06).abs() < 1e-7);
         assert!((again.turn_rad_s - 0.07).abs() < 1e-6);
-        // Turning left, the right wheel is faster, and the ground moves right below the feet.
+        // In a left turn the right wheel is faster, and the ground moves to the right below the feet.
         assert!(rims[1] > rims[0]);
         assert!(twist.ground_m_s(&G, Side::Left, [0.1, 0.0])[1] < 0.0);
     }
@@ -282,8 +281,8 @@ mod tests {
                 forward_m_s: speed,
                 turn_rad_s: turn,
             };
-            // The leg of the paper, then others: the cylinder turns a leg by asin(0.09 m / crank)
-            // and a little more to one side.
+            // The leg of the paper, then others: the cylinder turns a leg by asin(0.09 m / crank), and a little more to
+            // one side.
             let legs = [
                 (0.29, 0.01),
                 (0.23, 0.01),

@@ -2,10 +2,10 @@
 //!
 //! | state | b6 | b5 and yaw | ends when |
 //! |---|---|---|---|
-//! | stance | holds where it touched, less what keeps the nose | follow the ground | the walk lets it swing |
+//! | stance | holds where it touched, less what the nose requires | follow the ground | the walk lets it swing |
 //! | lift | up by the lift | follow the ground | the foot is clear of the ground |
 //! | reach | up | to the foothold | most of the way is done |
-//! | lower | down to just above the plan, then slowly on | at the foothold | a switch of the foot closes |
+//! | lower | down to just above the expected height, then slowly on | at the foothold | a switch of the foot closes |
 
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -19,45 +19,42 @@ use crate::setpoint::{
     NextReference, OnLinkLoss, PRESS_MM,
 };
 
-/// A foot is clear of hard ground after half of the lift, or after so much of it, mm.
+/// A foot is clear of hard ground after half of the lift, or after this much of it, mm.
 const CLEAR_MM: f32 = 20.0;
 /// Nails are out of the ground after their length, or after this share of the lift.
 const NAILS_OUT: f32 = 0.9;
-/// Share of the way to the foothold after which the foot goes down: what is left takes as long as
-/// the way down.
+/// Share of the way to the foothold after which the foot is lowered: the rest takes as long as the lowering.
 const LOWER_FROM: f32 = 0.6;
 /// Fastest change of a standing leg's height, mm per cycle (30 mm/s).
 const NOSE_MM: f32 = 0.3;
-/// A bump, or a try to get on, lifts a foot by so much more, mm.
+/// A bump, or an attempt to get free, lifts a foot by this much more, mm.
 pub(super) const HIGHER_MM: f32 = 40.0;
-/// A foot that finds no ground is set nearer by so much, m, …
+/// A foot that finds no ground is set this much nearer, m, …
 const NEARER_M: f32 = 0.06;
-/// … after so many cycles at full length (1.5 s), …
+/// … after this many cycles at full length (1.5 s), …
 const PATIENCE: u16 = 150;
-/// … so many times.
+/// … this many times.
 const TRIES: u8 = 2;
-/// A foot that runs against something although it is as high as it goes is set down so far in front
-/// of it, m.
+/// A foot that runs against something although it is as high as it can go is set down this far in front of it, m.
 const BEFORE_M: f32 = 0.1;
-/// Nothing of this height over where a foot stood is climbed by a wheel, mm: one alone rolls over a round
-/// rock of 95 mm, and over a step of 45 mm.
+/// A wheel climbs nothing of this height above where a foot stood, mm: a single wheel rolls over a round rock of 95 mm,
+/// and over a step of 45 mm.
 const CLIMB_MM: f32 = 100.0;
-/// A lift is announced at most so many cycles ahead: the air makes ready for it, and the foot
-/// presses less.
+/// A lift is announced at most this many cycles ahead: the air prepares for it, and the foot presses less.
 const ANNOUNCED: u8 = 8;
-/// From measurement to the middle of the cycle in which a reference holds, s.
+/// From the measurement to the middle of the cycle in which a reference holds, s.
 const LEAD_S: f32 = 0.02;
 
-/// What a leg does.
+/// State of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum LegState {
     /// Foot on the ground.
     Stance,
-    /// Foot rises from where b6 was at this stroke, mm.
+    /// The foot rises from where b6 was at this stroke, mm.
     Lift(f32),
-    /// Foot on its way over so many m.
+    /// The foot is on its way over this distance, m.
     Reach(f32),
-    /// Foot goes down, b6 as far as this, mm.
+    /// The foot is lowered, b6 down to this stroke, mm.
     Lower(f32),
 }
 
@@ -99,38 +96,38 @@ impl Sensed {
 pub(super) struct Leg {
     pub side: Side,
     state: LegState,
-    /// Where the foot is meant to be, m from O4.
+    /// Where the foot should be, m from O4.
     pub foot_m: [f32; 2],
     /// Stroke of b6 at which the leg stands, mm.
     pub stand_mm: f32,
-    /// Stroke of b6 at which it has found the ground last, mm.
+    /// Stroke of b6 at which it last found the ground, mm.
     ground_mm: f32,
-    /// Cycles until it is going to rise, if it is.
+    /// Cycles until it rises, if it is going to.
     pub rises_in: Option<u8>,
     /// Cycles for which the foot has been loaded without a break.
     pub loaded: u16,
-    /// What this swing is lifted beyond the order, mm.
+    /// How far this swing is lifted beyond the order, mm.
     higher_mm: f32,
     /// Cycles at full length without ground.
     without: u16,
-    /// Footholds of this swing that had no ground.
+    /// Number of footholds of this swing that had no ground.
     tries: u8,
-    /// Where this swing is to end instead of at its foothold, m.
+    /// Where this swing ends instead of at its foothold, m.
     before_m: Option<[f32; 2]>,
-    /// Foot from which progress counts, m.
+    /// Foot position from which progress is measured, m.
     anchor_m: [f32; 2],
-    /// How often it had run against something when that was looked at last.
+    /// Count of its collisions when it was last looked at.
     bumps: u8,
-    /// It has run against something in this swing, or in the one that its stance began with.
+    /// It has run against something in this swing, or in the one before the present stance.
     bumped: bool,
-    /// It has at a height that no wheel climbs, and in every swing since.
+    /// It has run against something at a height that no wheel climbs, and again in every swing since.
     faces: bool,
     /// The last pose that could be computed: yaw and b5.
     last: [JointSetpoint; 2],
 }
 
 impl Leg {
-    /// A leg that stands, or goes down to stand.
+    /// A leg that stands, or that is lowered to stand.
     pub(super) fn new(side: Side, sensed: &Sensed, bumps: u8) -> Self {
         Self {
             side,
@@ -163,12 +160,12 @@ impl Leg {
         self.state == LegState::Stance
     }
 
-    /// Whether there is nothing that it could still do: it stands, or is at full length above a hole.
+    /// Whether there is nothing more that it could do: it stands, or is at full length above a hole.
     pub(super) fn rests(&self) -> bool {
         self.stands() || self.wants_nose_down()
     }
 
-    /// What layer 0 is told of it.
+    /// Its state as reported to layer 0.
     pub(super) fn plan(&self) -> LegPlan {
         match self.state {
             LegState::Stance => LegPlan::Stance,
@@ -178,49 +175,49 @@ impl Leg {
         }
     }
 
-    /// Stroke at which a standing leg stands, with what layer 0 has made of it, mm.
+    /// Stroke at which a standing leg stands, including what layer 0 has added to it, mm.
     pub(super) fn stood_mm(&self, acts: &Acts) -> f32 {
         let beyond = acts.beyond_mm.get(self.side.index()).copied();
         let beyond_mm = millimetres(beyond.unwrap_or_default());
         (self.stand_mm + beyond_mm).min(full_mm())
     }
 
-    /// What layer 0 has made of a stance is the leg's own from now on.
+    /// Adopts what layer 0 has added to a stance as the leg's own.
     pub(super) fn absorb(&mut self, acts: &Acts) {
         if self.stands() {
             self.stand_mm = self.stood_mm(acts);
         }
     }
 
-    /// Begins a swing, `higher_mm` above the order's.
+    /// Begins a swing, `higher_mm` above the ordered height.
     pub(super) fn swing(&mut self, higher_mm: f32, acts: &Acts) {
         self.absorb(acts);
         self.higher_mm = higher_mm;
         self.tries = 0;
         self.before_m = None;
         self.bumped = false;
-        // Where a touch would have been, as the leg stands now.
+        // Where a touch would have been, with the leg as it stands now.
         self.ground_mm = self.stand_mm - millimetres(PRESS_MM);
         self.state = LegState::Lift(self.stand_mm);
     }
 
-    /// What it stands on may be the face of something that it has run against.
+    /// Whether it may stand on the face of something that it has run against.
     pub(super) fn may_stand_at_a_face(&self) -> bool {
         self.stands() && self.bumped
     }
 
-    /// It has run against something that no wheel climbs, and has not got over it since.
+    /// Whether it has run against something that no wheel climbs, and has not got over it since.
     pub(super) const fn faces(&self) -> bool {
         self.faces
     }
 
-    /// At full length it finds no ground: the nose is to go down.
+    /// Whether it finds no ground at full length, so that the nose has to go down.
     pub(super) fn wants_nose_down(&self) -> bool {
         matches!(self.state, LegState::Lower(_)) && self.without > NO_GROUND
     }
 
-    /// How far a standing foot has moved since it was asked last with a yes, m; 0 if it has not
-    /// moved by `least_m`, so that the noise of the sensors is no way.
+    /// How far a standing foot has moved since the last call that returned a distance, m; 0 if it has not moved by
+    /// `least_m`, so that sensor noise does not count as progress.
     pub(super) fn way_m(&mut self, sensed: &Sensed, least_m: f32) -> f32 {
         if !self.stands() {
             self.anchor_m = sensed.foot_m;
@@ -258,7 +255,7 @@ impl Leg {
             held(Cylinder::Vertical),
         ];
         if held_plane && !matches!(self.state, LegState::Lower(_)) {
-            // An overloaded leg goes nowhere: the foot is where it is.
+            // An overloaded leg does not move: its foot is to be where it is.
             self.foot_m = sensed.foot_m;
         }
         match self.state {
@@ -295,7 +292,7 @@ impl Leg {
                     self.before_m = Some([x - share * dx, y - share * dy]);
                     self.state = LegState::Reach(BEFORE_M);
                 } else {
-                    // There is no room: there.
+                    // There is no room in front of it: put it down there.
                     self.foot_m = sensed.foot_m;
                     self.lower();
                 }
@@ -304,13 +301,13 @@ impl Leg {
         }
     }
 
-    /// Goes down to just above the ground that is expected.
+    /// Lowers to just above the expected ground.
     fn lower(&mut self) {
         self.without = 0;
         self.state = LegState::Lower((self.ground_mm - millimetres(APPROACH_MM)).max(0.0));
     }
 
-    /// A foot on its way down, which layer 0 leads.
+    /// A foot being lowered, under control of layer 0.
     fn land(&mut self, sensed: &Sensed, acts: &Acts) {
         match acts.landing.get(self.side.index()) {
             Some(Landing::Down(stroke)) => {
@@ -333,14 +330,14 @@ impl Leg {
         }
     }
 
-    /// A foothold, set nearer to the middle of the reach for each one that had no ground.
+    /// A foothold, moved nearer to the middle of the reach for each previous one without ground.
     fn nearer(&self, geometry: &WalkGeometry, [x, y]: [f32; 2]) -> [f32; 2] {
         let middle = geometry.middle_m();
         let nearer = (NEARER_M * f32::from(self.tries)).min(libm::fabsf(x - middle));
         [x - libm::copysignf(nearer, x - middle), y]
     }
 
-    /// The ground has passed below: a foot that stands or rises goes with it.
+    /// The ground has passed below: a foot that stands or rises follows it.
     pub(super) fn follow(&mut self, moved: Twist, geometry: &WalkGeometry) {
         if !matches!(self.state, LegState::Stance | LegState::Lift(_)) {
             return;
@@ -350,11 +347,11 @@ impl Leg {
         self.foot_m = [x + dx, y + dy];
     }
 
-    /// Height of a standing leg: `rise_mm` is wanted by the nose, unless the foot looks for ground.
+    /// Height of a standing leg: the nose requires `rise_mm`, which is ignored while the foot searches for ground.
     pub(super) fn level(&mut self, rise_mm: f32, acts: &Acts) {
         let is = |all: &[bool]| all.get(self.side.index()) == Some(&true);
         if is(&acts.deep) {
-            // It is a foothold of its own.
+            // This is a foothold of its own.
             self.absorb(acts);
             self.without = 0;
             self.tries = 0;
@@ -365,7 +362,7 @@ impl Leg {
         }
     }
 
-    /// References: yaw, b5, b6. `speed` is the robot's.
+    /// References of yaw, b5 and b6. `speed` is the robot's.
     pub(super) fn setpoints(
         &mut self,
         speed: Twist,
@@ -385,7 +382,7 @@ impl Leg {
         if let Some(plane) = in_plane(geometry, self.side, ahead, velocity) {
             self.last = plane;
         } else {
-            // At the edge of the reach: where it was, without a speed.
+            // At the edge of the reach: stays where it was, without velocity.
             for joint in &mut self.last {
                 joint.velocity_mm_s = VelocityMmS::ZERO;
             }
@@ -417,14 +414,14 @@ impl Leg {
     }
 }
 
-/// Yaw and b5 for a foot at `foot` moving with `velocity`, both m from O4.
+/// Yaw and b5 for a foot at `foot` moving with `velocity`, in m and m/s from O4.
 pub(crate) fn in_plane(
     geometry: &WalkGeometry,
     side: Side,
     [x, y]: [f32; 2],
     [ux, uy]: [f32; 2],
 ) -> Option<[JointSetpoint; 2]> {
-    // Height does not enter: the vertical cylinder is parallel to the yaw axis.
+    // The height does not matter: the vertical cylinder is parallel to the yaw axis.
     let leg = &geometry.leg;
     let [_, _, b6] = leg.stroke_zero_m;
     let z = -(b6 + 0.09);

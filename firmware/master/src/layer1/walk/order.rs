@@ -1,4 +1,4 @@
-//! What the user asks of a walk.
+//! What the user orders of a walk.
 
 use fixed::types::I16F16;
 use wheeleg_units::{PositionMm, VelocityMmS};
@@ -16,7 +16,7 @@ pub enum WalkPattern {
     Tandem,
 }
 
-/// Orders of a walk; may be changed while walking.
+/// Order of a walk; may be changed while walking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WalkOrder {
     /// Speed forward ([`argument::WALK_SPEED`]).
@@ -25,14 +25,14 @@ pub struct WalkOrder {
     pub turn_rad_s: I16F16,
     /// Which leg swings when ([`argument::WALK_PATTERN`]).
     pub pattern: WalkPattern,
-    /// Height of a swing over where the foot stood ([`argument::WALK_LIFT`]).
+    /// Height of a swing above where the foot stood ([`argument::WALK_LIFT`]).
     pub lift_mm: PositionMm,
-    /// Height of the nose against fully extended legs ([`argument::NOSE`]).
+    /// Height of the nose relative to fully extended legs ([`argument::NOSE`]).
     pub nose_mm: PositionMm,
 }
 
 impl Default for WalkOrder {
-    /// Standing, 60 mm lift, nose 20 mm down so that a leg can still search the ground.
+    /// Standing, 60 mm lift, nose 20 mm down so that a leg can still search for the ground.
     fn default() -> Self {
         Self {
             speed_mm_s: VelocityMmS::ZERO,

@@ -37,9 +37,9 @@ pub(crate) struct FakeNode {
     /// Largest change per cycle, raw.
     pub(crate) rate: i64,
     pub(crate) refuse_arm: bool,
-    /// Acknowledges arming and does not close its loop.
+    /// Acknowledges arming but does not close its loop.
     pub(crate) never_arms: bool,
-    /// Requests that it will leave without an answer.
+    /// Requests that it will leave unanswered.
     pub(crate) unanswered: u8,
     pub(crate) echo_offset: u8,
     pub(crate) requests: Vec<Message>,
@@ -50,7 +50,7 @@ pub(crate) struct FakeNode {
     pub(crate) parameter: i32,
     /// Cycles for which a save will stall the board.
     pub(crate) save_cycles: u8,
-    /// Cycles for which the board is stalled still.
+    /// Cycles for which the board is still stalled.
     pub(crate) stall: u8,
 }
 

@@ -1,4 +1,4 @@
-//! Tests of the account of the air.
+//! Tests of the air estimate.
 
 use super::*;
 use crate::JOINT_TICK;
@@ -15,12 +15,12 @@ fn model() -> AirModel {
     of(&AxisData::default())
 }
 
-/// Absolute pressures in bar after so many ticks with these on-times.
+/// Absolute pressures in bar after this many ticks with these on-times.
 fn after(ticks: u32, on: OnTimes, start: [f64; 2], model: &AirModel) -> [f64; 2] {
     let raw = |bar: f64| (bar / 7.01325 * f64::from(SUPPLY)) as i32;
     let mut air = Air::unknown(model, MIDDLE);
     [air.a.p, air.b.p] = start.map(raw);
-    // A round more, in which each chamber takes in what it has not yet.
+    // One more round, in which each chamber processes what it has not yet seen.
     for _ in 0..ticks {
         air.follow(&on, MIDDLE, model, false);
     }
@@ -48,7 +48,7 @@ fn choked_flow_fills_at_a_constant_rate_and_empties_by_an_exponential() {
         (a - 7.013).abs() < 0.01 && (b - 1.013).abs() < 0.01,
         "{a} {b}"
     );
-    // Half the time open is half the air.
+    // Half the opening time gives half the air.
     let [half, _] = after(200, [500, 0, 0, 0], [1.2, 1.2], &model);
     let [full, _] = after(100, [1000, 0, 0, 0], [1.2, 1.2], &model);
     assert!((half - full).abs() < 0.01, "{half} {full}");
@@ -70,7 +70,7 @@ fn a_piston_that_moves_squeezes_by_the_polytropic_law() {
     let rises = law(length(lead_b, 90.0), length(lead_b, 30.0));
     assert!((f64::from(air.a.p) / a / falls - 1.0).abs() < 0.02);
     assert!((f64::from(air.b.p) / b / rises - 1.0).abs() < 0.02);
-    // A new calibration moves no air, and noise none either.
+    // A new calibration moves no air, and nor does noise.
     let before = air;
     air.follow(&[0; 4], MIDDLE, &model, false);
     air.follow(
@@ -108,7 +108,7 @@ fn what_has_been_vented_for_certain_is_known() {
     vent(&mut air, 300, [0, 1000, 1000, 0]);
     vent(&mut air, 72, [1000, 0, 0, 1000]);
     assert!(!air.is_comparable(&model));
-    // Pulses of 6 ms may not open the valve, however many.
+    // Pulses of 6 ms may not open the valve, however many there are.
     for _ in 0..100 {
         vent(&mut air, 6, [1000, 0, 0, 1000]);
         vent(&mut air, 14, [0; 4]);
@@ -124,7 +124,7 @@ fn what_has_been_vented_for_certain_is_known() {
     assert!(!air.is_comparable(&model) && !air.is_known(true, &model));
 }
 
-/// Valves told to open in 3.5 ms may take 6.3 ms.
+/// Valves specified to open in 3.5 ms may take 6.3 ms.
 #[test]
 fn of_a_pulse_that_may_open_nothing_nothing_is_certain() {
     let model = model();
@@ -148,15 +148,15 @@ fn of_a_pulse_that_may_open_nothing_nothing_is_certain() {
         assert_eq!(gain(6, begin, true).to_bits(), 0.0_f64.to_bits(), "{begin}");
         let whole = gain(18, begin, false);
         assert!((gain(6, begin, false) * 3.0 / whole - 1.0).abs() < 0.15);
-        // Of 18 ms 9 to 12 are left.
+        // Of 18 ms, 9 to 12 remain.
         let sure = gain(18, begin, true) / whole;
         assert!((0.45..0.72).contains(&sure), "{begin} {sure}");
     }
 }
 
-/// However long valves are told to take, air counts as certain no sooner than after 9/5 of
-/// that time, and at the latest from two rounds after it, as far as rounds are counted
-/// (45 ms): one to which it is rounded up, one in which a pulse may begin.
+/// Whatever the specified opening time, air counts as certain no sooner than after 9/5 of that time, and at the latest
+/// two rounds later, as far as rounds are counted (45 ms): one round for rounding up, and one in which a pulse may
+/// begin.
 #[test]
 fn a_valve_is_open_for_certain_after_nearly_twice_what_it_is_told() {
     for told in [
@@ -167,7 +167,7 @@ fn a_valve_is_open_for_certain_after_nearly_twice_what_it_is_told() {
             valve_on: Micros(told),
             ..AxisData::default()
         });
-        // What of A's vents counts, µs: pulses of so many ticks every 150 ms.
+        // How much of A's vent time counts, µs: pulses of this many ticks every 150 ms.
         let sure = |pulse: u32, begin: u32| {
             let mut air = Air::unknown(&model, MIDDLE);
             for tick in 0..1500 + begin {
@@ -231,7 +231,7 @@ fn a_chamber_may_lose_a_bar_in_4_7_s_down_to_the_atmosphere() {
     air.leak(&model, 4700 / ROUND);
     assert!((bar(air.a.p) - 6.01).abs() < 0.02, "{}", bar(air.a.p));
     assert_eq!(air.b.p, model.ambient);
-    // What is below it stays.
+    // A pressure below it stays.
     air.b.p = model.ambient / 2;
     air.leak(&model, 1);
     assert_eq!(air.b.p, model.ambient / 2);
@@ -267,7 +267,7 @@ fn a_pulse_fills_a_64th_of_the_supply_or_what_its_shortest_opening_gives() {
         let (least, none) = (Micros::ZERO, Micros(u32::MAX));
         let (time, force) = model.pulse(b, MIDDLE, least, none);
         assert!((f64::from(force) / 1e3 - supply_n / 64.0).abs() < 0.02);
-        // What the account makes of it: a 64th in choked flow, in ticks of a millisecond.
+        // What the estimate makes of it: a 64th in choked flow, in ticks of a millisecond.
         let ticks = time.get().div_ceil(1000);
         let mut on = [0; 4];
         on[if b { 2 } else { 0 }] = 1000;
@@ -276,7 +276,7 @@ fn a_pulse_fills_a_64th_of_the_supply_or_what_its_shortest_opening_gives() {
         let rise =
             if b { b1 - b0 } else { a1 - a0 } * f64::from(time.get()) / f64::from(ticks * 1000);
         assert!((rise / (7.01325 / 64.0) - 1.0).abs() < 0.03, "{rise}");
-        // Longer ones give more, up to all of the supply; bounds hold.
+        // Longer pulses give more, up to all of the supply; the bounds hold.
         for (times, parts) in [(10, 10), (50, 50), (64, 64), (100, 64)] {
             let shortest = Micros(time.get() * times);
             let (opening, longer) = model.pulse(b, MIDDLE, shortest, none);
@@ -291,7 +291,7 @@ fn a_pulse_fills_a_64th_of_the_supply_or_what_its_shortest_opening_gives() {
 #[test]
 fn what_moves_the_air_is_more_than_noise_and_no_more_than_a_piston_can() {
     let model = model();
-    // Lengths and pressures after three ticks at a stroke that is off by so much.
+    // Lengths and pressures after three ticks at a stroke that is off by this much.
     let moved = |off: i32| {
         let mut air = Air::unknown(&model, MIDDLE);
         let at = PositionMm::from_raw(MIDDLE.raw() + off);

@@ -1,4 +1,4 @@
-//! Tests of the watch for motion that does not come.
+//! Tests of the watch for missing motion.
 
 use super::*;
 use crate::checksum::Checksum;
@@ -31,7 +31,7 @@ const fn driven(reference: i16, position: i16) -> Driven {
     }
 }
 
-/// A watch that knows both chambers and a load of `learnt` mN.
+/// A watch that knows both chambers and has learnt a load of `learnt` mN.
 fn knowing(learnt: i32, position: i16, model: &MotionModel) -> MotionWatch {
     let mut watch = MotionWatch::new(model, PositionMm::from_int(position));
     for on in [PUSH, PULL, [0, 1000, 0, 1000]] {
@@ -46,7 +46,7 @@ fn knowing(learnt: i32, position: i16, model: &MotionModel) -> MotionWatch {
     watch
 }
 
-/// Tick of the fault, and the force on the piston 27 ticks before it, ten rounds with both, N.
+/// Tick of the fault, and the force on the piston, N, 27 ticks before it (ten rounds including both ends).
 fn fault(
     mut watch: MotionWatch,
     on: OnTimes,
@@ -63,7 +63,7 @@ fn fault(
 
 #[test]
 fn a_piston_that_should_move_for_all_that_was_learnt_is_at_fault() {
-    // The margin as told, or half of 158 N; then break-away friction of 15 N.
+    // The margin as specified, or half of 158 N; plus break-away friction of 15 N.
     for (margin, bound) in [(50, 65.0), (0, 94.0)] {
         let model = model(margin);
         for load in [-30_000, 0, 30_000] {
@@ -114,7 +114,7 @@ fn a_piston_that_moves_is_not_and_one_that_shakes_is() {
     assert!(!run(&|tick| (tick / 30 * 36_000) as i32 % (20 << 16), 0));
     assert!(run(&|tick| (tick / 60 * 30_000) as i32 % (20 << 16), 0));
     assert!(run(&|tick| (tick % 2 * 30_000) as i32, 0));
-    // One that turns back has a speed.
+    // A piston that reverses has a speed.
     assert!(!run(&|_| 0, 12));
 }
 
@@ -125,10 +125,10 @@ fn without_knowledge_it_takes_the_largest_force_for_200_ms() {
     // B is known to be empty after 1.17 s.
     let (tick, _) = fault(watch, PUSH, driven(120, 90), &model).unwrap();
     assert!((1360..1400).contains(&tick), "{tick}");
-    // One open valve of two leaves the other chamber unknown.
+    // If only one of two valves is open, the other chamber remains unknown.
     let one = fault(watch, [1000, 0, 0, 0], driven(120, 90), &model);
     assert_eq!(one, None);
-    // Being disarmed, or a minute at rest, is forgetting.
+    // Being disarmed, or a minute at rest, means forgetting.
     for minute in [false, true] {
         let mut watch = knowing(0, 90, &model);
         if minute {
@@ -150,7 +150,7 @@ fn a_chamber_that_should_hold_more_than_any_supply_has_lost_its_air() {
     for _ in 0..2000 {
         sample(&mut watch, &[0, 0, 1000, 0], &driven(20, 20), &model);
     }
-    // B at supply; 130 mm further in it would have 27 bar.
+    // B at supply pressure; 130 mm further in it would have 27 bar.
     let mut found = None;
     for tick in 0..2000_i32 {
         let moved = (tick * 13_107).min(130 << 16);
@@ -168,7 +168,7 @@ fn a_chamber_that_should_hold_more_than_any_supply_has_lost_its_air() {
             break;
         }
     }
-    // While it moves it may be a blow; 28 ticks after it has come to rest it is not.
+    // While the piston moves it may be an impact; 28 ticks after it has come to rest it is not.
     assert!(
         found.is_some_and(|tick| (674..684).contains(&tick)),
         "{found:?}"
@@ -190,7 +190,7 @@ fn the_load_is_the_force_of_a_sliding_piston_less_its_friction() {
             watch.learnt
         );
     }
-    // Standing teaches nothing, nor do the cushions: 6 mm before either end.
+    // Standing teaches nothing, nor do the cushions, 6 mm before either end.
     let before = watch.learnt;
     for (at, speed, teaches) in [
         (90, 0, false),
@@ -215,7 +215,7 @@ fn the_load_is_the_force_of_a_sliding_piston_less_its_friction() {
     }
 }
 
-/// Slides with the chambers as they are for so many ticks.
+/// Slides for this many ticks with the chambers as they are.
 fn slide(watch: &mut MotionWatch, ticks: u32, speed: i16, model: &MotionModel) {
     for _ in 0..ticks {
         let driven = Driven {
@@ -229,8 +229,8 @@ fn slide(watch: &mut MotionWatch, ticks: u32, speed: i16, model: &MotionModel) {
 #[test]
 fn what_was_learnt_counts_after_100_ms_of_sliding() {
     let model = model(50);
-    // Rounds of three ticks: 32 of them, and 33. Without knowledge rule 2 waits for nine
-    // tenths of 188 N, and 200 ms more.
+    // Rounds of three ticks: 32 of them, and 33. Without knowledge rule 2 waits for nine tenths of 188 N, and 200 ms
+    // more.
     for (ticks, least, most) in [(96, 142.0, 200.0), (99, 60.0, 70.0)] {
         let mut watch = knowing(0, 90, &model);
         (watch.slid, watch.learnt) = (0, 0);
@@ -249,8 +249,7 @@ fn the_mean_is_over_the_last_100_ms_of_sliding() {
     let mut watch = knowing(0, 90, &model);
     slide(&mut watch, 3000, 100, &model);
     let old = f64::from(watch.learnt);
-    // The other way friction has the other sign: 28 N of change, of which 33 rounds leave
-    // (32/33)^33.
+    // In the other direction friction has the other sign: a change of 28 N, of which 33 rounds leave (32/33)^33.
     slide(&mut watch, 99, -100, &model);
     let left = (old + 28_000.0 - f64::from(watch.learnt)) / 28_000.0;
     assert!((left - 0.362).abs() < 0.02, "{left}");
@@ -260,7 +259,7 @@ fn the_mean_is_over_the_last_100_ms_of_sliding() {
 fn every_flipped_bit_of_what_the_watch_keeps_changes_its_seal() {
     let model = model(0);
     let mut watch = knowing(0, 90, &model);
-    // A word of many bits and one of none: whatever joins two fields must keep both.
+    // One word with many bits set and one with none: whatever combines two fields must preserve both.
     for (slid, doubt) in [(0, 0), (0x55AA, 0xA55A)] {
         (watch.slid, watch.doubt) = (slid, doubt);
         let sound = Checksum::of(&watch);
@@ -294,7 +293,7 @@ fn a_precharge_holds_the_force_that_it_found() {
     assert_eq!(watch.unbalanced(&model), force);
     watch.hold_force(&model);
     assert_eq!((watch.unbalanced(&model), watch.slid), (0, 0));
-    // More in B pushes back, by as much as it changes the force.
+    // More pressure in B pushes back, by as much as it changes the force.
     fill(&mut watch, [0, 0, 1000, 0]);
     let change = watch.air.force(&model.air) - force;
     assert!(change < -20_000, "{change}");
@@ -306,7 +305,7 @@ fn a_precharge_holds_the_force_that_it_found() {
 #[test]
 fn each_bound_of_the_rules_is_where_it_is_told() {
     let model = model(50);
-    // 4 mm from the reference and 3 mm before the ends motion is expected.
+    // Motion is expected from 4 mm off the reference and 3 mm before the ends.
     for (on, reference, position) in [
         (PUSH, 94, 90),
         (PULL, 86, 90),
@@ -329,7 +328,7 @@ fn each_bound_of_the_rules_is_where_it_is_told() {
         assert_eq!(rule(&watch, reference, &model), Rule::None);
         watch.learnt -= sign;
         assert_eq!(rule(&watch, reference, &model), Rule::Pushed);
-        // So are nine tenths of the largest for a watch that has learnt nothing.
+        // So are nine tenths of the largest force for a watch that has learnt nothing.
         let (slid, mut model) = (watch.slid, model);
         watch.slid = 0;
         let least = sign * force;
@@ -344,7 +343,7 @@ fn each_bound_of_the_rules_is_where_it_is_told() {
 #[test]
 fn of_short_pulses_only_those_of_a_piston_that_moves_count() {
     let model = model(50);
-    // 6 ms every 20 ms: a valve told to open in 3.5 ms may not do so.
+    // 6 ms every 20 ms: a valve specified to open in 3.5 ms may not open.
     let gain = |moves: bool| {
         let mut watch = knowing(0, 90, &model);
         let driven = Driven {
@@ -365,8 +364,7 @@ fn of_short_pulses_only_those_of_a_piston_that_moves_count() {
     assert!(gain(true) > 20_000, "{}", gain(true));
 }
 
-/// The first rounds of sliding count no more than one of six, so that one reading does not
-/// stand for a load.
+/// The first rounds of sliding have a weight of at most one sixth, so that a single reading is not taken for a load.
 #[test]
 fn the_first_round_of_sliding_is_a_sixth_of_the_mean() {
     let model = model(0);
@@ -387,7 +385,7 @@ fn tools_are_told_what_the_watch_makes_of_the_axis() {
         watch.doubt >= 3 * STRONG
     });
     assert!(begun);
-    // Every doubt of rule 1 is a round of 3 ms.
+    // Each round of rule 1 takes 3 ms.
     let account = watch.account(at(120), at(90), &model);
     assert_eq!(account.rule, 1);
     let rounds = u32::from(watch.doubt / STRONG);
