@@ -186,6 +186,7 @@ impl Predictive {
         }
     }
 
+    /// The estimates of chambers, motion and mass.
     #[must_use]
     pub const fn observer(&self) -> &Observer {
         &self.observer
