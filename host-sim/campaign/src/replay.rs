@@ -184,7 +184,7 @@ pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
         reason: "it has no plan".to_owned(),
         help: "give the table of `wheeleg campaign merge`, or the folder of a campaign".to_owned(),
     })?;
-    PlanFile::parse(path, text)
+    PlanFile::parse(text).map_err(|reason| CampaignError::unreadable(path, reason))
 }
 
 /// Index of a case, and its row.
