@@ -3,6 +3,8 @@
 //! Densities are those of the text books; a normal and a log-normal one may be truncated by `min` and `max`,
 //! and the rest then has probability 1.
 
+use std::cmp::Ordering;
+
 use super::value::{Value, list};
 use crate::quantity::{brief, pretty};
 use crate::reader::{Entry, Reader};
@@ -235,7 +237,7 @@ pub(super) fn read(r: &mut Reader, factor: &Entry, key: &str) -> Option<(Distrib
             Some(entry.span.clone()),
             format!("`{path}`: {why}"),
             "not a distribution",
-            None,
+            ordered(&read),
         );
         return None;
     }
@@ -267,6 +269,20 @@ fn empty(low: f64, high: f64) -> Option<String> {
          allowed are {FAR}",
         brief(beyond.abs())
     ))
+}
+
+/// What to write instead of ends in the wrong order.
+fn ordered(d: &Distribution) -> Option<String> {
+    let [min, max] = d.ends()?;
+    match min.total_cmp(&max) {
+        Ordering::Less => None,
+        Ordering::Equal => Some(format!("for one value write `grid = [{}]`", pretty(min))),
+        Ordering::Greater => Some(format!(
+            "exchange the two: `min = {}`, `max = {}`",
+            pretty(max),
+            pretty(min)
+        )),
+    }
 }
 
 /// Why numbers do not make a distribution.
