@@ -200,7 +200,8 @@ fn a_table_is_no_file_of_its_campaign() {
         );
     }
     assert_eq!(crate::common::parts(folder.path()), before);
-    let beside = folder.path().join("table.parquet");
+    // A missing folder is created.
+    let beside = folder.path().join("deep/er/table.parquet");
     let merged = merge(&folders, &beside, &Stop::default()).expect("merged");
     assert_eq!(merged.expect("not stopped").rows, 8);
 }

@@ -135,9 +135,9 @@ struct MergeArgs {
     /// Folders of one campaign.
     #[arg(required = true)]
     dirs: Vec<PathBuf>,
-    /// Table to write.
-    #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
-    out: PathBuf,
+    /// Table to write; a missing folder is created [default: cases.parquet in the first DIR].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Merge even if cases are missing: a table of the finished cases, for example of a pilot.
     #[arg(long)]
     partial: bool,
@@ -165,7 +165,7 @@ struct ReportArgs {
 struct ReplayArgs {
     /// Folder of a campaign, or its merged table.
     from: PathBuf,
-    /// The case: its id of 32 hexadecimal digits, or its index in the plan.
+    /// The case: its id or the beginning of it, from 4 characters, or its index in the plan.
     case: String,
     /// Folder for log, figures and report [default: runs/<plan>-<case>].
     #[arg(long, value_name = "DIR")]
@@ -367,14 +367,18 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
 fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let merge = if args.partial { merge_partial } else { merge };
-    let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
+    let out = match (&args.out, args.dirs.first()) {
+        (Some(out), _) => out.clone(),
+        (None, first) => first.cloned().unwrap_or_default().join("cases.parquet"),
+    };
+    let Some(merged) = merge(&args.dirs, &out, &stop)? else {
         tell("stopped; no table was written, and the parts are unchanged");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
     Ok(if args.json {
-        print(&print::merged_json(&merged, &args.out))
+        print(&print::merged_json(&merged, &out))
     } else {
-        show(&print::merged(&merged, &args.out))
+        show(&print::merged(&merged, &out))
     }?)
 }
 
