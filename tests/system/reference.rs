@@ -244,8 +244,8 @@ fn target_rows(body: &mut String, targets: Vec<Target>, known: &mut BTreeSet<Str
 /// What the words of the bench's targets leave open.
 const BENCH: &str = "\
 A value is the worse of the measured moves. The first move after power-up, in which the board learns, is not one of them: \
-it has `first-overshoot` and `first-settling`, and counts in `stopped` and `faults`. [What each move \
-is](../guide/campaigns.md#what-is-played-and-judged).
+it has `first-overshoot` and `first-settling`, and counts in `stopped` and `faults`. Of `first-step`, the first move is the \
+measured one, and these two columns are missing. [What each move is](../guide/campaigns.md#what-is-played-and-judged).
 
 - A positive `rest-error`: the rod has come out too little.
 - The force left of `margin` is that of [`load_share`](../guide/campaigns.md#the-load); the load of a contact is not in it.

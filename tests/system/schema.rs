@@ -129,8 +129,8 @@ fn what_campaigns_write_is_as_published() {
         (&merged["rows"], &merged["missing"]),
         (&2.into(), &0.into())
     );
-    let report = ["report", "cases.parquet", "--json"];
-    let against = ["--against", "cases.parquet"];
+    let report = ["report", "out/cases.parquet", "--json"];
+    let against = ["--against", "out/cases.parquet"];
     for arguments in [report.to_vec(), [&report[..], &against[..]].concat()] {
         let report = json(&campaign(&arguments, 0));
         assert_valid(&report, "campaign-report");

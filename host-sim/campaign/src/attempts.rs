@@ -22,8 +22,9 @@ use crate::{CampaignError, host};
 struct Line {
     case: u64,
     event: Event,
-    host: String,
-    process: u32,
+    /// The process, by [`host::this_process`]; empty in files of earlier versions.
+    #[serde(default)]
+    by: String,
 }
 
 /// What happened to a case.
@@ -45,6 +46,8 @@ pub(crate) struct Known {
     pub(crate) open: u32,
     /// Separate processes that the case crashed.
     pub(crate) proven: u32,
+    /// Whether the process that had the case last is alive, if this computer can tell.
+    pub(crate) lives: Option<bool>,
 }
 
 impl Known {
@@ -59,6 +62,7 @@ impl Known {
 pub(crate) struct Attempts {
     path: PathBuf,
     known: BTreeMap<u64, Known>,
+    is_shared: bool,
     /// Keeps lines of different threads from mixing.
     file: Mutex<()>,
 }
@@ -70,11 +74,15 @@ impl Attempts {
             .and_then(std::io::read_to_string)
             .unwrap_or_default();
         let mut known: BTreeMap<u64, Known> = BTreeMap::new();
+        // Whether each process is alive: few processes, and many lines.
+        let mut processes: BTreeMap<String, Option<bool>> = BTreeMap::new();
         for line in text.lines() {
             let Ok(line) = serde_json::from_str::<Line>(line) else {
                 continue;
             };
             let of = known.entry(line.case).or_default();
+            let lives = processes.entry(line.by);
+            of.lives = *lives.or_insert_with_key(|process| host::lives(process));
             match line.event {
                 Event::Begun => of.open += 1,
                 Event::Ended => of.open = of.open.saturating_sub(1),
@@ -84,9 +92,12 @@ impl Attempts {
                 }
             }
         }
+        let mut others = processes.iter();
         Self {
             path,
             known,
+            is_shared: others
+                .any(|(name, lives)| *lives == Some(true) && name != host::this_process()),
             file: Mutex::new(()),
         }
     }
@@ -94,6 +105,11 @@ impl Attempts {
     /// What was known about a case when the file was read.
     pub(crate) fn known(&self, case: u64) -> Known {
         self.known.get(&case).copied().unwrap_or_default()
+    }
+
+    /// Whether another process that is alive has worked on the block.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.is_shared
     }
 
     /// What was known about every case that was begun.
@@ -106,8 +122,7 @@ impl Attempts {
         let line = Line {
             case,
             event,
-            host: host::name(),
-            process: std::process::id(),
+            by: host::this_process().to_owned(),
         };
         let mut text = serde_json::to_string(&line).expect("plain data is JSON");
         text.push('\n');
@@ -152,8 +167,15 @@ mod tests {
         fs::write(&path, text).expect("written");
         let attempts = Attempts::read(path.clone());
         let known = [5, 6, 7, 8].map(|case| attempts.known(case));
-        let of = |open, proven| Known { open, proven };
-        assert_eq!(known, [of(1, 0), of(0, 0), of(0, 1), of(0, 0)]);
+        let lives = host::lives(host::this_process());
+        let of = |open, proven| Known {
+            open,
+            proven,
+            lives,
+        };
+        let none = Known::default();
+        assert_eq!(known, [of(1, 0), of(0, 0), of(0, 1), none]);
+        assert!(!attempts.is_shared(), "only this process has worked on it");
         attempts.remove();
         assert!(!path.exists());
     }

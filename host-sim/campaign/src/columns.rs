@@ -68,6 +68,11 @@ impl Column {
         self.min.is_some() || self.max.is_some()
     }
 
+    /// The middle of a target's limits, if it has both: for such a target neither more nor less is better.
+    pub(crate) fn middle(&self) -> Option<f64> {
+        Some(self.min?.midpoint(self.max?))
+    }
+
     /// The limits of a target in words, after a comma; empty if it has none.
     pub(crate) fn limits(&self) -> String {
         let unit = match self.unit.as_str() {

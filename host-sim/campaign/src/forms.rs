@@ -28,6 +28,8 @@ pub struct StatusForm {
     pub begun: u64,
     /// Cases that have ended, but whose row is in no file yet.
     pub unsaved: u64,
+    /// Cases of both kinds whose process was killed: the next run repeats them.
+    pub lost: u64,
     /// Rows that missed a required target or have no result.
     pub failed: u64,
     /// The most frequent causes of these failures.
@@ -102,6 +104,7 @@ impl StatusForm {
             partial: state.partial,
             begun: state.begun,
             unsaved: state.unsaved,
+            lost: state.lost,
             failed: state.failed,
             causes: causes.collect(),
             other_causes: state.causes.kinds().saturating_sub(CAUSES),

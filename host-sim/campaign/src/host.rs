@@ -38,6 +38,12 @@ pub(crate) fn unique() -> String {
     format!("{host}-{scope}-{}-{ns:x}-{count}", std::process::id())
 }
 
+/// Name of this process, as [`unique`] makes it, for records of what it has done.
+pub(crate) fn this_process() -> &'static str {
+    static NAME: std::sync::LazyLock<String> = std::sync::LazyLock::new(unique);
+    &NAME
+}
+
 /// Scope of a computer that does not report one.
 const UNKNOWN: &str = "unknown";
 

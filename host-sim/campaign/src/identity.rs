@@ -29,6 +29,41 @@ impl fmt::Display for CaseId {
     }
 }
 
+/// Fewest characters of the beginning of an identity: shorter ones would name a case by chance.
+const BEGINNING: usize = 4;
+/// The same of one that has only decimal digits, and might be a place in a plan.
+const BEGINNING_OF_DIGITS: usize = 8;
+
+/// The beginning of an identity, as tables show a long text, with or without `…`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Beginning(String);
+
+impl Beginning {
+    /// Whether an identity begins with it.
+    pub(crate) fn is_of(&self, case: CaseId) -> bool {
+        case.to_string().starts_with(&self.0)
+    }
+}
+
+impl FromStr for Beginning {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let own = text.trim_end_matches('…').to_lowercase();
+        let least = match own.bytes().all(|b| b.is_ascii_digit()) {
+            true => BEGINNING_OF_DIGITS,
+            false => BEGINNING,
+        };
+        let is_hexadecimal = own.bytes().all(|b| b.is_ascii_hexdigit());
+        if is_hexadecimal && (least..=32).contains(&own.len()) {
+            return Ok(Self(own));
+        }
+        Err(format!(
+            "`{text}` is not the beginning of a case's identity"
+        ))
+    }
+}
+
 impl FromStr for CaseId {
     type Err = String;
 

@@ -108,6 +108,10 @@ fn table_of(
     let temporary = out.with_extension(format!("{}.tmp", host::unique()));
     // From here on there is something to clean up.
     stop.begin();
+    if let Some(folder) = out.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| CampaignError::output("create the folder", folder, e))?;
+    }
     let facts = [plan_text.as_str(), &first.plan().program];
     let written = write([&temporary, out], &stores, &columns, facts, (partial, stop));
     let result = written.and_then(|merged| {

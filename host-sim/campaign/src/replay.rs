@@ -11,7 +11,7 @@ use wheeleg_studies::run::run_read;
 use wheeleg_studies::study::{Finished, Settings, Stop};
 
 use crate::cases::{Cases, Setup};
-use crate::identity::CaseId;
+use crate::identity::Beginning;
 use crate::part::{self, PLAN};
 use crate::row::{self, Row, Status};
 use crate::simulate::{hash, simulate};
@@ -81,8 +81,8 @@ enum From {
     Table(PathBuf),
 }
 
-/// Repeats a case. `from` is the folder of a campaign or its merged table; `case` is an identity or an index
-/// in the plan.
+/// Repeats a case. `from` is the folder of a campaign or its merged table; `case` is an identity, its beginning, or an
+/// index in the plan.
 ///
 /// # Errors
 /// [`CampaignError::Refused`] if there is no such case; otherwise as for a run.
@@ -184,33 +184,40 @@ pub(crate) fn plan_of_table(path: &Path) -> Result<PlanFile, CampaignError> {
         reason: "it has no plan".to_owned(),
         help: "give the table of `wheeleg campaign merge`, or the folder of a campaign".to_owned(),
     })?;
-    PlanFile::parse(path, text)
+    PlanFile::parse(text).map_err(|reason| CampaignError::unreadable(path, reason))
 }
 
-/// Index of a case, and its row.
+/// Index of a case, and its row. The case is a place in the plan, or an identity or its beginning.
 fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>), CampaignError> {
     let missing = || {
         CampaignError::refused(
             format!("there is no case `{}`", word(case)),
             format!(
-                "give one of the column `case`, 32 hexadecimal digits, or a place from 0 to {}",
+                "give one of the column `case`, or its first characters (from 4), or a place from 0 to {}",
                 plan.cases - 1
             ),
         )
     };
-    let by_index = case.parse::<u64>().ok().filter(|_| case.len() < 32);
-    if let Some(index) = by_index {
-        if index >= plan.cases {
-            return Err(missing());
-        }
+    let by_index = case.parse::<u64>().ok();
+    if let Some(index) = by_index.filter(|index| *index < plan.cases && case.len() < 32) {
         let row = rows_at(place, Some(index / plan.block))?;
         let row = row.into_iter().find(|row| row.index == index);
         return Ok((index, row));
     }
-    let id: CaseId = case.parse().map_err(|_| missing())?;
-    let row = rows_at(place, None)?.into_iter().find(|row| row.case == id);
-    let row = row.ok_or_else(missing)?;
-    Ok((row.index, Some(row)))
+    let beginning: Beginning = case.parse().map_err(|_| missing())?;
+    let mut rows = rows_at(place, None)?;
+    rows.retain(|row| beginning.is_of(row.case));
+    // Files of killed processes may have a row twice.
+    rows.sort_by_key(|row| row.case);
+    rows.dedup_by_key(|row| row.case);
+    match rows.len() {
+        0 => Err(missing()),
+        1 => Ok((rows[0].index, rows.pop())),
+        many => Err(CampaignError::refused(
+            format!("{many} cases begin with `{}`", word(case)),
+            "give more characters of the column `case`",
+        )),
+    }
 }
 
 /// Rows of one block, or of all blocks; for a folder, the rows that exist.
@@ -232,6 +239,77 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             let read = TableReader::new(file).and_then(|reader| reader.read());
             let table = read.map_err(|e| CampaignError::unreadable(path, e))?;
             row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, "rows that are none"))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use wheeleg_config::plan::{Plan, Sources};
+
+    use super::*;
+    use crate::Figure;
+
+    /// Four cases, two of which begin alike.
+    const CASES: [&str; 4] = [
+        "044f1d1a0af2183bb3b31813bface27d",
+        "044f1d1a1af2183bb3b31813bface27d",
+        "12345678901f183bb3b31813bface27d",
+        "feed1d1a0af2183bb3b31813bface27d",
+    ];
+
+    #[test]
+    fn a_case_is_found_by_its_place_its_identity_and_the_beginning_of_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("plan.toml");
+        let text =
+            "name = \"x\"\nroot = 1\nblock = 4\nreplicates = 4\n[base]\naxis = \"small-12x50\"\n";
+        std::fs::write(&file, text).expect("written");
+        let plan = Plan::of(Sources::load(&file.to_string_lossy()).expect("read")).expect("a plan");
+        let columns = Cases::new(&plan).expect("cases").columns().clone();
+        let of_plan = PlanFile::of(&plan, 1.0);
+        let store = Store::create(folder.path(), of_plan.clone(), &Stop::default());
+        let store = store.expect("a folder");
+        let rows = CASES.iter().zip(0..).map(|(case, index)| Row {
+            case: case.parse().expect("an identity"),
+            index,
+            block: 0,
+            sample: 0,
+            replicate: index,
+            seed: index,
+            factors: Vec::new(),
+            status: Status::Error,
+            error: None,
+            log_hash: None,
+            simulated_s: None,
+            passed: None,
+            figures: vec![Figure::default(); columns.targets.len()],
+        });
+        let rows: Vec<Row> = rows.collect();
+        store.write_part(&columns, 0, &rows).expect("written");
+        let place = From::Folder(Box::new(store));
+        let found = |case: &str| find(&place, &of_plan, case).map(|(index, _)| index);
+        for (case, index) in [
+            ("2", 2),
+            (CASES[3], 3),
+            ("feed", 3),
+            ("FEED1d…", 3),
+            ("044f1d1a0", 0),
+            ("12345678", 2),
+        ] {
+            assert_eq!(found(case).expect(case), index, "{case}");
+        }
+        for (case, told) in [
+            ("044f1d1a", "2 cases begin with `044f1d1a`"),
+            // Decimal digits may be a place beyond the plan.
+            ("1234", "there is no case `1234`"),
+            ("fee", "there is no case `fee`"),
+            ("feed2", "there is no case `feed2`"),
+            ("x", "there is no case `x`"),
+            ("", "there is no case ``"),
+        ] {
+            let error = found(case).expect_err(case).to_string();
+            assert!(error.contains(told), "{case}: {error}");
         }
     }
 }

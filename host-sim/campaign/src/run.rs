@@ -3,7 +3,7 @@
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -61,6 +61,8 @@ pub struct Ran {
     pub stopped: Option<Signal>,
     /// Parts that were set aside, and why.
     pub aside: Vec<(PathBuf, String)>,
+    /// Whether another process worked on the same blocks, so that cases may have been computed twice.
+    pub shared: bool,
 }
 
 /// Computes a shard. Work that an earlier process finished is not repeated.
@@ -100,6 +102,7 @@ pub fn run(
         progress.begin("cases", of);
     }
     let aside = Mutex::new(Vec::new());
+    let shared = AtomicBool::new(false);
     let work = Work {
         store,
         cases,
@@ -116,6 +119,15 @@ pub fn run(
         aside: &|path: &Path, why: &str| {
             let mut list = aside.lock().expect("nobody panics with it");
             list.push((path.to_owned(), why.to_owned()));
+        },
+        shared: &|| {
+            let first = !shared.swap(true, Ordering::Relaxed);
+            if first && !options.json {
+                progress.tell(
+                    "another process works on the same blocks, and both compute the same cases: stop one, \
+                     or give each its share with --shard I/N",
+                );
+            }
         },
     };
     let result = work.run(blocks, options.threads);
@@ -142,6 +154,7 @@ pub fn run(
         of,
         stopped: options.stop.signal().filter(|_| found + computed < of),
         aside: aside.into_inner().unwrap_or_default(),
+        shared: shared.into_inner(),
     })
 }
 

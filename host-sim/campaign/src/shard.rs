@@ -111,7 +111,11 @@ impl FromStr for Shard {
         let parts = parts.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match parts {
             Some((i, n)) if i < n => Ok(Self { i, n }),
-            _ => Err("a shard is I/N, I from 0 to N - 1: 0/4, 1/4, 2/4, 3/4".to_owned()),
+            Some((_, n)) if n > 0 => Err(format!(
+                "a shard is I/N, I from 0 to N - 1: of {n} from 0/{n} to {}/{n}",
+                n - 1
+            )),
+            _ => Err("a shard is I/N, I from 0 to N - 1: of 4 from 0/4 to 3/4".to_owned()),
         }
     }
 }
@@ -180,5 +184,7 @@ mod tests {
         for text in ["", "1", "2/2", "a/b", "-1/2", "0/0"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
+        let told = "7/6".parse::<Shard>().expect_err("the seventh of six");
+        assert!(told.ends_with("from 0/6 to 5/6"), "{told}");
     }
 }

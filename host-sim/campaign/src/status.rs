@@ -25,6 +25,10 @@ pub struct State {
     /// Cases that have ended but whose row is in no file: their process has not saved it yet, or was killed
     /// before it could.
     pub unsaved: u64,
+    /// Cases of both kinds whose process is known to be dead: the next run repeats them.
+    pub lost: u64,
+    /// Whether a process is known to be working on them.
+    pub is_running: bool,
     /// Rows that missed a required target or have no result.
     pub failed: u64,
     /// Why these cases failed.
@@ -51,6 +55,8 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
         partial: 0,
         begun: 0,
         unsaved: 0,
+        lost: 0,
+        is_running: false,
         failed: 0,
         causes: Causes::default(),
         by_status: [0; 5],
@@ -106,6 +112,8 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
             let attempts = Attempts::read(store.attempts(block));
             let open = attempts.all();
             for (_, known) in open.filter(|(case, _)| !seen.contains(&i64::try_from(*case).ok())) {
+                state.lost += u64::from(known.lives == Some(false));
+                state.is_running |= known.lives == Some(true);
                 if known.open > 0 {
                     state.begun += 1;
                 } else {

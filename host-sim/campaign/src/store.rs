@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use wheeleg_config::open_file;
 use wheeleg_config::plan::{MOST_BLOCKS, MOST_IN_BLOCK, Plan, Sources, Text};
+use wheeleg_config::{open_file, word};
 use wheeleg_report::output::same_file;
 use wheeleg_studies::study::Stop;
 
@@ -53,6 +53,11 @@ pub struct PlanFile {
     pub sources: Sources,
 }
 
+/// What to do about a plan file that cannot be read. The parts have the hash of their plan, so they are found
+/// again.
+const DAMAGED: &str = "if it is the damaged file of a campaign, remove it and run the campaign's own plan with \
+     --out into this folder: the cases that have a row are found again; otherwise give another folder";
+
 /// Work per block, s, if the plan does not set the block size.
 const BLOCK_S: f64 = 60.0;
 
@@ -71,7 +76,7 @@ impl PlanFile {
             hash: hash(&plan.sources, block),
             cases: plan.cases(),
             block,
-            sources: plan.sources.clone(),
+            sources: plan.sources.clone().with_bare_names(),
         }
     }
 
@@ -91,35 +96,38 @@ impl PlanFile {
     pub fn read(path: &Path) -> Result<Self, CampaignError> {
         let text = open_file(path).and_then(std::io::read_to_string);
         let text = text.map_err(|e| CampaignError::unreadable(path, e))?;
-        Self::parse(path, &text)
+        Self::parse(&text).map_err(|reason| CampaignError::Unreadable {
+            path: path.to_owned(),
+            reason,
+            help: DAMAGED.to_owned(),
+        })
     }
 
-    /// Parses the text of a plan file; `path` is its location.
-    ///
-    /// # Errors
-    /// [`CampaignError::Unreadable`] if it is not a plan file.
-    pub(crate) fn parse(path: &Path, text: &str) -> Result<Self, CampaignError> {
-        let file: Self =
-            serde_json::from_str(text).map_err(|e| CampaignError::unreadable(path, e))?;
+    /// Parses the text of a plan file, or says why it is none.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        let file: Self = serde_json::from_str(text).map_err(|e| e.to_string())?;
         if file.format != FORMAT {
-            let reason = format!("form {}, not {FORMAT}", file.format);
-            return Err(CampaignError::unreadable(path, reason));
+            return Err(format!("form {}, not {FORMAT}", file.format));
         }
         if file.hash != hash(&file.sources, file.block) {
-            let reason = "its texts are not those of its hash".to_owned();
-            return Err(CampaignError::unreadable(path, reason));
+            return Err("its texts are not those of its hash".to_owned());
         }
         // The number of cases follows from the texts. For a plan that only another program can read, it is
         // taken as stated.
         let cases = file.plan().map_or(file.cases, |plan| plan.cases());
         if file.cases != cases || cases == 0 {
-            let reason = format!(
+            return Err(format!(
                 "`cases` is {}, allowed: {cases}, as in its plan",
                 file.cases
-            );
-            return Err(CampaignError::unreadable(path, reason));
+            ));
         }
         Ok(file)
+    }
+
+    /// Number of blocks.
+    #[must_use]
+    pub fn blocks(&self) -> u64 {
+        self.cases.div_ceil(self.block)
     }
 
     /// The plan in the file.
@@ -179,13 +187,32 @@ impl PlanFile {
             let Some((_, found)) = same else {
                 return Some(format!("it has a {name}"));
             };
-            let mut lines = text.text.lines().zip(found.text.lines());
             if text.text != found.text {
-                let number = lines.position(|(a, b)| a != b).map_or(0, |n| n + 1);
-                return Some(format!("the {name} differs, first in line {number}"));
+                let place = first_difference(&text.text, &found.text);
+                return Some(format!("the {name} differs, first in {place}"));
             }
         }
         Some("it lacks a scenario, a robot or an axis".to_owned())
+    }
+}
+
+/// The first line in which two different texts differ, as it was and as it is.
+fn first_difference(was: &str, is: &str) -> String {
+    let (mut was, mut is) = (was.lines(), is.lines());
+    let line = |line: Option<&str>| match line {
+        Some(line) => format!("`{}`", word(line)),
+        None => "missing".to_owned(),
+    };
+    let mut number = 0_u64;
+    loop {
+        number += 1;
+        match (was.next(), is.next()) {
+            (None, None) => return "how a line ends".to_owned(),
+            (was, is) if was != is => {
+                return format!("line {number}: {} then, {} now", line(was), line(is));
+            }
+            _ => {}
+        }
     }
 }
 
@@ -236,6 +263,8 @@ impl Store {
     /// [`CampaignError::Refused`] if the folder belongs to another plan or program, which is named;
     /// [`CampaignError::Output`] if it cannot be written.
     pub fn create(folder: &Path, plan: PlanFile, stop: &Stop) -> Result<Self, CampaignError> {
+        // Nothing is written into the folder of another campaign.
+        Self::ensure_not_of_another(folder, &plan)?;
         stop.begin();
         for name in ["parts", "attempts"] {
             let path = folder.join(name);
@@ -248,20 +277,34 @@ impl Store {
         if !path.exists() {
             create_new(&path, text.as_bytes())?;
         }
-        let found = PlanFile::read(&path)?;
-        if let Some(difference) = found.difference(&plan) {
-            return Err(CampaignError::refused(
-                format!(
-                    "the folder `{}` is of another campaign: {difference}",
-                    folder.display()
-                ),
-                "give another folder with --out DIR",
-            ));
-        }
+        // Another process may have been the first.
+        Self::ensure_not_of_another(folder, &plan)?;
         Ok(Self {
             folder: folder.to_owned(),
-            plan: found,
+            plan: PlanFile::read(&path)?,
         })
+    }
+
+    /// Checks, without writing anything, that [`Store::create`] would take the folder.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if the folder belongs to another plan or program, which is named;
+    /// [`CampaignError::Unreadable`] if its plan is invalid.
+    pub fn ensure_not_of_another(folder: &Path, plan: &PlanFile) -> Result<(), CampaignError> {
+        let path = folder.join(PLAN_FILE);
+        if !path.exists() {
+            return Ok(());
+        }
+        let Some(difference) = PlanFile::read(&path)?.difference(plan) else {
+            return Ok(());
+        };
+        Err(CampaignError::refused(
+            format!(
+                "the folder `{}` is of another campaign: {difference}",
+                folder.display()
+            ),
+            "give another folder with --out DIR; every character of a plan counts, in its comments too",
+        ))
     }
 
     /// Opens an existing folder.
@@ -309,7 +352,7 @@ impl Store {
     /// Number of blocks.
     #[must_use]
     pub fn blocks(&self) -> u64 {
-        self.plan.cases.div_ceil(self.plan.block)
+        self.plan.blocks()
     }
 
     /// Indices of the cases of a block.
@@ -369,10 +412,12 @@ impl Store {
         Ok(to)
     }
 
-    /// Blocks that have a file, whether complete or not.
+    /// Blocks that have a file, whether complete or not; a process that was killed soon leaves only the record
+    /// of the cases that it had begun.
     pub(crate) fn begun(&self) -> BTreeSet<u64> {
-        let entries = fs::read_dir(self.folder.join("parts"));
-        let names = entries.into_iter().flatten().flatten();
+        let folders = ["parts", "attempts"].into_iter();
+        let entries = folders.map(|name| fs::read_dir(self.folder.join(name)));
+        let names = entries.flatten().flatten().flatten();
         let number = |name: &str| name.split('.').next()?.parse().ok();
         let blocks = names.filter_map(|entry| number(&entry.file_name().to_string_lossy()));
         blocks.collect()

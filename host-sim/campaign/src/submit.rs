@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::{CampaignError, Store};
+use crate::{CampaignError, PlanFile};
 
 /// Shortest work of a task, s: a shorter task is mostly start-up, and many of them overload a site.
 const LEAST_TASK_S: f64 = 30.0;
@@ -27,27 +27,25 @@ pub struct Submission {
 }
 
 impl Submission {
-    /// Prepares the submission of a folder.
+    /// Prepares the submission of a plan into a folder; writes nothing.
     ///
     /// # Errors
     /// [`CampaignError::Refused`], stating what is allowed, if there are more shards than blocks, or more
     /// than a few shards with less than 30 s of work each, judging by the simulated time of a case.
     pub fn new(
-        store: &Store,
+        plan: &PlanFile,
         name: &str,
-        program: &Path,
+        [program, folder]: [&Path; 2],
         shards: u64,
         case_s: f64,
     ) -> Result<Self, CampaignError> {
-        let work_s = store.plan().cases as f64 * case_s;
-        let most = ((work_s / LEAST_TASK_S) as u64)
-            .max(FEW)
-            .min(store.blocks());
+        let work_s = plan.cases as f64 * case_s;
+        let most = ((work_s / LEAST_TASK_S) as u64).max(FEW).min(plan.blocks());
         if shards == 0 || shards > most {
             return Err(CampaignError::refused(
                 format!(
                     "{shards} shards are too many, or none: the campaign has {} blocks, about {work_s:.0} s of work",
-                    store.blocks()
+                    plan.blocks()
                 ),
                 format!(
                     "give --shards from 1 to {most}: a task has at least one block, and above \
@@ -62,7 +60,7 @@ impl Submission {
         Ok(Self {
             name: name.to_owned(),
             program: absolute(program),
-            folder: absolute(store.folder()),
+            folder: absolute(folder),
             shards,
         })
     }
@@ -110,12 +108,11 @@ impl Submission {
             .collect()
     }
 
-    /// Submits the array and the merge job to Slurm; returns their numbers.
+    /// Checks that Slurm is there and allows so many tasks.
     ///
     /// # Errors
-    /// [`CampaignError::Refused`] if Slurm is missing, allows fewer tasks, or refuses;
-    /// [`CampaignError::Output`] if the script cannot be written.
-    pub fn submit_to_slurm(&self, further: &[String]) -> Result<[String; 2], CampaignError> {
+    /// [`CampaignError::Refused`] if not.
+    pub fn ensure_slurm_allows(&self) -> Result<(), CampaignError> {
         let config = output_of("scontrol", &["show".to_owned(), "config".to_owned()])?;
         if let Some(most) = max_array_size(&config)
             && self.shards > most
@@ -128,6 +125,14 @@ impl Submission {
                 format!("give --shards from 1 to {most}"),
             ));
         }
+        Ok(())
+    }
+
+    /// Submits the array and the merge job to Slurm; returns their numbers. The folder has its plan.
+    ///
+    /// # Errors
+    /// [`CampaignError::Refused`] if Slurm refuses; [`CampaignError::Output`] if the script cannot be written.
+    pub fn submit_to_slurm(&self, further: &[String]) -> Result<[String; 2], CampaignError> {
         let folder = Path::new(&self.folder).join("slurm");
         std::fs::create_dir_all(&folder)
             .map_err(|e| CampaignError::output("create the folder", &folder, e))?;

@@ -68,6 +68,8 @@ pub(crate) struct Work<'a> {
     pub(crate) on_row: &'a (dyn Fn(&Row) -> Result<(), CampaignError> + Sync),
     /// Called for every part that was set aside.
     pub(crate) aside: &'a (dyn Fn(&Path, &str) + Sync),
+    /// Called for every block on which another process is working, too.
+    pub(crate) shared: &'a (dyn Fn() + Sync),
 }
 
 impl Work<'_> {
@@ -189,12 +191,16 @@ impl Work<'_> {
         (self.found)(found().count() as u64, failed as u64);
         let left = wanted.iter().copied();
         let left: VecDeque<u64> = left.filter(|index| !rows.contains_key(index)).collect();
+        let attempts = Attempts::read(self.store.attempts(number));
+        if attempts.is_shared() {
+            (self.shared)();
+        }
         let block = Block {
             number,
             wanted: wanted.len(),
             rows: Mutex::new(rows),
             efforts: Mutex::new(Vec::new()),
-            attempts: Attempts::read(self.store.attempts(number)),
+            attempts,
             saved: Mutex::new(Saved {
                 since: Instant::now(),
                 files,

@@ -494,6 +494,18 @@ fn the_mark_stands_under_what_is_wrong() {
             10,
             "has no lower end",
         ),
+        (
+            "parameter = [\"robot.supply.droop\", \"plant.moving.mass\"]\ngrid = [1.0]\nunit = \"bar\"",
+            7,
+            36,
+            "every case is a robot",
+        ),
+        (
+            "parameter = \"controller\"\ngrid = [\"predictive\"]",
+            7,
+            13,
+            "every case is a robot",
+        ),
     ] {
         let text = format!("{HEAD}[factor.x]\n{factor}\n");
         let error = Plan::of(sources(&text)).expect_err(factor);

@@ -169,6 +169,66 @@ fn mistakes_are_told() {
     }
 }
 
+/// What to write instead of a path, or of numbers that are none.
+#[test]
+fn a_mistake_in_a_factor_says_what_to_write() {
+    let grid = "grid = [1.0]\nunit = \"kg\"";
+    let mass = "parameter = \"plant.moving.mass\"\nscale = true";
+    for (factor, help) in [
+        (
+            format!("parameter = \"plnt.moving.mass\"\n{grid}"),
+            "did you mean \"plant.moving.mass\"?",
+        ),
+        (
+            format!("parameter = \"moving.mass\"\n{grid}"),
+            "did you mean \"plant.moving.mass\"?",
+        ),
+        (
+            "parameter = \"contoller\"\ngrid = [\"predictive\"]".to_owned(),
+            "did you mean \"controller\"?",
+        ),
+        (
+            format!("parameter = \"temperature\"\n{grid}"),
+            "for example \"plant.moving.mass\"",
+        ),
+        (
+            format!("parameter = \"plant.moving.colour\"\n{grid}"),
+            "axes/bench-vq110u.toml gives in [moving]: mass, load",
+        ),
+        (
+            format!("parameter = \"plant.paint.colour\"\n{grid}"),
+            "axes/bench-vq110u.toml has the sections gas, supply, ",
+        ),
+        (
+            format!("{mass}\nuniform = {{ min = 2.0, max = 0.5 }}"),
+            "exchange the two: `min = 0.5`, `max = 2`",
+        ),
+        (
+            format!("{mass}\nuniform = {{ min = 2.0, max = 2.0 }}"),
+            "for one value write `grid = [2]`",
+        ),
+        (
+            format!("{mass}\nuniform = {{ min = nan, max = 2.0 }}"),
+            "NaN and infinity are none",
+        ),
+        (
+            format!("{mass}\ngrid = [1.0, nan]"),
+            "NaN and infinity are no values",
+        ),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("plan.toml");
+        fs::write(&path, format!("{HEAD}{BASE}[factor.x]\n{factor}\n")).expect("written");
+        let plan = Sources::load(&path.to_string_lossy()).and_then(Plan::of);
+        let error = plan.expect_err(&factor);
+        let [problem] = error.problems() else {
+            panic!("{:?}", error.problems())
+        };
+        let told = problem.help_text().unwrap_or_default();
+        assert!(told.contains(help), "{help}: {told}\n{}", problem.summary());
+    }
+}
+
 /// A factor of the plant scales what the data sheet of a case states: its axis file's, or what another factor makes
 /// of it.
 #[test]

@@ -558,6 +558,160 @@ fn an_indexed_job_of_kubernetes_comes_to_the_table_of_one_process() {
     assert_eq!(refused.status.code(), Some(2), "more pods than blocks");
 }
 
+/// Two laws on the bench: eight cases of a few milliseconds.
+fn bench_plan(folder: &Path, head: &str) -> PathBuf {
+    let path = folder.join("bench.toml");
+    let text = format!(
+        "name = \"bench\"\nroot = 3\nsamples = 8\n{head}[base]\naxis = \"small-12x50\"\nmove = \"first-step\"\n\
+         [factor.friction]\nparameter = \"plant.friction.viscous\"\nscale = true\n\
+         uniform = {{ min = 0.5, max = 1.5 }}\n"
+    );
+    fs::write(&path, text).expect("written");
+    path
+}
+
+/// A shard without work says why: too few blocks, or a pilot that ends before it.
+#[test]
+fn a_shard_without_work_says_why() {
+    let home = folder();
+    let run = |plan: &Path, out: &str, arguments: &[&str]| {
+        let mut command = wheeleg();
+        command
+            .arg("run")
+            .arg(plan)
+            .arg("--out")
+            .arg(home.path().join(out));
+        let run = output(command.args(arguments));
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        [text(&run.stdout), text(&run.stderr)]
+    };
+    let one = bench_plan(home.path(), "");
+    for shard in ["0/2", "1/2"] {
+        let [_, told] = run(&one, "one", &["--shard", shard]);
+        let words =
+            "only 1 of 2 shards have work: the 8 cases make 1 block; for all, write `block = 4`";
+        assert!(told.contains(words), "{told}");
+    }
+    let two = bench_plan(home.path(), "block = 4\n");
+    let [told, warned] = run(&two, "two", &["--shard", "1/2", "--first", "3"]);
+    assert!(
+        told.contains("0 of 0 in shard 1/2: it begins with place 4 in the plan")
+            && !warned.contains("only"),
+        "{told}{warned}"
+    );
+    // A pilot of all cases is the whole campaign.
+    let [told, _] = run(&two, "two", &["--first", "99999"]);
+    assert!(
+        told.contains("next    wheeleg campaign merge") && !told.contains("--partial"),
+        "{told}"
+    );
+}
+
+/// What a killed process has lost is counted, with the command that repeats it.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_process_has_lost_is_told_with_what_to_do() {
+    let home = folder();
+    let plan = plan(home.path(), 200);
+    let long = fs::read_to_string(&plan)
+        .expect("there")
+        .replace("block = 4", "block = 400");
+    fs::write(&plan, long).expect("written");
+    let out = home.path().join("out");
+    let mut child = wheeleg()
+        .arg("run")
+        .arg(&plan)
+        .arg("--out")
+        .arg(&out)
+        .args(["--threads", "2"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("started");
+    let attempts = out.join("attempts/000000.jsonl");
+    let begun = Instant::now();
+    let lines = || {
+        fs::read_to_string(&attempts)
+            .unwrap_or_default()
+            .lines()
+            .count()
+    };
+    while lines() < 6 {
+        assert!(begun.elapsed() < HUNG, "no case is begun");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let state = || text(&output(wheeleg().arg("status").arg(&out)).stdout);
+    let running = state();
+    assert!(running.contains("begun ") && !running.contains("lost ") && !running.contains("next "));
+    // A second process is told that it repeats the work of the first.
+    let mut second = wheeleg();
+    let second = second
+        .arg("run")
+        .arg(&plan)
+        .arg("--out")
+        .arg(&out)
+        .args(["--first", "1"]);
+    let second = output(second);
+    assert!(text(&second.stderr).contains("another process works on the same blocks"));
+    assert!(text(&second.stdout).contains("shared  another process"));
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    let told = state();
+    let lost = told.lines().find_map(|line| line.strip_prefix("lost    "));
+    let lost = lost.and_then(|line| line.split(' ').next()?.parse::<u64>().ok());
+    assert!(lost >= Some(2), "{told}");
+    let folder = out.display();
+    let next = format!("next    wheeleg campaign run {folder}/plan.json --out {folder}\n");
+    assert!(told.ends_with(&next), "{told}");
+}
+
+/// The corrected command is not refused because of what a first, refused one has left.
+#[test]
+fn a_refused_submission_and_a_dry_run_write_nothing() {
+    let home = folder();
+    let plan = plan(home.path(), 6);
+    let out = home.path().join("out");
+    let submit = |arguments: &[&str]| {
+        let mut command = wheeleg();
+        command.arg("submit").arg(&plan).arg("--out").arg(&out);
+        command.args(arguments);
+        output(&mut command)
+    };
+    for (arguments, code) in [
+        (&["--slurm", "--dry-run", "--shards", "1000"][..], 2),
+        (&["--slurm", "--shards", "1000"], 2),
+        (&["--kubernetes", "--shards", "1000"], 2),
+        (&["--slurm", "--dry-run", "--shards", "3"], 0),
+        (&["--kubernetes", "--dry-run", "--shards", "3"], 0),
+    ] {
+        let told = submit(arguments);
+        let words = text(&told.stderr);
+        assert_eq!(told.status.code(), Some(code), "{arguments:?}: {words}");
+        assert_eq!(told.stdout.is_empty(), code != 0, "{arguments:?}");
+        assert!(!out.exists(), "{arguments:?}");
+    }
+    // What another campaign forbids is refused before the submission.
+    succeeded(
+        wheeleg()
+            .arg("run")
+            .arg(&plan)
+            .arg("--out")
+            .arg(&out)
+            .args(["--first", "1"]),
+    );
+    fs::write(
+        &plan,
+        fs::read_to_string(&plan).expect("there") + "# more\n",
+    )
+    .expect("written");
+    let told = submit(&["--slurm", "--dry-run", "--shards", "3"]);
+    assert!(
+        text(&told.stderr).contains("`# more` now"),
+        "{}",
+        text(&told.stderr)
+    );
+}
+
 /// Random numbers, the same every time.
 fn random(state: &mut u64) -> u64 {
     // Xorshift (Marsaglia 2003).

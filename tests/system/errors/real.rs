@@ -316,8 +316,8 @@ fn campaigns(folder: &Path, all: &mut Vec<Driven>) {
         words,
     ));
     let kept: PathBuf = folder.join("kept");
-    let store = Store::create(&kept, file(), &Stop::default()).expect("made");
-    let none = Submission::new(&store, "x", Path::new("wheeleg"), 0, 10.0);
+    Store::create(&kept, file(), &Stop::default()).expect("made");
+    let none = Submission::new(&file(), "x", [Path::new("wheeleg"), &kept], 0, 10.0);
     let words = vec!["0 shards"];
     all.push((
         "CampaignError::Refused",

@@ -8,6 +8,7 @@ use wheeleg_config::plan::{Plan, Sampler};
 use wheeleg_report::stats;
 
 use super::Merged;
+use super::asked::Asked;
 use super::cells::{self, Cell};
 use super::pairs::{self, Paired};
 use super::worst::{Worst, worst};
@@ -143,6 +144,8 @@ pub struct OfScenario {
 /// What a table shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Findings {
+    /// What the plan asks.
+    pub asked: Asked,
     /// Rows.
     pub rows: u64,
     /// Rows by [`Status::ALL`].
@@ -197,6 +200,7 @@ pub(super) fn find(merged: &Merged) -> Result<Findings, CampaignError> {
     };
     let targets = columns.map(|column| of_target(merged, column, &cells, &drawn, shared.len()));
     Ok(Findings {
+        asked: Asked::of(&plan),
         rows: table.rows() as u64,
         by_status: by_status.to_vec(),
         passed: cells

@@ -1,5 +1,6 @@
 //! The report page of a campaign: what its table shows, and how certain that is.
 
+mod asked;
 mod cells;
 mod findings;
 mod page;
@@ -18,6 +19,7 @@ use crate::store::PlanFile;
 use crate::table::{Table, TableReader};
 use crate::{CampaignError, replay};
 
+pub use asked::{Asked, OfFactor};
 pub use findings::{Findings, OfScenario, Rate};
 pub use pairs::{Change, Paired, Pairs};
 pub use worst::Worst;

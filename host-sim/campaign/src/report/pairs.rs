@@ -41,6 +41,9 @@ pub struct TargetSplit {
 pub struct Change {
     /// Column of the value.
     pub column: Column,
+    /// Whether the change is that of the distance from the middle of the limits, because the target has limits
+    /// on both sides; otherwise it is that of the value.
+    pub of_distance: bool,
     /// Mean of after − before.
     pub mean: Option<f64>,
     /// Its 95 % interval, by resampling the pairs; for very many pairs, by the normal distribution.
@@ -179,14 +182,17 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
     let changes = columns
         .filter(|column| after.columns.targets.contains(&column.name))
         .map(|column| {
+            let middle = column.middle();
             let numbers = |of: &Merged, row: usize| -> Option<f64> {
-                of.table.numbers(&column.name).get(row).copied().flatten()
+                let value = of.table.numbers(&column.name).get(row).copied().flatten()?;
+                Some(middle.map_or(value, |middle| (value - middle).abs()))
             };
             let differences: Vec<f64> = rows
                 .iter()
                 .filter_map(|(i, j)| Some(numbers(after, *j)? - numbers(before, *i)?))
                 .collect();
             Change {
+                of_distance: middle.is_some(),
                 mean: stats::mean(&differences),
                 interval: interval_of_mean(&differences),
                 column: column.clone(),

@@ -1,5 +1,7 @@
-//! The worst cases: first those without a result, then those furthest outside a required limit. Among the
-//! cases that passed, the nearest to a limit come first.
+//! The worst cases: first those without a result, then those furthest outside a required limit; of equal ones,
+//! those whose next miss is the furthest. Among the cases that passed, the nearest to a limit come first.
+
+use std::cmp::Ordering;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -105,6 +107,14 @@ fn furthest_first<'a>(missed: impl Iterator<Item = Miss<'a>>) -> Vec<Miss<'a>> {
     missed
 }
 
+/// Compares misses, the furthest of each case first: all cases that a fault has stopped miss its limit of zero
+/// alike, and differ in what else they miss.
+fn further(a: &[f64], b: &[f64]) -> Ordering {
+    let mut pairs = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+    let first = pairs.find(|order| order.is_ne());
+    first.unwrap_or_else(|| a.len().cmp(&b.len()))
+}
+
 pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
     let table = &merged.table;
     let (statuses, passed) = (table.texts("status"), table.flags("passed"));
@@ -136,25 +146,26 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
             .filter(|(_, room)| *room >= 0.0);
         rooms.min_by(|a, b| a.1.total_cmp(&b.1))
     };
-    // Within a class, rank by the measured values; less room is worse.
-    let rank = |row: usize| -> (Class, f64) {
+    // Within a class, rank by the measured values, the furthest miss first; less room is worse.
+    let rank = |row: usize| -> (Class, Vec<f64>) {
         if statuses[row].as_deref() != Some(Status::Ok.name()) {
-            return (Class::NoResult, 0.0);
+            return (Class::NoResult, Vec::new());
         }
         if passed[row] == Some(true) {
             let room = nearest(row).map_or(f64::INFINITY, |(_, room)| room);
-            return (Class::Passed, -room);
+            return (Class::Passed, vec![-room]);
         }
-        let furthest = missed_in(row).filter_map(|(_, by)| by).fold(0.0, f64::max);
-        match missed_in(row).any(|(_, by)| by.is_none()) {
-            true => (Class::NotMeasured, furthest),
-            false => (Class::Missed, furthest),
-        }
+        let missed = furthest_first(missed_in(row));
+        let class = match missed.iter().any(|(_, by)| by.is_none()) {
+            true => Class::NotMeasured,
+            false => Class::Missed,
+        };
+        (class, missed.into_iter().filter_map(|(_, by)| by).collect())
     };
-    let mut ranked: Vec<(usize, (Class, f64))> =
+    let mut ranked: Vec<(usize, (Class, Vec<f64>))> =
         (0..table.rows()).map(|row| (row, rank(row))).collect();
     // The sort is stable: equally bad cases stay in the order of the plan.
-    ranked.sort_by(|(_, (a, by_a)), (_, (b, by_b))| b.cmp(a).then(by_b.total_cmp(by_a)));
+    ranked.sort_by(|(_, (a, by_a)), (_, (b, by_b))| b.cmp(a).then_with(|| further(by_b, by_a)));
     let cases = table.texts("case");
     ranked
         .into_iter()

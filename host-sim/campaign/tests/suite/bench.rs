@@ -10,7 +10,7 @@ use wheeleg_campaign::{Case, Cases, Outcome, Recording, Setup, Status, merge, re
 use wheeleg_config::bench::Bench;
 use wheeleg_config::plan::Plan;
 use wheeleg_report::number::short;
-use wheeleg_studies::study::{Signal, Stop};
+use wheeleg_studies::study::{Settings, Signal, Stop};
 
 use crate::common::{options, parts, plan_of, run_in};
 
@@ -321,6 +321,20 @@ fn the_first_step_is_judged_itself() {
     let rise_s = rise.and_then(|t| t.value).expect("measured");
     assert!((0.05..0.5).contains(&rise_s), "{rise_s}");
     assert!(!outcome.targets.iter().any(|t| t.id.starts_with("first-")));
+    // Its page does not say that the first move is not measured.
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = Settings {
+        out: folder.path().join("case"),
+        png: false,
+        stop: Stop::default(),
+    };
+    wheeleg_studies::bench::write(&bench_of(&case), case.seed, &played, &settings)
+        .expect("written");
+    let page = fs::read_to_string(settings.out.join("report.html")).expect("a page");
+    assert!(
+        page.contains("The measured move is the first one after power-up")
+            && !page.contains("is not one of them")
+    );
 }
 
 /// A target that no control law can meet only informs; for moves without a change of load it is required.

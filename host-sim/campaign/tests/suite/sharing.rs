@@ -3,6 +3,7 @@
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use miette::Diagnostic as _;
 use wheeleg_campaign::{
     CampaignError, Merged, PlanFile, Shard, Store, merge, merge_partial, status, work_s,
 };
@@ -158,6 +159,27 @@ fn a_pilot_is_taken_up() {
     assert_eq!(merged(folder.path()), whole(&plan).1);
 }
 
+/// The bytes of a table do not depend on how the path of its plan was given.
+#[test]
+fn a_table_does_not_know_how_its_plan_was_named() {
+    let tables: Vec<Vec<u8>> = ["", "further/"]
+        .into_iter()
+        .map(|between| {
+            let home = tempfile::tempdir().expect("a folder");
+            let path = home.path().join(format!("{between}plan.toml"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("created");
+            fs::write(&path, &spread(2).sources.plan.text).expect("written");
+            let plan = Plan::load(&path.to_string_lossy()).expect("a plan");
+            let out = home.path().join("out");
+            let (ran, _) = run_in(&out, &plan, &options(1), &|case| Some(computed(case)));
+            ran.expect("it runs");
+            merged(&out);
+            fs::read(out.join("cases.parquet")).expect("read")
+        })
+        .collect();
+    assert!(tables[0] == tables[1]);
+}
+
 /// A merged table may not take the place of a part or of the plan.
 #[test]
 fn a_table_is_no_file_of_its_campaign() {
@@ -178,7 +200,8 @@ fn a_table_is_no_file_of_its_campaign() {
         );
     }
     assert_eq!(crate::common::parts(folder.path()), before);
-    let beside = folder.path().join("table.parquet");
+    // A missing folder is created.
+    let beside = folder.path().join("deep/er/table.parquet");
     let merged = merge(&folders, &beside, &Stop::default()).expect("merged");
     assert_eq!(merged.expect("not stopped").rows, 8);
 }
@@ -191,6 +214,37 @@ fn a_block_that_nobody_chose_is_a_minute_of_work() {
     let plan = crate::common::plan_of(text);
     let block = |duration_s| PlanFile::of(&plan, work_s(duration_s)).block;
     assert_eq!([0.3, 10.0, 60.0, 7200.0].map(block), [256, 64, 16, 1]);
+}
+
+/// A damaged plan file says how the campaign goes on, and what is refused writes nothing.
+#[test]
+fn a_damaged_plan_file_says_how_to_go_on_and_a_refusal_writes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = spread(4);
+    let simulate = |case: &_| Some(computed(case));
+    let run = || run_in(folder.path(), &plan, &options(1), &simulate);
+    run().0.expect("it runs");
+    let path = folder.path().join("plan.json");
+    let text = fs::read_to_string(&path).expect("there");
+    fs::write(&path, &text[..text.len() / 2]).expect("written");
+    let error = Store::open(folder.path()).expect_err("damaged");
+    let help = error.help().expect("a help").to_string();
+    assert!(
+        help.contains("remove it") && help.contains("found again"),
+        "{help}"
+    );
+    fs::remove_file(&path).expect("there");
+    let (ran, simulated) = run();
+    assert_eq!((ran.expect("it runs").found, simulated), (8, 0));
+
+    let foreign = tempfile::tempdir().expect("a folder");
+    fs::write(foreign.path().join("plan.json"), "{\"x\": 1}").expect("written");
+    let file = PlanFile::of(&plan, 1.0);
+    let refused = Store::create(foreign.path(), file, &Stop::default());
+    assert!(matches!(refused, Err(CampaignError::Unreadable { .. })));
+    let names = fs::read_dir(foreign.path()).expect("there").flatten();
+    let names: Vec<_> = names.map(|entry| entry.file_name()).collect();
+    assert_eq!(names, ["plan.json"]);
 }
 
 #[test]
@@ -207,7 +261,17 @@ fn another_plan_is_refused_and_the_difference_named() {
         error.to_string()
     };
     let told = refused(PlanFile::of(&spread(5), 1.0));
-    assert!(told.contains("the plan differs, first in line 1"), "{told}");
+    let lines = "first in line 1: `samples = 4` then, `samples = 5` now";
+    assert!(told.contains(lines), "{told}");
+    let mut more = plan.clone();
+    more.sources.plan.text.push_str("# a comment\n");
+    let told = refused(PlanFile::of(&more, 1.0));
+    let end = more.sources.plan.text.lines().count();
+    let lines = format!("line {end}: missing then, `# a comment` now");
+    assert!(told.contains(&lines), "{told}");
+    more.sources.plan.text = plan.sources.plan.text.replace('\n', "\r\n");
+    let told = refused(PlanFile::of(&more, 1.0));
+    assert!(told.contains("first in how a line ends"), "{told}");
     let told = refused(PlanFile {
         program: "wheeleg 9".to_owned(),
         ..file.clone()

@@ -110,6 +110,28 @@ impl Setting {
     }
 }
 
+impl Base {
+    /// Its settings with their values in words. A robot that is not given is the scenario's.
+    #[must_use]
+    pub fn settings(&self) -> Vec<(Setting, String)> {
+        match self {
+            Self::Robot { scenario, robot } => {
+                let robot = robot.iter().map(|robot| (Setting::Robot, robot.clone()));
+                let scenario = (Setting::Scenario, scenario.clone());
+                [scenario].into_iter().chain(robot).collect()
+            }
+            Self::Axis(base) => vec![
+                (Setting::Axis, base.axis.clone()),
+                (Setting::Move, base.motion.name().to_owned()),
+                (Setting::Controller, base.controller.name().to_owned()),
+                (Setting::Delays, base.delays.name().to_owned()),
+                (Setting::Air, base.air.name().to_owned()),
+                (Setting::LoadShare, pretty(base.load_share)),
+            ],
+        }
+    }
+}
+
 /// Reads `[base]`.
 pub(super) fn read(r: &mut Reader) -> Option<Base> {
     let Some(entry) = r.table("base") else {

@@ -47,12 +47,12 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
     let on_bench = matches!(plan.base, Base::Axis(_));
     let other = match &factor.sets {
         Sets::Base(setting) => {
-            (setting.is_of_bench() != on_bench).then(|| format!("`{}`", setting.name()))
+            (setting.is_of_bench() != on_bench).then(|| setting.name().to_owned())
         }
-        Sets::Fault(_) => on_bench.then(|| "a fault".to_owned()),
+        Sets::Fault(fault) => on_bench.then(|| fault.clone()),
         Sets::Fields(fields) => {
             let other = fields.iter().find(|f| f.part.is_of_bench() != on_bench);
-            other.map(|field| format!("`{field}`"))
+            other.map(ToString::to_string)
         }
     };
     let Some(other) = other else {
@@ -68,9 +68,13 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
             "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, and a `fault`",
         ),
     };
-    let span = span_of(r, factor);
+    let span = span_of_path(r, factor, &other);
+    let what = match factor.sets {
+        Sets::Fault(_) => "a fault".to_owned(),
+        Sets::Base(_) | Sets::Fields(_) => format!("`{other}`"),
+    };
     let message = format!(
-        "`factor.{}` sets {other}, and every case is {base}",
+        "`factor.{}` sets {what}, and every case is {base}",
         factor.name
     );
     r.problem(span, message, "not of this base", Some(allowed.to_owned()));
@@ -86,10 +90,10 @@ fn span_of(r: &Reader, factor: &Factor) -> Option<Range<usize>> {
     span.or(Some(entry.span))
 }
 
-/// Position of the path that a factor sets, one of a list if it has several.
+/// Position of the path or fault that a factor sets, one of a list if it has several.
 fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>> {
     let entry = r.table(&format!("factor.{}", factor.name))?;
-    let Some((key, item)) = entry.get("parameter") else {
+    let Some((key, item)) = entry.get("parameter").or_else(|| entry.get("fault")) else {
         return Some(entry.span);
     };
     let listed = item.as_array().into_iter().flatten();
@@ -324,7 +328,28 @@ fn nearest(base: &Template, field: &Field, factor: &Factor) -> String {
         None if field.part == Part::Robot => {
             "`wheeleg params` lists a robot's parameters".to_owned()
         }
-        None => format!("allowed are the quantities that {} gives", base.file),
+        None => given(base, field),
+    }
+}
+
+/// The quantities of a file near to an unknown path: those of its section, or the sections that there are.
+fn given(base: &Template, field: &Field) -> String {
+    let sections = base.listing.iter().filter_map(|p| p.path.split_once('.'));
+    let section = field.path.split('.').next().unwrap_or_default();
+    let own = sections.clone().filter(|(of, _)| *of == section);
+    let mut own: Vec<&str> = own.map(|(_, name)| name).collect();
+    let file = &base.file;
+    let near = match own.is_empty() {
+        false => format!("{file} gives in [{section}]: {}", own.join(", ")),
+        true => {
+            own.extend(sections.map(|(section, _)| section));
+            own.dedup();
+            format!("{file} has the sections {}", own.join(", "))
+        }
+    };
+    match field.part.is_of_bench() {
+        true => format!("{near}; docs/reference/axis-fields.md lists all"),
+        false => near,
     }
 }
 

@@ -3,6 +3,8 @@
 //! Densities are those of the text books; a normal and a log-normal one may be truncated by `min` and `max`,
 //! and the rest then has probability 1.
 
+use std::cmp::Ordering;
+
 use super::value::{Value, list};
 use crate::quantity::{brief, pretty};
 use crate::reader::{Entry, Reader};
@@ -108,6 +110,56 @@ impl Distribution {
     }
 }
 
+impl std::fmt::Display for Distribution {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ends = |min: f64, max: f64| match (min.is_finite(), max.is_finite()) {
+            (true, true) => format!(", from {} to {}", pretty(min), pretty(max)),
+            (true, false) => format!(", from {}", pretty(min)),
+            (false, true) => format!(", up to {}", pretty(max)),
+            (false, false) => String::new(),
+        };
+        match self {
+            Self::Uniform { min, max } => write!(f, "uniform{}", ends(*min, *max)),
+            Self::LogUniform { min, max } => write!(f, "loguniform{}", ends(*min, *max)),
+            Self::Normal { mean, sd, min, max } => {
+                write!(
+                    f,
+                    "normal, mean {}, sd {}{}",
+                    pretty(*mean),
+                    pretty(*sd),
+                    ends(*min, *max)
+                )
+            }
+            Self::LogNormal {
+                median,
+                sigma,
+                min,
+                max,
+            } => {
+                let ends = ends(*min, *max);
+                write!(
+                    f,
+                    "lognormal, median {}, sigma {}{ends}",
+                    pretty(*median),
+                    pretty(*sigma)
+                )
+            }
+            Self::Triangular { min, mode, max } => {
+                write!(f, "triangular, mode {}{}", pretty(*mode), ends(*min, *max))
+            }
+            Self::Choice(list) => {
+                let equal = list.iter().all(|one| one.weight == list[0].weight);
+                let one = |one: &Choice| match equal {
+                    true => one.value.to_string(),
+                    false => format!("{} (weight {})", one.value, pretty(one.weight)),
+                };
+                let list: Vec<String> = list.iter().map(one).collect();
+                write!(f, "choice of {}", list.join(", "))
+            }
+        }
+    }
+}
+
 /// Reads the distribution `key` of a factor, with its unit, empty if none is given.
 pub(super) fn read(r: &mut Reader, factor: &Entry, key: &str) -> Option<(Distribution, String)> {
     let path = factor.field_path(key);
@@ -185,7 +237,7 @@ pub(super) fn read(r: &mut Reader, factor: &Entry, key: &str) -> Option<(Distrib
             Some(entry.span.clone()),
             format!("`{path}`: {why}"),
             "not a distribution",
-            None,
+            ordered(&read),
         );
         return None;
     }
@@ -217,6 +269,20 @@ fn empty(low: f64, high: f64) -> Option<String> {
          allowed are {FAR}",
         brief(beyond.abs())
     ))
+}
+
+/// What to write instead of ends in the wrong order.
+fn ordered(d: &Distribution) -> Option<String> {
+    let [min, max] = d.ends()?;
+    match min.total_cmp(&max) {
+        Ordering::Less => None,
+        Ordering::Equal => Some(format!("for one value write `grid = [{}]`", pretty(min))),
+        Ordering::Greater => Some(format!(
+            "exchange the two: `min = {}`, `max = {}`",
+            pretty(max),
+            pretty(min)
+        )),
+    }
 }
 
 /// Why numbers do not make a distribution.

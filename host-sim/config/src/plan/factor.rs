@@ -3,7 +3,10 @@
 use super::base::Setting;
 use super::distribution::{self, Choice, Distribution};
 use super::value::{Value, list};
+use crate::axis::{AXES, AxisConfig};
+use crate::builtin;
 use crate::reader::{Entry, NAME_LENGTH, Reader};
+use crate::suggest::closest;
 
 /// The target of a factor.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -281,7 +284,7 @@ fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
                         settings.join(", ")
                     ),
                     "not a path",
-                    Some("for example \"robot.supply.set_pressure\"".into()),
+                    Some(meant(r, &text)),
                 );
             }
             ok.then_some(Sets::Fields(fields))
@@ -296,6 +299,38 @@ fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
             );
             None
         }
+    }
+}
+
+/// What may be meant by a parameter that begins with no part of a case.
+fn meant(r: &Reader, text: &str) -> String {
+    let on_bench = r.table("base").is_some_and(|base| base.has("axis"));
+    let settings = Setting::ALL.into_iter();
+    let settings = settings.filter(|setting| setting.is_of_bench() == on_bench);
+    let parts = Part::ALL.into_iter();
+    let mut parts = parts.filter(|part| part.is_of_bench() == on_bench);
+    let parameters = match on_bench {
+        true => AxisConfig::load(AXES[0].0).map(|axis| axis.parameters),
+        false => builtin::robot(builtin::ROBOTS[0].0).map(|robot| robot.parameters),
+    };
+    let parameters = parameters.unwrap_or_default();
+    let [of_file, example] = match on_bench {
+        true => [Part::Plant.prefix(), "plant.moving.mass"],
+        false => [Part::Robot.prefix(), "robot.supply.set_pressure"],
+    };
+    let meant = match text.split_once('.') {
+        None => closest(text, settings.map(Setting::name)).map(str::to_owned),
+        Some((first, rest)) => parts
+            .find(|part| closest(&format!("{first}."), [part.prefix()]).is_some())
+            .map(|part| format!("{}{rest}", part.prefix()))
+            .or_else(|| {
+                let paths = parameters.iter().map(|parameter| parameter.path.as_str());
+                closest(text, paths).map(|path| format!("{of_file}{path}"))
+            }),
+    };
+    match meant {
+        Some(meant) => format!("did you mean \"{meant}\"?"),
+        None => format!("for example \"{example}\""),
     }
 }
 

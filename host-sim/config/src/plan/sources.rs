@@ -91,6 +91,19 @@ impl Sources {
         sources.without(wrong)
     }
 
+    /// The same with the names of files without their folders, which depend on how a path was given.
+    #[must_use]
+    pub fn with_bare_names(mut self) -> Self {
+        let texts = [&mut self.scenarios, &mut self.robots, &mut self.axes].into_iter();
+        let texts = texts.flat_map(BTreeMap::values_mut);
+        for text in texts.chain([&mut self.plan]) {
+            if let Some(name) = Path::new(&text.file).file_name() {
+                text.file = name.to_string_lossy().into_owned();
+            }
+        }
+        self
+    }
+
     /// Itself, if nothing named in the plan is `wrong`; otherwise the errors at their places in the plan.
     fn without(self, wrong: Vec<(Named, ConfigError)>) -> Result<Self, ConfigError> {
         if wrong.is_empty() {

@@ -51,7 +51,9 @@ pub(super) fn list(r: &mut Reader, entry: &Entry, key: &str) -> Option<Vec<Value
                 item.to_string().trim()
             ),
             "not a list of values",
-            None,
+            Some(format!(
+                "write `{key} = [0.5, 1.0]` or `{key} = [\"NAME\"]`; NaN and infinity are no values"
+            )),
         );
         return None;
     }

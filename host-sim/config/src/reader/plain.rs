@@ -152,7 +152,7 @@ impl Reader {
                 item.span().or(Some(key_span)),
                 message,
                 "not a number",
-                None,
+                Some("write a number without quotes and unit, such as 0.5; NaN and infinity are none".into()),
             );
         }
         value

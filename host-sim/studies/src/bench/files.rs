@@ -99,6 +99,8 @@ struct Page<'a> {
     faults: String,
     missed: Vec<&'a Line<'a>>,
     targets: &'a [Line<'a>],
+    /// Which moves are measured, in a sentence or two.
+    measured: &'static str,
     figures: Vec<Picture<'a>>,
     version: &'static str,
 }
@@ -125,7 +127,7 @@ pub fn write(
             figures.push(trace_figure(&name, title(bench.motion, &name), trace));
         }
         let drawn = job.draw(figures);
-        (render(summary, &drawn), drawn)
+        (render(summary, bench.motion, &drawn), drawn)
     }))
 }
 
@@ -137,7 +139,20 @@ fn title(motion: Move, name: &str) -> &str {
     }
 }
 
-fn render(summary: &BenchSummary, drawn: &[Drawn]) -> Result<String, StudyError> {
+/// Which moves are measured.
+fn measured(motion: Move) -> &'static str {
+    match motion {
+        Move::FirstStep => {
+            "The measured move is the first one after power-up: the board has learnt nothing."
+        }
+        _ => {
+            "Of several measured moves, the worse. The first move after power-up is not one of them: in it the board \
+             learns."
+        }
+    }
+}
+
+fn render(summary: &BenchSummary, motion: Move, drawn: &[Drawn]) -> Result<String, StudyError> {
     let lines: Vec<Line<'_>> = (summary.targets.iter())
         .map(|target| Line {
             id: &target.id,
@@ -156,6 +171,7 @@ fn render(summary: &BenchSummary, drawn: &[Drawn]) -> Result<String, StudyError>
         faults: summary.faults.join(", "),
         missed: missed.collect(),
         targets: &lines,
+        measured: measured(motion),
         figures: pictures(drawn),
         version: summary.version,
     };

@@ -96,6 +96,15 @@ impl Progress {
         self.bar.set_message(what);
     }
 
+    /// Writes a line on standard error, above the bar.
+    pub fn tell(&self, line: &str) {
+        use std::io::Write as _;
+        // Standard error may be closed or full.
+        self.bar.suspend(|| {
+            let _ = writeln!(std::io::stderr(), "{line}");
+        });
+    }
+
     /// Sets the number of finished steps of the phase.
     pub fn at(&self, steps: u64) {
         self.bar.set_position(steps);

@@ -101,7 +101,7 @@ struct SubmitArgs {
     /// Print an indexed Kubernetes job, for `kubectl apply -f -`.
     #[arg(long, conflicts_with = "slurm")]
     kubernetes: bool,
-    /// Print what would be submitted instead of submitting it.
+    /// Print what would be submitted instead of submitting it; writes nothing.
     #[arg(long)]
     dry_run: bool,
     /// Further argument of sbatch, such as `--partition=long`; may be given several times.
@@ -135,9 +135,9 @@ struct MergeArgs {
     /// Folders of one campaign.
     #[arg(required = true)]
     dirs: Vec<PathBuf>,
-    /// Table to write.
-    #[arg(long, value_name = "FILE", default_value = "cases.parquet")]
-    out: PathBuf,
+    /// Table to write; a missing folder is created [default: cases.parquet in the first DIR].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Merge even if cases are missing: a table of the finished cases, for example of a pilot.
     #[arg(long)]
     partial: bool,
@@ -165,7 +165,7 @@ struct ReportArgs {
 struct ReplayArgs {
     /// Folder of a campaign, or its merged table.
     from: PathBuf,
-    /// The case: its id of 32 hexadecimal digits, or its index in the plan.
+    /// The case: its id or the beginning of it, from 4 characters, or its index in the plan.
     case: String,
     /// Folder for log, figures and report [default: runs/<plan>-<case>].
     #[arg(long, value_name = "DIR")]
@@ -235,6 +235,9 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     let out = args.out.clone();
     let out = out.unwrap_or_else(|| Path::new("runs").join(&plan.name));
     announce(&cases, args.first);
+    if let Some(idle) = print::idle(&file, shard) {
+        tell(&idle);
+    }
     let stop = stop_on_signals()?;
     let store = Store::create(&out, file, &stop)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -297,11 +300,22 @@ fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
     let (plan, file) = plan_of(&args.plan)?;
     let cases = Cases::new(&plan)?;
     cases.ensure_possible()?;
-    let stop = stop_on_signals()?;
-    let store = Store::create(&args.out, file, &stop)?;
     let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("wheeleg"));
-    let case_s = cases.work_s();
-    let submission = Submission::new(&store, &plan.name, &program, args.shards, case_s)?;
+    let (paths, case_s) = ([&*program, &*args.out], cases.work_s());
+    let submission = Submission::new(&file, &plan.name, paths, args.shards, case_s)?;
+    Store::ensure_not_of_another(&args.out, &file)?;
+    let manifest = || submission.kubernetes(&args.image, &args.claim);
+    if args.dry_run {
+        return Ok(print(&match args.kubernetes {
+            true => manifest(),
+            false => print::slurm(&submission, &args.slurm_args),
+        })?);
+    }
+    if args.slurm {
+        submission.ensure_slurm_allows()?;
+    }
+    let stop = stop_on_signals()?;
+    Store::create(&args.out, file, &stop)?;
     if let Some(signal) = stop.signal() {
         tell(&format!(
             "{} before anything was submitted; run the same command again",
@@ -310,9 +324,7 @@ fn submit_command(args: &SubmitArgs) -> Result<ExitCode, CampaignError> {
         return Ok(ExitCode::from(stopped_code(signal)));
     }
     let text = if args.kubernetes {
-        submission.kubernetes(&args.image, &args.claim)
-    } else if args.dry_run {
-        print::slurm(&submission, &args.slurm_args)
+        manifest()
     } else {
         let [array, merge] = submission.submit_to_slurm(&args.slurm_args)?;
         format!(
@@ -333,7 +345,7 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
         if args.json {
             print(&print::state_json(&state))?;
         } else {
-            show(&print::state(&state, &store))?;
+            show(&print::state(&state, &store, shard))?;
         }
         let complete = state.missing.is_empty();
         if complete || !args.watch {
@@ -355,14 +367,18 @@ fn status_command(args: &StatusArgs) -> Result<ExitCode, CampaignError> {
 fn merge_command(args: &MergeArgs) -> Result<ExitCode, CampaignError> {
     let stop = stop_on_signals()?;
     let merge = if args.partial { merge_partial } else { merge };
-    let Some(merged) = merge(&args.dirs, &args.out, &stop)? else {
+    let out = match (&args.out, args.dirs.first()) {
+        (Some(out), _) => out.clone(),
+        (None, first) => first.cloned().unwrap_or_default().join("cases.parquet"),
+    };
+    let Some(merged) = merge(&args.dirs, &out, &stop)? else {
         tell("stopped; no table was written, and the parts are unchanged");
         return Ok(ExitCode::from(stop.signal().map_or(FAILED, stopped_code)));
     };
     Ok(if args.json {
-        print(&print::merged_json(&merged, &args.out))
+        print(&print::merged_json(&merged, &out))
     } else {
-        show(&print::merged(&merged, &args.out))
+        show(&print::merged(&merged, &out))
     }?)
 }
 

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use wheeleg_campaign::report::{Findings, Paired, Pairs};
 use wheeleg_campaign::{
-    CAUSES, Cases, Causes, MergeForm, Merged, Ran, Recording, Replayed, ReportForm, Shard, State,
-    Status, StatusForm, Store, Submission,
+    CAUSES, Cases, Causes, MergeForm, Merged, PlanFile, Ran, Recording, Replayed, ReportForm,
+    Shard, State, Status, StatusForm, Store, Submission,
 };
-use wheeleg_report::number::p_equals;
+use wheeleg_report::number::{counted, p_equals};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::schema;
 
@@ -59,12 +59,22 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -
     if shard != Shard::ALL {
         let _ = write!(out, " in shard {shard}");
     }
-    if ran.of == 0 {
-        let _ = write!(
-            out,
-            ": it has no block, the campaign has {}",
-            store.blocks()
-        );
+    match (ran.of, shard.i < store.blocks()) {
+        (0, false) => {
+            let _ = write!(
+                out,
+                ": it has no block, the campaign has {}",
+                store.blocks()
+            );
+        }
+        (0, true) => {
+            let first = store.cases_of(shard.i).start;
+            let _ = write!(
+                out,
+                ": it begins with place {first} in the plan, beyond those of --first"
+            );
+        }
+        _ => {}
     }
     if ran.found > 0 {
         let _ = write!(out, ", {} of them found", ran.found);
@@ -85,10 +95,16 @@ pub(super) fn ran(ran: &Ran, store: &Store, shard: Shard, pilot: Option<Took>) -
             took.as_secs_f64()
         );
     }
+    if ran.shared {
+        out.push_str(
+            "shared  another process worked on the same blocks: give each its --shard I/N\n",
+        );
+    }
     let folder = store.folder().display();
     let _ = writeln!(out, "folder  {folder}");
     if shard == Shard::ALL && ran.stopped.is_none() {
-        let partial = if pilot.is_some() { " --partial" } else { "" };
+        let is_whole = ran.of == store.plan().cases;
+        let partial = if is_whole { "" } else { " --partial" };
         let _ = writeln!(
             out,
             "next    wheeleg campaign merge {folder}{partial} --out {folder}/cases.parquet"
@@ -132,14 +148,38 @@ pub(super) fn slurm(submission: &Submission, further: &[String]) -> String {
     let merge = submission.merge_arguments("ARRAY", further);
     let merge: Vec<String> = merge.iter().map(|word| format!("{word:?}")).collect();
     format!(
-        "# sbatch {array} of\n{}\n# then, with the number of the array\n# sbatch {}\n",
+        "# the plan into {}/plan.json, then\n# sbatch {array} of\n{}\n# then, with the number of the array\n\
+         # sbatch {}\n",
+        submission.folder,
         submission.slurm_script(),
         merge.join(" ")
     )
 }
 
+/// For a campaign with fewer blocks than shards: that some have no work, and the size of block with which all
+/// have.
+pub(super) fn idle(plan: &PlanFile, shard: Shard) -> Option<String> {
+    let blocks = plan.blocks();
+    if blocks >= shard.n {
+        return None;
+    }
+    let only = format!(
+        "only {blocks} of {} shards have work: the {} cases make {}",
+        shard.n,
+        plan.cases,
+        counted(blocks as usize, "block", "blocks")
+    );
+    let block = plan.cases / shard.n;
+    Some(match block {
+        0 => only,
+        _ => format!(
+            "{only}; for all, write `block = {block}` into the plan, and give another --out"
+        ),
+    })
+}
+
 /// Progress of a campaign.
-pub(super) fn state(state: &State, store: &Store) -> String {
+pub(super) fn state(state: &State, store: &Store, shard: Shard) -> String {
     let mut out = format!("cases   {} of {} have a result\n", state.rows, state.cases);
     if state.partial > 0 {
         let _ = writeln!(out, "        {} of them in blocks under way", state.partial);
@@ -150,6 +190,13 @@ pub(super) fn state(state: &State, store: &Store) -> String {
             "begun   {} more cases, of which {} have ended and are not saved yet",
             state.begun + state.unsaved,
             state.unsaved
+        );
+    }
+    if state.lost > 0 {
+        let _ = writeln!(
+            out,
+            "lost    {} of them, whose process was killed: the next run repeats them",
+            state.lost
         );
     }
     let counts = Status::ALL.iter().zip(state.by_status);
@@ -178,7 +225,19 @@ pub(super) fn state(state: &State, store: &Store) -> String {
             state.leftovers.len()
         );
     }
-    out + &bad_parts(&state.bad)
+    out += &bad_parts(&state.bad);
+    if !state.missing.is_empty() && !state.is_running {
+        let folder = store.folder().display();
+        let shard = match shard {
+            Shard::ALL => String::new(),
+            shard => format!(" --shard {shard}"),
+        };
+        let _ = writeln!(
+            out,
+            "next    wheeleg campaign run {folder}/plan.json --out {folder}{shard}"
+        );
+    }
+    out
 }
 
 /// Unreadable or foreign parts.
