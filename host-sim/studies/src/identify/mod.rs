@@ -16,6 +16,7 @@ mod noise;
 mod page;
 mod point;
 mod predict;
+mod wrong;
 
 use std::path::Path;
 
@@ -34,6 +35,7 @@ use self::intervals::Interval;
 use self::lab::Lab;
 use self::map::Mapped;
 pub use self::noise::{Noise, noise};
+pub use self::wrong::{LabError, WrongCell, WrongCells};
 use self::predict::{Predicted, predict};
 use crate::StudyError;
 use crate::study::schema::json;
