@@ -577,3 +577,37 @@ fn a_drawn_case_begins_with_chambers_that_hold_the_piston() {
     assert!(ticks.iter().all(|n| *n > 30), "{ticks:?}");
     assert!((60..140).contains(&filled), "{filled}");
 }
+
+/// The first step has figures of its own, and the random combinations of moves that are not judged do not
+/// disappear without a word.
+#[test]
+fn the_first_step_has_figures_and_unjudged_combinations_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = |motion: &str| {
+        let out = folder.path().join(motion);
+        let [controller, axis, combinations] = ["predictive", AXIS, "2"];
+        let mut command = wheeleg(&["compare", "--quick", "--move", motion, "--axis", axis]);
+        command.args(["--controller", controller, "--combinations", combinations]);
+        let ran = command.arg("--out").arg(&out).assert().success();
+        let page = fs::read_to_string(out.join("report.html")).expect("a page");
+        let stdout = String::from_utf8(ran.get_output().stdout.clone()).expect("text");
+        (stdout, page)
+    };
+    let (first, page) = told("first-step");
+    let mut lines = first.lines();
+    let head = lines.find(|line| line.contains("cycles"));
+    let words: Vec<&str> = head.expect("a table").split_whitespace().collect();
+    assert_eq!(
+        words,
+        ["cycles", "first", "mm", "overshoot", "settled", "s"]
+    );
+    assert!(first.contains(" of 2 combinations on bench-vq110u by predictive"));
+    assert!(page.contains("first step, overshoot [mm]") && !page.contains(">switches per s<"));
+    assert!(page.contains("judged by the move <code>first-step</code>"));
+
+    let (sine, page) = told("sine");
+    assert!(sine.contains("none of the combinations: only those of step-100 and first-step"));
+    assert!(
+        page.contains("The 2 random combinations were played by the chosen moves, and are not")
+    );
+}

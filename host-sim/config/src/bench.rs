@@ -63,15 +63,15 @@ named! {
 named! {
     /// Motion of a case.
     Move {
-        /// 100 mm from power-up, in 2 s, with nothing learnt.
+        /// From the stroke at power-up to the upper end of step-100, in 2 s, with nothing learnt.
         FirstStep = "first-step",
-        /// 20 mm back and out.
+        /// 20 mm back and out; at most 11.2 % of the stroke.
         Step20 = "step-20",
-        /// 100 mm back and out.
+        /// 100 mm back and out; at most 56 % of the stroke.
         Step100 = "step-100",
-        /// 64 mm out and back, in 1 s each, without a jerk.
+        /// 64 mm out and back, in 1 s each, without a jerk; at most 36 % of the stroke.
         SCurve = "s-curve",
-        /// Two periods of 2 s, 60 mm from crest to crest.
+        /// Two periods of 2 s, 60 mm from crest to crest; at most 34 % of the stroke.
         Sine = "sine",
         /// At rest for 10 s after a step.
         Hold = "hold",

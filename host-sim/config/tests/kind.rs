@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use common::{assert_all, report};
 use wheeleg_config::plan::{Plan, Sources, Text};
 use wheeleg_config::{AxisConfig, ConfigError, RobotConfig, Scenario};
+use wheeleg_plant::sensors::AdcNoise;
 
 const ROBOT: &str = include_str!("../../robots/wheeleg-2003.toml");
 const SCENARIO: &str = include_str!("../../scenarios/three-step.toml");
@@ -61,5 +62,29 @@ fn a_file_of_another_kind_is_named() {
                 ],
             );
         }
+    }
+}
+
+/// The number of the converter's noise means another thing in each kind of file, and its description says both.
+#[test]
+fn the_noise_of_the_converter_is_described_as_it_is_read() {
+    let axis = AxisConfig::load("bench-vq110u").expect("built in");
+    let robot = RobotConfig::parse("wheeleg-2003.toml", ROBOT).expect("built in");
+    let forms = (axis.axis.adc.noise, robot.plant.adc.noise);
+    let (AdcNoise::Uniform { .. }, AdcNoise::Gaussian { .. }) = forms else {
+        panic!("{forms:?}");
+    };
+    for parameters in [&axis.parameters, &robot.parameters] {
+        let mut listed = parameters.iter();
+        let noise = listed.find(|info| info.path == "sensor.adc.noise");
+        let doc = noise.expect("listed").doc;
+        assert!(
+            doc.contains("of an axis the bound of a uniform one"),
+            "{doc}"
+        );
+        assert!(
+            doc.contains("of a robot the standard deviation of a normal"),
+            "{doc}"
+        );
     }
 }

@@ -12,6 +12,7 @@ use wheeleg_sim::SimError;
 use wheeleg_telemetry::LogError;
 
 use crate::check::vectors::VectorsError;
+use crate::identify::LabError;
 
 /// Any failure of the program outside the simulated robot.
 #[derive(Debug, Error, Diagnostic)]
@@ -50,6 +51,11 @@ pub enum StudyError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Sim(#[from] SimError),
+
+    /// A measurement cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Lab(#[from] LabError),
 
     /// Standard output takes no more.
     #[error("cannot write to standard output: {0}")]

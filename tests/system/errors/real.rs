@@ -288,6 +288,24 @@ fn axes(all: &mut Vec<Driven>) {
     all.push(("StudyError::Refused", Box::new(lab()), words()));
     let of_campaign = CampaignError::from(lab());
     all.push(("CampaignError::Study", Box::new(of_campaign), words()));
+    let unread = |text: &str| match Lab::parse("lab.csv", text, &axis(), &[]) {
+        Err(StudyError::Lab(error)) => error,
+        other => panic!("another result: {other:?}"),
+    };
+    let head = "time_s,position_mm,fill_a,vent_a,fill_b,vent_b\n";
+    let wrong = || unread(&format!("{head}0,many,0,0,0,0\n1,0,2,0,0,0\n"));
+    let words = || {
+        vec![
+            "lab.csv",
+            "line 2, column `position_mm`",
+            "line 3, column `fill_a`",
+        ]
+    };
+    let study = StudyError::from(wrong());
+    all.push(("StudyError::Lab", Box::new(study), words()));
+    all.push(("LabError::Cells", Box::new(wrong()), words()));
+    let words = vec!["lab.csv is empty"];
+    all.push(("LabError::Empty", Box::new(unread("")), words));
 }
 
 fn campaigns(folder: &Path, all: &mut Vec<Driven>) {

@@ -233,7 +233,8 @@ params! {
         bits: u32, "bits", Count, 8.0, 16.0;
         /// Conversions averaged in one reading.
         oversampling: u32, "oversampling", Count, 1.0, 256.0;
-        /// Standard deviation of one conversion, in its least significant bits; Gaussian.
+        /// Noise of one conversion, in its least significant bits: of a robot the standard deviation of a normal
+        /// distribution, of an axis the bound of a uniform one.
         noise: f64, "noise", Lsb, 0.0, 100.0;
     }
 

@@ -98,9 +98,13 @@ impl MoveMeter {
                 let id = format!("{id}-{name}");
                 targets.push(Target::new(id, what, Some(value), unit, None, max).info());
             };
+            let why = match joint.longest_s.is_finite() {
+                true => "",
+                false => " (none: the next command came before that)",
+            };
             add(
                 "M1",
-                format!("{name} longest time to within {ARRIVED_MM} mm of a new command"),
+                format!("{name} longest time to within {ARRIVED_MM} mm of a new command{why}"),
                 joint.longest_s,
                 "s",
                 None,
@@ -161,6 +165,26 @@ mod tests {
     fn value(targets: &[Target], id: &str) -> f64 {
         let target = targets.iter().find(|t| t.id == id);
         target.and_then(|t| t.value).unwrap_or(f64::NAN)
+    }
+
+    #[test]
+    fn a_move_that_the_next_command_ends_says_so_instead_of_a_time() {
+        let mut meter = MoveMeter::default();
+        for ms in 0..300_u32 {
+            let row = Row {
+                t_ns: u64::from(ms) * 1_000_000,
+                v: JointSample {
+                    commanded_mm: f64::from(ms / 100) * 50.0,
+                    ..JointSample::default()
+                },
+            };
+            meter.joint(2, &row);
+        }
+        let targets = meter.targets(1);
+        let late = targets.iter().find(|t| t.id == "M1-b6").expect("moved");
+        assert_eq!(late.measured_text(), "not measured");
+        let why = "(none: the next command came before that)";
+        assert!(late.description.ends_with(why), "{}", late.description);
     }
 
     #[test]

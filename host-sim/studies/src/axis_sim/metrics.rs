@@ -172,6 +172,7 @@ mod tests {
             motion,
             rows,
             faults: wheeleg_protocol::FaultBits::NONE,
+            latched: Vec::new(),
             drove: true,
         }
     }

@@ -50,6 +50,6 @@ pub use identify::{Delays, Probe, design_with, identify};
 pub use metrics::{LIMIT_CYCLE, Metrics, SETTLED_BAND_M};
 pub use motion::{LoadEvent, Motion};
 pub use node::Node;
-pub use run::{Action, AxisSim, Board, REFERENCES_M, Row, SPEEDS_M_S, Sample, Trace};
+pub use run::{Action, AxisSim, Board, Latched, REFERENCES_M, Row, SPEEDS_M_S, Sample, Trace};
 pub use valve_resolution::ValveResolution;
 pub use wheeleg_config::bench::Kind;

@@ -2,7 +2,7 @@
 
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_plant::axis::{Axis, AxisParams, AxisState};
-use wheeleg_protocol::FaultBits;
+use wheeleg_protocol::{Fault, FaultBits};
 use wheeleg_units::{AdcCode, PositionMm, VelocityMmS};
 
 use super::error::AxisSimError;
@@ -74,6 +74,15 @@ pub struct Row {
     pub settled: bool,
 }
 
+/// A fault, and when the board latched it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Latched {
+    /// Time from the start of the recording \[s\].
+    pub at_s: f64,
+    /// The fault.
+    pub fault: Fault,
+}
+
 /// A recording, one row a millisecond.
 #[derive(Debug, Clone)]
 pub struct Trace {
@@ -83,6 +92,8 @@ pub struct Trace {
     pub rows: Vec<Row>,
     /// Every fault that the board had latched.
     pub faults: FaultBits,
+    /// The faults that it latched in this recording, in the order of time.
+    pub latched: Vec<Latched>,
     /// Whether the board drove from the first to the last tick.
     pub drove: bool,
 }
@@ -97,6 +108,8 @@ pub struct AxisSim<B> {
     /// The board.
     pub board: B,
     pending: OnTimes,
+    /// Faults latched in the recordings so far.
+    latched: FaultBits,
     /// How far ahead the board knows of a step \[s\]; 0: not at all.
     pub preview_s: f64,
 }
@@ -114,6 +127,7 @@ impl<B: Board> AxisSim<B> {
             axis,
             board,
             pending: [0; 4],
+            latched: FaultBits::NONE,
             preview_s: 0.0,
         })
     }
@@ -150,7 +164,9 @@ impl<B: Board> AxisSim<B> {
     ) -> Result<Trace, AxisSimError> {
         let ticks = (duration_s * 1000.0).round() as usize;
         let mut rows = Vec::with_capacity(ticks);
-        let (mut faults, mut drove) = (FaultBits::NONE, true);
+        let (mut latched, mut drove) = (Vec::new(), true);
+        // Those latched in an earlier recording.
+        let (mut faults, mut before) = (FaultBits::NONE, self.latched);
         let start_air = self.state.core.cylinders[0].supply_mass_kg;
         let start_switches = self.switches();
         for k in 0..ticks {
@@ -178,13 +194,21 @@ impl<B: Board> AxisSim<B> {
                 watch(&row, board);
             })?;
             faults = faults.union(action.faults);
+            let new = action
+                .faults
+                .iter()
+                .filter(|fault| !before.contains(*fault));
+            latched.extend(new.map(|fault| Latched { at_s: t, fault }));
+            before = before.union(action.faults);
             drove &= action.driving;
             rows.push(row);
         }
+        self.latched = before;
         Ok(Trace {
             motion: motion.clone(),
             rows,
             faults,
+            latched,
             drove,
         })
     }

@@ -7,15 +7,32 @@ use wheeleg_report::number::{counted, listed};
 use wheeleg_report::plot::Figure;
 use wheeleg_report::results::CSV;
 use wheeleg_report::{Picture, page, pictures};
+use wheeleg_telemetry::messages::within;
 
 use super::{About, PlayedBench, targets};
 use crate::StudyError;
 use crate::analysis::{Judgement, Target};
+use crate::axis_sim::Latched;
 use crate::compare::{trace_csv, trace_figure};
 use crate::study::schema::json;
 use crate::study::{self, Drawn, Finished, Job, Settings};
 
 const TEMPLATE: &str = include_str!("page.html");
+
+/// A fault that the board latched.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct BenchFault {
+    /// Its name.
+    pub name: &'static str,
+    /// Recording in which it was latched: `first`, `measured-1` or `measured-2`.
+    pub recording: String,
+    /// Time from the start of that recording, s.
+    pub at_s: f64,
+    /// What it means.
+    pub meaning: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+}
 
 /// Contents of `summary.json`.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -27,8 +44,13 @@ pub struct BenchSummary {
     pub version: &'static str,
     /// Simulated time, s, without the search for the valves' delays.
     pub simulated_s: f64,
+    /// Force on the rod at power-up, N, positive extends: that of the plant, of `load_share` and of a contact.
+    pub load_n: f64,
     /// Names of the faults that the board latched.
     pub faults: Vec<&'static str>,
+    /// The same with their times, in the order in which they were latched. A fault latched in the move between
+    /// the first and the measured ones, which is not recorded, has the time 0 of the next recording.
+    pub latched: Vec<BenchFault>,
     /// Whether every required target is met.
     pub passed: bool,
     /// Targets with values and verdicts.
@@ -44,14 +66,18 @@ impl BenchSummary {
     #[must_use]
     pub fn of(bench: &Bench, seed: u64, case: &PlayedBench) -> Self {
         let targets = targets(bench, case);
-        let traces = case.played.traces();
-        let faults = traces
+        let traces = || case.played.traces();
+        let faults = traces()
             .map(|(_, trace)| trace.faults)
             .reduce(|all, other| all.union(other));
         Self {
             about: About::of(bench, seed),
             version: env!("CARGO_PKG_VERSION"),
             simulated_s: case.simulated_s,
+            load_n: traces()
+                .find_map(|(_, trace)| trace.rows.first())
+                .map_or(0.0, |row| row.load_n),
+            latched: latched(case),
             faults: faults
                 .iter()
                 .flat_map(|all| all.iter())
@@ -80,6 +106,23 @@ impl BenchSummary {
     }
 }
 
+/// The faults of a case, each with its first time.
+fn latched(case: &PlayedBench) -> Vec<BenchFault> {
+    let mut all: Vec<BenchFault> = Vec::new();
+    for (recording, trace) in case.played.traces() {
+        for Latched { at_s, fault } in &trace.latched {
+            all.push(BenchFault {
+                name: fault.name(),
+                recording: recording.clone(),
+                at_s: *at_s,
+                meaning: fault.sentence(),
+                remedy: fault.remedy(),
+            });
+        }
+    }
+    all
+}
+
 /// A target on the page.
 #[derive(Serialize)]
 struct Line<'a> {
@@ -91,12 +134,21 @@ struct Line<'a> {
     class: Judgement,
 }
 
+/// A fault on the page.
+#[derive(Serialize)]
+struct Told<'a> {
+    fault: &'a BenchFault,
+    /// The recording, in words.
+    recording: String,
+}
+
 #[derive(Serialize)]
 struct Page<'a> {
     stopped: Option<String>,
     verdict: String,
     about: &'a About,
-    faults: String,
+    load_n: f64,
+    faults: Vec<Told<'a>>,
     missed: Vec<&'a Line<'a>>,
     targets: &'a [Line<'a>],
     /// Which moves are measured, in a sentence or two.
@@ -164,11 +216,16 @@ fn render(summary: &BenchSummary, motion: Move, drawn: &[Drawn]) -> Result<Strin
         })
         .collect();
     let missed = lines.iter().filter(|l| l.class == Judgement::Missed);
+    let faults = summary.latched.iter().map(|fault| Told {
+        fault,
+        recording: within(title(motion, &fault.recording)),
+    });
     let values = Page {
         stopped: None,
         verdict: summary.verdict(),
         about: &summary.about,
-        faults: summary.faults.join(", "),
+        load_n: summary.load_n,
+        faults: faults.collect(),
         missed: missed.collect(),
         targets: &lines,
         measured: measured(motion),

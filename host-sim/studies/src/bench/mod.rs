@@ -7,7 +7,7 @@ mod targets;
 use serde::Serialize;
 use wheeleg_config::bench::{Air, Bench, Deviation};
 
-pub use files::{BenchSummary, write};
+pub use files::{BenchFault, BenchSummary, write};
 pub use targets::{targets, unmeasured};
 
 use crate::axis_sim::suite::{AxisSimError, Factors, designed, force_left_n};

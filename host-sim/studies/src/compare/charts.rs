@@ -55,17 +55,18 @@ impl Comparison {
         })
     }
 
-    /// Rows of random combinations of an axis and controller that are feasible.
+    /// Rows of random combinations of an axis and controller that are feasible, of the move that is judged.
     pub(super) fn combined<'a>(
         &'a self,
         axis: &'a str,
         kind: Kind,
     ) -> impl Iterator<Item = &'a Row> {
+        let judged = self.options.judged_move();
         self.rows.iter().filter(move |r| {
             let c = &r.case;
             c.axis == axis
                 && c.controller == kind
-                && c.motion == Move::Step100
+                && Some(c.motion) == judged
                 && c.feasible
                 && matches!(c.variation, Variation::Combination(_) | Variation::Drawn(_))
         })

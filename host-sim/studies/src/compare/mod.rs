@@ -62,6 +62,18 @@ pub struct Options {
     pub threads: usize,
 }
 
+impl Options {
+    /// The move by which random combinations are judged; `None` if those that were chosen have no target to arrive at.
+    #[must_use]
+    pub fn judged_move(&self) -> Option<Move> {
+        let Some(moves) = &self.moves else {
+            return Some(Move::Step100);
+        };
+        let mut judged = [Move::Step100, Move::FirstStep].into_iter();
+        judged.find(|motion| moves.contains(motion))
+    }
+}
+
 /// Moves under variations, unless chosen.
 const VARIED: [Move; 2] = [Move::Step100, Move::SCurve];
 

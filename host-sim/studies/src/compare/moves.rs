@@ -183,3 +183,32 @@ pub(crate) fn play_from_power_up(
     rig.wait(wait_ms)?;
     play(motion, &mut rig, sheet, plant.load_n)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axis_sim::Kind;
+    use wheeleg_config::AxisConfig;
+
+    /// What `docs/guide/campaigns.md` says of the first step.
+    #[test]
+    fn the_first_step_is_as_long_as_the_stroke_at_power_up_makes_it() {
+        for (axis, long_mm) in [
+            ("bench-vq110u", 100.0),
+            ("small-12x50", 29.0),
+            ("long-16x400", 170.0),
+            ("heavy-40x250", 125.0),
+        ] {
+            let sheet = AxisConfig::load(axis).expect("built in").axis;
+            let mut rig = TestRig::new(&sheet, &crate::axis_sim::design(&sheet, Kind::PwmP), 1)
+                .expect("a rig");
+            let played = play(Move::FirstStep, &mut rig, &sheet, sheet.load_n).expect("played");
+            let motion = &played.measured[0].motion;
+            let [_, upper_m] = Sizes::of(&sheet).large_m;
+            assert_eq!(motion.to_m(), upper_m, "{axis}");
+            let step_mm = (motion.to_m() - sheet.initial_stroke_m) * 1e3;
+            assert!((step_mm - long_mm).abs() < 1e-9, "{axis}: {step_mm}");
+        }
+        assert!(Move::FirstStep.about().contains("stroke at power-up"));
+    }
+}

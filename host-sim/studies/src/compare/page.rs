@@ -70,6 +70,9 @@ impl Comparison {
                     of(Move::Contact, 2, |r| r.figures.recovery_s),
                     of(Move::ContactHelped, 2, |r| r.figures.recovery_s),
                     cycles.count().to_string(),
+                    or_dash(largest(rows(Move::FirstStep), error), 2),
+                    of(Move::FirstStep, 2, |r| r.figures.overshoot_mm),
+                    or_dash(median(rows(Move::FirstStep), settle), 3),
                 ];
                 (*kind, cells)
             })
@@ -107,7 +110,7 @@ impl Comparison {
 }
 
 /// Head of [`Comparison::table`].
-pub(super) const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 19] = [
     "error 100 mm [mm]",
     "error 20 mm [mm]",
     "overshoot [mm]",
@@ -124,6 +127,9 @@ pub(super) const COLUMNS: [&str; 16] = [
     "recovery, against [s]",
     "recovery, helped [s]",
     "limit cycles",
+    "first step, error [mm]",
+    "first step, overshoot [mm]",
+    "first step, settled, median [s]",
 ];
 
 /// Values of the template.
@@ -135,7 +141,8 @@ struct Page<'a> {
     verdict: String,
     supervised: String,
     kinds: Vec<&'static str>,
-    columns: [&'static str; COLUMNS.len()],
+    columns: Vec<&'static str>,
+    judged_move: Option<&'static str>,
     axes: Vec<Axis<'a>>,
     figures: Vec<Picture<'a>>,
     cases: usize,
@@ -292,15 +299,28 @@ pub(super) fn render(
         )
     };
     let judged = comparison.judged();
-    let axes = comparison.axes.iter().map(|axis| {
+    // Only columns of moves that were played.
+    let tables: Vec<_> = (comparison.axes.iter())
+        .map(|axis| comparison.table(&axis.config.name))
+        .collect();
+    let shown: Vec<usize> = (0..COLUMNS.len())
+        .filter(|place| {
+            let mut lines = tables.iter().flatten();
+            lines.any(|(_, cells)| cells[*place] != DASH)
+        })
+        .collect();
+    let axes = comparison.axes.iter().zip(&tables).map(|(axis, table)| {
         let name = axis.config.name.as_str();
-        let table = comparison.table(name).into_iter();
+        let table = table.iter().map(|(kind, cells)| {
+            let cells = shown.iter().map(|place| cells[*place].clone());
+            (kind.name(), cells.collect())
+        });
         Axis {
             name,
             description: &axis.config.description,
             bound_large: bound(axis.bound_s[0]),
             bound_small: bound(axis.bound_s[1]),
-            table: table.map(|(kind, cells)| (kind.name(), cells)).collect(),
+            table: table.collect(),
             factors: factors(comparison, name),
             combined: judged
                 .iter()
@@ -327,7 +347,8 @@ pub(super) fn render(
         verdict: comparison.verdict(),
         supervised: supervised(comparison),
         kinds: options.kinds.iter().map(|k| k.name()).collect(),
-        columns: COLUMNS,
+        columns: shown.iter().map(|place| COLUMNS[*place]).collect(),
+        judged_move: options.judged_move().map(Move::name),
         axes: axes.collect(),
         figures: pictures(figures),
         cases: comparison.rows.len(),

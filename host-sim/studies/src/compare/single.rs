@@ -158,20 +158,25 @@ pub(crate) fn trace_figure(id: &str, title: &str, trace: &Trace) -> Figure {
         let content = Content::lines((unit, range(&series)), series);
         Panel::new(title, (0.0, end), 200, content)
     };
+    let mut panels = vec![
+        lines("Stroke", "[mm]", stroke),
+        lines("Chamber pressure", "[bar abs]", pressure),
+        Panel::new(
+            "On-time of the valves in each tick",
+            (0.0, end),
+            110,
+            Content::Raster(valves.collect()),
+        ),
+    ];
+    for panel in &mut panels {
+        panel.marks = trace.latched.iter().map(|latched| latched.at_s).collect();
+        panel.marked = "fault latched";
+    }
     Figure {
         id: id.to_owned(),
         title: title.to_owned(),
         caption: String::new(),
-        panels: vec![
-            lines("Stroke", "[mm]", stroke),
-            lines("Chamber pressure", "[bar abs]", pressure),
-            Panel::new(
-                "On-time of the valves in each tick",
-                (0.0, end),
-                110,
-                Content::Raster(valves.collect()),
-            ),
-        ],
+        panels,
     }
 }
 

@@ -21,6 +21,8 @@ const DIFFERENCE: f64 = 2e-3;
 /// Most steps.
 const STEPS: usize = 60;
 
+/// A start that misses a part of the measurement by more than this many times the sensor's noise is given up.
+const HOPELESS: f64 = 9.0;
 /// A step that lowers the cost by less than this share is the last.
 const ENOUGH: f64 = 1e-7;
 
@@ -70,6 +72,15 @@ pub struct Fit {
     pub cost: f64,
     /// Residuals of the data over their standard deviation.
     pub residuals: DVector<f64>,
+}
+
+impl Fit {
+    /// Root mean square of the position's error over its standard deviation; a sample has `channels` residuals.
+    pub(super) fn position_error(&self, channels: usize) -> f64 {
+        let errors = self.residuals.iter().step_by(channels);
+        let (count, sum) = errors.fold((0.0, 0.0), |(n, sum), r| (n + 1.0, sum + r * r));
+        (sum / f64::max(count, 1.0)).sqrt()
+    }
 }
 
 impl Problem<'_> {
@@ -175,6 +186,31 @@ impl Problem<'_> {
     fn cost(&self, residuals: &DVector<f64>, point: &Point) -> f64 {
         let trusted: f64 = point.expected().map(|value| value * value).sum();
         0.5 * (residuals.norm_squared() + trusted)
+    }
+
+    /// The smallest cost from a start, by way of the beginning of the measurement, and then of ever more of it: the
+    /// error of a plant that is far from the truth grows with time, and with it the number of local minima. `None` if a
+    /// part is missed by more than [`HOPELESS`]; a sample has `channels` residuals.
+    #[must_use]
+    pub(super) fn fit_growing(
+        &self,
+        start: &Point,
+        channels: usize,
+        go_on: &dyn Fn() -> bool,
+    ) -> Option<Fit> {
+        let driven = self.lab.on_us.iter().position(|on| *on != [0; 4]);
+        let driven = driven.unwrap_or(0).min(self.ticks);
+        let mut point = *start;
+        for part in [8, 4, 2] {
+            let ticks = driven + (self.ticks - driven) / part;
+            let part = Self { ticks, ..*self };
+            let fit = part.fit(&point, Exact::Fully, go_on)?;
+            if fit.position_error(channels) > HOPELESS {
+                return None;
+            }
+            point = fit.point;
+        }
+        self.fit(&point, Exact::Fully, go_on)
     }
 
     /// The smallest cost from a start; `None` if the plant is impossible there. `go_on` ends it early.

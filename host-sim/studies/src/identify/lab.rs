@@ -11,6 +11,7 @@ use wheeleg_plant::axis::{AxisParams, TICK_US};
 use wheeleg_plant::supply::PRESSURES_PA;
 
 use super::map::Mapped;
+use super::wrong::{LabError, WrongCell, WrongCells};
 use crate::StudyError;
 
 const VALVES: [&str; 4] = ["fill_a", "vent_a", "fill_b", "vent_b"];
@@ -74,27 +75,21 @@ struct At<'a> {
 }
 
 impl At<'_> {
-    fn wrong(&self, column: &str, what: &str, help: &str) -> StudyError {
-        let Self { file, line } = self;
-        StudyError::refused(
-            format!("{file}, line {line}, column `{column}`: {what}"),
-            help,
-        )
+    fn wrong(&self, column: &str, what: &str, help: &str) -> WrongCell {
+        WrongCell {
+            line: self.line,
+            column: column.to_owned(),
+            what: what.to_owned(),
+            help: help.to_owned(),
+        }
     }
 
-    fn within(
-        &self,
-        column: &str,
-        value: f64,
-        [min, max]: [f64; 2],
-        help: &str,
-    ) -> Result<f64, StudyError> {
-        if value >= min && value <= max {
-            Ok(value)
-        } else {
-            let what = format!("{} is outside {min} to {max}", pretty(value));
-            Err(self.wrong(column, &what, help))
-        }
+    /// The error if this is the only wrong cell.
+    fn error(&self, column: &str, what: &str, help: &str) -> StudyError {
+        let mut wrong = WrongCells::default();
+        wrong.add(self.wrong(column, what, help));
+        let file = self.file.to_owned();
+        LabError::Cells { file, wrong }.into()
     }
 }
 
@@ -270,15 +265,32 @@ impl Lab {
             .delimiter(delimiter(text))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let names = reader.headers().map_err(|e| bad_row(file, text, &[], &e))?;
+        if text.trim().is_empty() {
+            let file = file.to_owned();
+            return Err(LabError::Empty { file }.into());
+        }
+        let names = reader
+            .headers()
+            .map_err(|e| not_a_row(file, line_of_error(text, &e)))?;
         let names = names.iter().map(str::to_owned).collect();
         let columns = Columns::of(file, line_of(text, &csv::Position::new()), names, map)?;
-        let mut rows = Vec::new();
+        let (mut rows, mut wrong) = (Vec::new(), WrongCells::default());
         for record in reader.records() {
-            let record = record.map_err(|e| bad_row(file, text, &columns.names, &e))?;
-            let line = record.position().map_or(0, |at| line_of(text, at));
-            rows.push((line, row(&At { file, line }, &columns, &record, axis)?));
+            match record {
+                Ok(record) => {
+                    let line = record.position().map_or(0, |at| line_of(text, at));
+                    let mut cells = Cells {
+                        at: At { file, line },
+                        columns: &columns,
+                        record: &record,
+                        wrong: &mut wrong,
+                    };
+                    rows.extend(cells.row(axis).map(|row| (line, row)));
+                }
+                Err(e) => wrong.add(bad_row(file, text, &columns.names, &e)?),
+            }
         }
+        wrong.none_in(file)?;
         if rows.len() < ROWS_MIN {
             return Err(StudyError::refused(
                 format!(
@@ -302,29 +314,43 @@ fn line_of(text: &str, at: &csv::Position) -> u64 {
     at.line() + blank.filter(|byte| **byte == b'\n').count() as u64
 }
 
-/// The error for a line that is not a row of the table.
-fn bad_row(file: &str, text: &str, columns: &[String], error: &csv::Error) -> StudyError {
-    const HELP: &str =
-        "each line has a value for each column, parted by commas, semicolons or tabs";
-    if let csv::ErrorKind::UnequalLengths { pos, len, .. } = error.kind() {
-        let line = pos.as_ref().map_or(0, |at| line_of(text, at));
-        let of = format!("{len} values, and the table has {} columns", columns.len());
-        return match columns.get(*len as usize) {
-            Some(missing) => {
-                At { file, line }.wrong(missing, &format!("no value: the row has {of}"), HELP)
-            }
-            None => {
-                let last = columns.last().map_or("time_s", String::as_str);
-                let what = format!("more values behind it: the row has {of}");
-                At { file, line }.wrong(last, &what, HELP)
-            }
-        };
-    }
-    let line = error.position().map_or(1, |at| line_of(text, at));
+const A_ROW: &str = "each line has a value for each column, parted by commas, semicolons or tabs";
+
+fn line_of_error(text: &str, error: &csv::Error) -> u64 {
+    error.position().map_or(1, |at| line_of(text, at))
+}
+
+fn not_a_row(file: &str, line: u64) -> StudyError {
     StudyError::refused(
         format!("{file}, line {line}: it is not a row of a CSV table"),
-        HELP,
+        A_ROW,
     )
+}
+
+/// What is wrong with a row that has more or fewer values than the table has columns.
+fn bad_row(
+    file: &str,
+    text: &str,
+    columns: &[String],
+    error: &csv::Error,
+) -> Result<WrongCell, StudyError> {
+    let line = line_of_error(text, error);
+    let csv::ErrorKind::UnequalLengths { len, .. } = error.kind() else {
+        return Err(not_a_row(file, line));
+    };
+    let of = format!("{len} values, and the table has {} columns", columns.len());
+    let at = At { file, line };
+    Ok(match columns.get(*len as usize) {
+        Some(missing) => at.wrong(missing, &format!("no value: the row has {of}"), A_ROW),
+        None => {
+            let last = columns.last().map_or("time_s", String::as_str);
+            at.wrong(
+                last,
+                &format!("more values behind it: the row has {of}"),
+                A_ROW,
+            )
+        }
+    })
 }
 
 /// A row as read.
@@ -337,93 +363,97 @@ struct Row {
     load_n: Option<f64>,
 }
 
-fn row(
-    at: &At<'_>,
-    columns: &Columns,
-    record: &csv::StringRecord,
-    axis: &AxisParams,
-) -> Result<Row, StudyError> {
-    let number = |place: Place, [min, max]: [f64; 2]| {
-        let (name, text) = (
-            &columns.names[place.column],
-            record.get(place.column).unwrap_or(""),
-        );
+/// The cells of a row, while they are read.
+struct Cells<'a> {
+    at: At<'a>,
+    columns: &'a Columns,
+    record: &'a csv::StringRecord,
+    wrong: &'a mut WrongCells,
+}
+
+impl Cells<'_> {
+    /// A number within a range; `None` if it is wrong, which is noted.
+    fn ranged(&mut self, place: Place, [min, max]: [f64; 2], help: &str) -> Option<f64> {
+        let name = &self.columns.names[place.column];
+        let text = self.record.get(place.column).unwrap_or("");
         // A comma within a cell does not separate columns: it is a decimal comma.
         let value = match text.split_once(',') {
             Some((whole, decimals)) => format!("{whole}.{decimals}").parse::<f64>(),
             None => text.parse::<f64>(),
         };
         let value = value.ok().filter(|v| v.is_finite());
-        let value = value.map(|value| value * place.factor + place.offset);
-        value.ok_or_else(|| {
+        let Some(value) = value.map(|value| value * place.factor + place.offset) else {
             let what = match text {
                 "" => "there is no value".to_owned(),
                 text => format!("\"{}\" is not a number", shown(text)),
             };
             let help = format!("a number with a decimal point, from {min} to {max}");
-            at.wrong(name, &what, &help)
-        })
-    };
-    let ranged = |place: Place, range: [f64; 2], help: &str| {
-        let name = &columns.names[place.column];
-        at.within(name, number(place, range)?, range, help)
-    };
-    let stroke_mm = axis.cylinder.stroke_m * 1e3;
-    let most_mm = stroke_mm * (1.0 + BEYOND);
-    let position_mm = ranged(
-        columns.position,
-        [-BEYOND * stroke_mm, most_mm],
-        "positions are strokes in mm, 0 where the rod is in; the axis file has the cylinder's stroke",
-    )?;
-    let mut on_us = [0; 4];
-    for (valve, on) in on_us.iter_mut().enumerate() {
-        let column = columns.valves[valve];
-        let name = &columns.names[column.column];
-        let most = if columns.on_times {
-            f64::from(TICK_US)
-        } else {
-            1.0
+            self.wrong.add(self.at.wrong(name, &what, &help));
+            return None;
         };
-        let help = if columns.on_times {
-            "on-times are whole microseconds of a tick of 1 ms"
-        } else {
-            "a state is 0 or 1"
-        };
-        let value = ranged(column, [0.0, most], help)?;
-        if value.fract() != 0.0 {
-            let what = format!("{} is not a whole number", pretty(value));
-            return Err(at.wrong(name, &what, help));
+        if value >= min && value <= max {
+            return Some(value);
         }
-        *on = if columns.on_times {
-            value as u16
-        } else {
-            value as u16 * TICK_US
-        };
+        let what = format!("{} is outside {min} to {max}", pretty(value));
+        self.wrong.add(self.at.wrong(name, &what, help));
+        None
     }
-    let allowed_bar = PRESSURES_PA.map(|pa| pa * 1e-5);
-    let pressure = |column: Place| ranged(column, allowed_bar, "pressures are absolute, in bar");
-    let pressure_pa = match columns.pressures {
-        Some([a, b]) => Some([pressure(a)? * 1e5, pressure(b)? * 1e5]),
-        None => None,
-    };
-    let load_n = match columns.load {
-        Some(column) => {
-            let help = "a force in N, positive extends";
-            Some(ranged(column, [-1e4, 1e4], help)?)
+
+    /// On-time of a valve, µs.
+    fn valve(&mut self, place: Place) -> Option<u16> {
+        let (most, unit_us, help) = match self.columns.on_times {
+            true => {
+                let help = "on-times are whole microseconds of a tick of 1 ms";
+                (f64::from(TICK_US), 1, help)
+            }
+            false => (1.0, TICK_US, "a state is 0 or 1"),
+        };
+        let value = self.ranged(place, [0.0, most], help)?;
+        if value.fract() == 0.0 {
+            return Some(value as u16 * unit_us);
         }
-        None => None,
-    };
-    Ok(Row {
-        time_s: ranged(
+        let what = format!("{} is not a whole number", pretty(value));
+        let name = &self.columns.names[place.column];
+        self.wrong.add(self.at.wrong(name, &what, help));
+        None
+    }
+
+    /// The row; `None` if any of its cells is wrong.
+    fn row(&mut self, axis: &AxisParams) -> Option<Row> {
+        let columns = self.columns;
+        let stroke_mm = axis.cylinder.stroke_m * 1e3;
+        let position_mm = self.ranged(
+            columns.position,
+            [-BEYOND * stroke_mm, stroke_mm * (1.0 + BEYOND)],
+            "positions are strokes in mm, 0 where the rod is in; the axis file has the cylinder's stroke",
+        );
+        let [fill_a, vent_a, fill_b, vent_b] = columns.valves.map(|place| self.valve(place));
+        let allowed_bar = PRESSURES_PA.map(|pa| pa * 1e-5);
+        let pressures = columns.pressures.map(|both| {
+            both.map(|place| self.ranged(place, allowed_bar, "pressures are absolute, in bar"))
+        });
+        let load = columns
+            .load
+            .map(|place| self.ranged(place, [-1e4, 1e4], "a force in N, positive extends"));
+        let time = self.ranged(
             columns.time,
             [-LATEST_S, LATEST_S],
             "times are in seconds, from any begin",
-        )?,
-        position_m: position_mm * 1e-3,
-        on_us,
-        pressure_pa,
-        load_n,
-    })
+        );
+        Some(Row {
+            time_s: time?,
+            position_m: position_mm? * 1e-3,
+            on_us: [fill_a?, vent_a?, fill_b?, vent_b?],
+            pressure_pa: match pressures {
+                Some([a, b]) => Some([a? * 1e5, b? * 1e5]),
+                None => None,
+            },
+            load_n: match load {
+                Some(load) => Some(load?),
+                None => None,
+            },
+        })
+    }
 }
 
 /// Reports a piston that hardly moves: its positions may be in metres, or constant.
@@ -482,7 +512,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
             "rows are {} ms apart; allowed: whole ms, 1 to {most}",
             pretty(period_ms)
         );
-        return Err(at(rows[1].0).wrong(&columns.names[columns.time.column], &what, help));
+        return Err(at(rows[1].0).error(&columns.names[columns.time.column], &what, help));
     }
     for (k, (line, row)) in rows.iter().enumerate() {
         let due_ms = k as f64 * step;
@@ -493,7 +523,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
                 pretty(ms(row)),
                 pretty(due_ms)
             );
-            return Err(at(*line).wrong(&columns.names[columns.time.column], &what, help));
+            return Err(at(*line).error(&columns.names[columns.time.column], &what, help));
         }
     }
     if rows.len() as f64 * step > LONGEST_S * 1e3 {
@@ -511,7 +541,7 @@ fn ticks(file: &str, columns: &Columns, rows: &[(u64, Row)]) -> Result<Lab, Stud
                 pretty(to_mm)
             );
             let help = "a sensor that has lost its track, or rows that are missing: cut before it";
-            return Err(at(pair[1].0).wrong("position_mm", &what, help));
+            return Err(at(pair[1].0).error("position_mm", &what, help));
         }
     }
     let held = step as usize;

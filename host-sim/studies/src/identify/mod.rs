@@ -6,6 +6,7 @@
 //! ([`intervals`]), with the valve sequence that would determine most of them ([`experiment`]).
 
 pub mod bench;
+mod doubt;
 pub mod experiment;
 pub mod fit;
 pub mod free;
@@ -16,6 +17,7 @@ mod noise;
 mod page;
 mod point;
 mod predict;
+mod wrong;
 
 use std::path::Path;
 
@@ -27,6 +29,7 @@ use serde::Serialize;
 use wheeleg_config::axis::Change;
 use wheeleg_config::{AxisConfig, ParameterInfo};
 
+pub use self::doubt::Doubt;
 use self::experiment::Experiment;
 use self::fit::{Exact, Fit, Point, Problem, trust};
 use self::free::{COUNT, FREE, Logs};
@@ -35,6 +38,7 @@ use self::lab::Lab;
 use self::map::Mapped;
 pub use self::noise::{Noise, noise};
 use self::predict::{Predicted, predict};
+pub use self::wrong::{LabError, WrongCell, WrongCells};
 use crate::StudyError;
 use crate::study::schema::json;
 use crate::study::{self, Finished, Job, Progress, Settings, Stopped};
@@ -72,6 +76,8 @@ pub struct Parameter {
     pub high: f64,
     /// Whether the data determine it; otherwise it comes from the trust in the file.
     pub determined: bool,
+    /// Whether its interval can be trusted: the rest of the measurement is met.
+    pub trusted: bool,
     /// Whether the file's value is kept, because the fitted one contradicts others of the axis file.
     pub kept: bool,
 }
@@ -80,10 +86,11 @@ impl Parameter {
     /// Remark on its value, in words; empty if the data determine it.
     #[must_use]
     pub fn note(&self) -> &'static str {
-        match (self.kept, self.determined) {
-            (true, _) => "kept: the fit's value contradicts the axis file",
-            (false, false) => "not determined",
-            (false, true) => "",
+        match (self.kept, self.determined, self.trusted) {
+            (true, ..) => "kept: the fit's value contradicts the axis file",
+            (false, false, _) => "not determined",
+            (false, true, false) => "not to be trusted",
+            (false, true, true) => "",
         }
     }
 }
@@ -116,6 +123,8 @@ pub struct Identified {
     pub after: Misses,
     /// Noise of the position sensor by the axis file \[mm\].
     pub noise_mm: f64,
+    /// What the measurement lacks; empty if the fit explains it.
+    pub doubts: Vec<Doubt>,
     /// Parameters that the data do not determine.
     pub undetermined: Vec<String>,
     /// Next experiments, the most informative first.
@@ -152,6 +161,8 @@ pub struct Summary<'a> {
     /// Whether the file's own values explain it and the fitted ones do not: the measurement is too short, and
     /// no axis is written.
     worse_than_the_file: bool,
+    /// What the measurement lacks, if its rest is not met: to be mended before the bench is doubted.
+    doubts: &'a [Doubt],
     /// Parameters that the data do not determine.
     undetermined: &'a [String],
     /// The most informative next experiment, null if the plant can play none or the fit was stopped.
@@ -266,6 +277,11 @@ fn misses(lab: &Lab, predicted: &[Predicted], ticks: usize) -> Misses {
     }
 }
 
+/// Whether the held-out part is met.
+fn explains(misses: Misses, noise_mm: f64) -> bool {
+    misses.held_out_mm <= EXPLAINED * noise_mm
+}
+
 /// A fit, and its information.
 #[derive(Debug, Clone)]
 pub struct Fitted<'a> {
@@ -299,7 +315,7 @@ pub fn fitted<'a>(
     let go_on = || !progress.is_stopped();
     let refined =
         |of: &Problem<'_>, fit: Fit| of.fit(&fit.point, Exact::Fully, &go_on).unwrap_or(fit);
-    let free = refined(problem, first);
+    let free = searched(problem, refined(problem, first), channels, progress)?;
     // The model's errors are noise to the fit: they do not overrule the file.
     let left = |of: &Problem<'_>, fit: &Fit| of.noise.left(fit.residuals.as_slice(), channels);
     let second = Problem {
@@ -323,6 +339,30 @@ pub fn fitted<'a>(
         information,
         stopped,
     })
+}
+
+/// A fit that explains the fitted part. If the given one does not, it may be a local minimum: then the search begins again,
+/// with the air at several levels if nobody has measured it, and with ever more of the measurement.
+fn searched(
+    problem: &Problem<'_>,
+    found: Fit,
+    channels: usize,
+    progress: &Progress,
+) -> Result<Fit, StudyError> {
+    if found.position_error(channels) <= EXPLAINED {
+        return Ok(found);
+    }
+    let go_on = || !progress.is_stopped();
+    let others = progress.map(&bench::airs(problem.axis, problem.lab), |unknowns| {
+        let mut start = Point::of([0.0; COUNT]);
+        start.unknowns = *unknowns;
+        Ok::<_, StudyError>(problem.fit_growing(&start, channels, &go_on))
+    })?;
+    let others = others.into_iter().flatten().flatten();
+    Ok(others.fold(
+        found,
+        |best, fit| if fit.cost < best.cost { fit } else { best },
+    ))
 }
 
 /// Changes of the axis file under these factors; `said` gives the source of each value.
@@ -474,6 +514,8 @@ impl Identified {
                 .map_err(|e| unplayed(&problem, "the rest of the measurement", &format!(": {e}")))
         };
         let played = [play(&Point::of([0.0; COUNT]))?, play(&kept.point)?];
+        let [before, after] = [0, 1].map(|i| misses(&lab, &played[i], ticks));
+        let trusted = explains(after, noise.position_m * 1e3);
         let parameters = FREE.iter().enumerate().map(|(i, free)| {
             let factor = kept.point.logs[i].exp();
             let [low, high] = intervals[i].factors(fit.point.logs[i]);
@@ -486,13 +528,18 @@ impl Identified {
                 low: low.min(factor),
                 high: high.max(factor),
                 determined: intervals[i].determined,
+                trusted,
                 kept: refused.contains(&i),
             }
         });
         Ok(Self {
             parameters: parameters.collect(),
-            before: misses(&lab, &played[0], ticks),
-            after: misses(&lab, &played[1], ticks),
+            before,
+            after,
+            doubts: match trusted {
+                true => Vec::new(),
+                false => doubt::doubts(&lab, axis, noise.position_m),
+            },
             noise_mm: noise.position_m * 1e3,
             undetermined: intervals::undetermined(&information),
             // A stopped fit is no basis for planning.
@@ -514,14 +561,14 @@ impl Identified {
     /// Whether the rest of the measurement is explained.
     #[must_use]
     pub fn is_explained(&self) -> bool {
-        self.after.held_out_mm <= EXPLAINED * self.noise_mm
+        explains(self.after, self.noise_mm)
     }
 
     /// Whether the file's own values explain the rest of the measurement and the fitted ones do not: the
     /// measurement is too short to add to the file.
     #[must_use]
     pub fn is_worse_than_the_file(&self) -> bool {
-        !self.is_explained() && self.before.held_out_mm <= EXPLAINED * self.noise_mm
+        !self.is_explained() && explains(self.before, self.noise_mm)
     }
 
     /// The axis file with the results.
@@ -539,10 +586,14 @@ impl Identified {
             };
             match (parameter.kept, parameter.determined) {
                 (false, true) => format!(
-                    "IDENTIFIED from {lab}: {} to {} {} (95 %)",
+                    "IDENTIFIED from {lab}: {} to {} {} ({})",
                     in_unit(parameter.low),
                     in_unit(parameter.high),
-                    info.unit
+                    info.unit,
+                    match parameter.trusted {
+                        true => "95 %",
+                        false => "not to be trusted: the model does not match the held-out data",
+                    }
                 ),
                 (false, false) => left_open(&lab, info),
                 (true, _) => kept_against(&lab, info),
@@ -568,6 +619,7 @@ impl Identified {
             noise_mm: self.noise_mm,
             explained: self.is_explained(),
             worse_than_the_file: self.is_worse_than_the_file(),
+            doubts: &self.doubts,
             undetermined: &self.undetermined,
             next_experiment: self.experiments.first().map(|e| e.name),
         }

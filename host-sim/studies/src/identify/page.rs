@@ -79,6 +79,8 @@ struct Page<'a> {
     after_mm: f64,
     noise_mm: f64,
     parameters: Vec<Shown<'a>>,
+    doubts: Vec<String>,
+    explained: bool,
     undetermined: &'a [String],
     experiments: Vec<Next<'a>>,
     figures: Vec<Picture<'a>>,
@@ -112,7 +114,7 @@ pub(super) fn render(
     } else if identified.is_worse_than_the_file() {
         "the file's values match the held-out data and the fit's do not: it is not written, measure for longer"
     } else {
-        "the held-out data are not matched: the model lacks something that the bench has, such as a leak"
+        "the held-out data are not matched: do not trust the intervals"
     };
     let next = |experiment: &'_ Experiment| experiment.ignorance.exp() * 100.0;
     let values = Page {
@@ -135,6 +137,8 @@ pub(super) fn render(
                 paths: parameter.paths.join(", "),
             })
             .collect(),
+        doubts: identified.doubts.iter().map(ToString::to_string).collect(),
+        explained: identified.is_explained(),
         undetermined: &identified.undetermined,
         experiments: identified
             .experiments

@@ -97,7 +97,7 @@ fn chosen<T: Clone + PartialEq>(given: &[T], all: &[T]) -> Vec<T> {
 
 /// Columns on the terminal: the heading, the cell of [`Comparison::table`], and whether the column is shown
 /// if no moves were chosen.
-const COLUMNS: [(&str, usize, bool); 12] = [
+const COLUMNS: [(&str, usize, bool); 15] = [
     ("error mm", 0, true),
     ("20 mm", 1, false),
     ("overshoot", 2, true),
@@ -110,6 +110,9 @@ const COLUMNS: [(&str, usize, bool); 12] = [
     ("recovery", 13, true),
     ("helped", 14, false),
     ("cycles", 15, false),
+    ("first mm", 16, false),
+    ("overshoot", 17, false),
+    ("settled s", 18, false),
 ];
 
 /// The table of an axis. If moves were chosen, it has the columns that contain figures.
@@ -184,6 +187,12 @@ fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
         }
     }
     out += &combinations(comparison);
+    let options = &comparison.options;
+    if options.combinations > 0 && options.judged_move().is_none() {
+        out.push_str(
+            "judged      none of the combinations: only those of step-100 and first-step are\n",
+        );
+    }
     let alarms = comparison.false_alarms();
     let mut told = String::new();
     let shown = if all { usize::MAX } else { ALARMS_LISTED };

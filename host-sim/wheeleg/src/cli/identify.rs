@@ -23,7 +23,8 @@ pub(super) struct IdentifyArgs {
     #[arg(long, value_name = "AXIS")]
     axis: String,
     /// Column with another name or unit in the file: NAME=COLUMN, or NAME=COLUMN*FACTOR+OFFSET, such as
-    /// `position_mm=x (m)*1000`; may be given several times. The other columns of the file are then not read.
+    /// `position_mm=x (m)*1000`; may be given several times. Columns with a name of that list are read as they
+    /// are; all others are then ignored.
     #[arg(long, value_name = "NAME=COLUMN")]
     map: Vec<Mapped>,
     /// Fraction of the measurement, at its end, that is held out from the fit, 0.1 to 0.9.
@@ -96,7 +97,13 @@ fn text(identified: &Identified, report: &Path) -> String {
     if identified.is_worse_than_the_file() {
         text.push_str("               the fit is worse than the file: measure for longer\n");
     } else if !identified.is_explained() {
-        text.push_str("               the model lacks something that the bench has\n");
+        text.push_str("               do not trust the intervals; possible reasons:\n");
+        for doubt in &identified.doubts {
+            let _ = writeln!(text, "               - {doubt}");
+        }
+        text.push_str(
+            "               - the bench has something that the model lacks, such as a leak\n",
+        );
     }
     if let Some(next) = identified.experiments.first() {
         let path = report.with_file_name(NEXT);
