@@ -56,6 +56,7 @@ fn identified(text: &str) -> (Value, String) {
 /// The mass is 2.5 times that of the file, and the chambers are full where the file has them empty: from the file's values all fits
 /// end in local minima.
 #[test]
+#[ignore = "long; `cargo xtask test` runs it"]
 fn a_mass_far_from_the_files_is_found_in_unknown_air() {
     let (summary, _) = identified(&table(&sine("mass=3.75")[..3500], |_, at_mm| at_mm));
     assert_eq!(summary["explained"], true, "{summary}");
@@ -80,7 +81,7 @@ fn a_mass_far_from_the_files_is_found_in_unknown_air() {
 #[test]
 fn what_the_measurement_lacks_is_told_before_the_bench() {
     let rows = sine("nominal");
-    let (rows, slips) = (&rows[..1500], 1200);
+    let (rows, slips) = (&rows[..900], 720);
     let text = table(rows, |k, at_mm| at_mm + if k > slips { 4.0 } else { 0.0 });
     let (summary, axis) = identified(&text);
     assert_eq!(summary["explained"], false, "{summary}");
