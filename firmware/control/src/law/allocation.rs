@@ -14,7 +14,7 @@
 //! thin rod. This is neither the stiffest level, which is the highest, nor the one at which filling and venting are
 //! equally fast.
 //!
-//! **Pressure swap.** A chamber vents no faster than its valve lets it. In an announced move, and in a move from an end
+//! **Pressure swap.** A chamber vents no faster than its valve lets it. In a move after a preload, and in one from an end
 //! stop, the drive chamber compensates for the excess pressure that is still in the counter chamber, and falls back as
 //! that vents: the force is there as soon as either chamber can make it. The swap ends once the expected excess of the
 //! counter chamber is at most 10 kPa. Source: this project (decision 38).

@@ -147,7 +147,7 @@ mod tests {
 
     /// Friction takes 48 mm/s in the dead time, but never reverses the motion.
     #[test]
-    fn friction_stops_a_slow_piston_and_turns_it_not_round() {
+    fn friction_stops_a_slow_piston_and_does_not_reverse_it() {
         // The 12 N of load are balanced.
         for (speed, stops) in [(40.0, true), (-40.0, true), (80.0, false), (-80.0, false)] {
             let [_, found] = predicted(90.0, speed, -LOAD_N, -LOAD_N, false);

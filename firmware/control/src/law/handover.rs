@@ -7,7 +7,7 @@
 //! | | what is kept when another part drives | why |
 //! |---|---|---|
 //! | continues | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
-//! | starts afresh, if the other part has the last tick of a period, and at the end of each period in which it drives | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
+//! | starts afresh at the end of each period whose last tick the other part has | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
 //! | is dropped at once | the part of the plan that was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
 //!
 //! A part that drives for less than a period, and not in its last tick, leaves rest, ramp and preload as they were. An

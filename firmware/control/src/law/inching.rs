@@ -26,9 +26,9 @@
 //!
 //! **Which valves.** Fill the drive chamber or vent the counter chamber, if ΔF is at least 0.8 of the finest pulse of
 //! that valve and its chamber has room. If both are possible, fill when the mean of the pressures is below the middle,
-//! otherwise vent, so that the pressures stay about it. If ΔF is less than either, use a *vernier* pair: both chambers
-//! are filled, or both vented, starting together, and the difference of their forces acts. All openings are sent as
-//! planned, whatever the piston does meanwhile.
+//! otherwise vent, so that the pressures stay about it. If neither is possible, use a *vernier* pair: both chambers are
+//! filled, or both vented, starting together, and the difference of their forces acts. All openings are sent as planned,
+//! unless `standstill` shuts the valves. A step waits until the air has come to rest and all valves are ready.
 //!
 //! `standstill` has priority: where it holds the valves shut (CATCH, PAUSE, REST), the rest of the pulses is dropped.
 //! The state is AWAY while a preload or a seat decides, while the reference moves, and after a new target. The

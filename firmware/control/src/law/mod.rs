@@ -38,7 +38,7 @@
 //! 6. `standstill`, unless 4 has decided: its state follows from 5, or otherwise from how the piston approaches the
 //!    target.
 //! 7. `allocation`: the pressure swap starts with a preload, or when the piston stands at an end stop.
-//! 8. F\* is that of 4 or 5. There is no pulse if 4 says so, or if the state of 6 is PAUSE, CATCH or REST. If the
+//! 8. F\* is that of 4 or 5, if one of them gave a force. There is no pulse if 4 says so, or if the state of 6 is PAUSE, CATCH or REST. If the
 //!    valves are coarse and the piston is near, `inching` gives the pulses of a step, or none, and 9 is skipped.
 //!    Otherwise F\* is that of the position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics`,
 //!    which uses `switching_curve`.
@@ -60,11 +60,11 @@
 //!
 //! | what happens | what follows |
 //! |---|---|
-//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`) and passes on the last good stroke. Two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the axis data, the state of the air counts as unknown |
+//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`) and passes on the last good stroke. Two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the axis data, and the pressures start from the assumption of a power-up, with bounds from atmosphere to supply |
 //! | a frozen potentiometer | the node notices the missing motion (`no_motion_detector.rs` there) |
 //! | no new reference | the node lets the last one continue at its speed for one bus cycle and then stand; when it gives up on the master it shuts the valves. The law comes to rest at whatever reference it is given |
 //! | somebody else drives the valves | `handover`: the observer counts what they send. When the law acts again, its standstill, ramp and preload start afresh (if the other part had the last tick of a period); everything else continues |
-//! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers after some 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
+//! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers with a time constant of about 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | it appears as load. Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
@@ -72,9 +72,10 @@
 //! `preload` are in `tests.rs` here and in `tests/preload.rs`. `tests/system/control_bars.rs` shows what all of it is
 //! worth in the closed loop.
 //!
-//! Three values of friction are used on purpose. The observer and the predictor use 0.92 of Coulomb friction, because
-//! more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward. `standstill` relies on
-//! 0.85 of it where friction has to stop the piston.
+//! Three shares of Coulomb friction are used for sliding and stopping, on purpose. The observer and the predictor use
+//! 0.92 of it, because more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward.
+//! `standstill` relies on 0.85 where friction has to stop the piston. `preload`, `seat` and `inching` have factors of
+//! their own.
 
 mod allocation;
 mod dead_time_predictor;

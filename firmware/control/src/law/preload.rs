@@ -47,7 +47,7 @@ use crate::tuning::{
 /// An awaited move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Preload {
-    /// Where the piston stood when the move was announced, raw mm; `None` without an announcement.
+    /// Stroke when the preload began, raw mm; `None` without one.
     place: Option<i32>,
     /// Pulses are sent: more than half of the friction was missing, and either the force is not yet reached, or the
     /// counter chamber still lags.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! opening = (p* − p expected) / ṗ         ṗ = n K p_s ψ(p/p_s) / L to fill, −n K p ψ(p_a/p) / L to vent
-//! on-time = opening + t_on − t_off        no shorter than t_on and its margin, no gap shorter than t_off and its
+//! on-time = opening + t_on − t_off        at least t_on + margin; gaps at least t_off + margin
 //! ```
 //!
 //! Times in s, pressures in Pa, ṗ in Pa/s: the inverse of [`crate::observer::pressure`], with its symbols, at the mean

@@ -20,8 +20,8 @@
 //! may exceed a T_t. A new target is accepted at any time and approached from the present r and v.
 //!
 //! If the reference ran away from a piston that has not begun to move, it would demand a speed that no valve can
-//! deliver, and the piston would then overshoot. For a stuck piston the reference only brakes from a lead of 2 ℓ on: it
-//! stops at most 2 ℓ + v²/(2 a) ahead, where v is its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s,
+//! deliver, and the piston would then overshoot. Ahead of a stuck piston the reference brakes fully from a lead of 2 ℓ on, at the
+//! latest: it stops at most 2 ℓ + v²/(2 a) ahead, where v is its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s,
 //! 1500 mm/s² and 4 mm). If the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever
 //! supervises the piston must compare it with the command.
 //!

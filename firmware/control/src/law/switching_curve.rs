@@ -33,7 +33,8 @@
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot removes
 //! the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve serves 1 and 400
 //! mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are searched
-//! ([`crate::tuning`]). Within the limits of k and a_b, e_l does not depend on the mass.
+//! ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l does not
+//! depend on the mass.
 //!
 //! Assumes: dead time, supply and conductance as specified; the mass in use; and that a force can be built up within
 //! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that

@@ -96,7 +96,7 @@ fn a_moving_reference_is_not_rested_at() {
 /// After a stop in the middle of a move nothing is left of its force.
 #[test]
 fn a_move_after_a_stop_does_not_begin_with_the_force_of_the_one_before() {
-    // Moved by hand, as no force moves a piston, so that nothing can be learnt from it.
+    // The test moves the piston itself, without a force, so no mass can be learnt.
     let data = AxisData {
         learns_mass: false,
         ..AxisData::default()

@@ -19,8 +19,8 @@
 //! determines a mass if it took at least 80 ms, reached 200 mm/s, and was 100 mm/s above the line; otherwise nothing
 //! changes.
 //!
-//! If the bounds of the pressures are far apart in such a move (on average by more than a quarter of the largest
-//! extending force), as after a power-up with unknown air, the force is not accurate enough for the mass. Then the mass
+//! If the bounds of the pressures are far apart in such a move (both widths, as forces, together on average by more than
+//! a quarter of the largest extending force), as after a power-up with unknown air, the force is not accurate enough for the mass. Then the mass
 //! comes, together with the pressures, from [`super::identification`].
 //!
 //! **Doubt.** The peak above the line is a small difference of large impulses. In a long move at nearly constant speed

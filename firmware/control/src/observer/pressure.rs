@@ -24,12 +24,12 @@
 //! The observer is open loop: there is no pressure sensor. Errors die out by themselves: a filling chamber ends at the
 //! supply and a venting one at the atmosphere, whatever was assumed before. The flow is monotone in p, so both bounds
 //! keep their order, and their distance says how far the estimate can be off. The estimate itself is not held within
-//! them: its flow is that at p̄, so it may lie outside them by the error of a step. Only the identification of a move
-//! uses the bounds ([`super::mass`] their distance, and `identification`); they hold as long as the assumptions do.
+//! them: its flow is that at p̄, so it may lie outside them by the error of a step. The bounds are used only
+//! after a move: their distance by [`super::mass`], both by `identification`. They hold as long as the assumptions do.
 //!
 //! Assumes: supply and atmosphere as specified, tight seals, no flow except through the valves. If the supply is lower,
-//! a chamber that is filled ends below the estimate, and below p⁻, too: the bounds no longer hold. Venting restores
-//! both.
+//! a chamber that is filled ends below the estimate, and below p⁻, too: the bounds no longer hold. Venting makes
+//! estimate and bounds right again.
 //!
 //! Per period and chamber there is one explicit step from moment to moment, with the mean length and speed of that
 //! time; then one over the dead time, with the pulses under way and the speed at the moment, for the expected pressure;
