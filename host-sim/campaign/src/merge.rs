@@ -108,7 +108,11 @@ fn table_of(
     let temporary = out.with_extension(format!("{}.tmp", host::unique()));
     // From here on there is something to clean up.
     stop.begin();
-    if let Some(folder) = out.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+    let parents = out.ancestors().skip(1);
+    let made: Vec<&Path> = parents
+        .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists())
+        .collect();
+    if let Some(folder) = made.first() {
         std::fs::create_dir_all(folder)
             .map_err(|e| CampaignError::output("create the folder", folder, e))?;
     }
@@ -124,6 +128,12 @@ fn table_of(
     });
     // It no longer exists if it has become the table.
     let _ = std::fs::remove_file(&temporary);
+    if !matches!(result, Ok(Some(_))) {
+        // Nothing is left where no table was written.
+        for folder in made {
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
     result
 }
 

@@ -193,7 +193,8 @@ fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>),
         CampaignError::refused(
             format!("there is no case `{}`", word(case)),
             format!(
-                "give one of the column `case`, or its first characters (from 4), or a place from 0 to {}",
+                "give one of the column `case` of a case that has a row, or its first characters (from 4; from 8 if all \
+                 are digits), or a place from 0 to {}",
                 plan.cases - 1
             ),
         )

@@ -44,12 +44,12 @@ impl Submission {
         if shards == 0 || shards > most {
             return Err(CampaignError::refused(
                 format!(
-                    "{shards} shards are too many, or none: the campaign has {} blocks, about {work_s:.0} s of work",
+                    "{shards} shards do not fit: the blocks of the campaign are {}, about {work_s:.0} s of work",
                     plan.blocks()
                 ),
                 format!(
-                    "give --shards from 1 to {most}: a task has at least one block, and above \
-                     {FEW} tasks about {LEAST_TASK_S:.0} s of work"
+                    "give --shards from 1 to {most}: each task needs a block, and where there are more than {FEW} \
+                     tasks, {LEAST_TASK_S:.0} s of work; a smaller `block` in the plan makes more blocks"
                 ),
             ));
         }

@@ -44,6 +44,8 @@ pub struct Change {
     /// Whether the change is that of the distance from the middle of the limits, because the target has limits
     /// on both sides; otherwise it is that of the value.
     pub of_distance: bool,
+    /// Pairs in which both cases have the value: only these are in mean and interval.
+    pub measured: u64,
     /// Mean of after − before.
     pub mean: Option<f64>,
     /// Its 95 % interval, by resampling the pairs; for very many pairs, by the normal distribution.
@@ -193,6 +195,7 @@ fn paired(what: String, before: &Merged, after: &Merged, rows: &[(usize, usize)]
                 .collect();
             Change {
                 of_distance: middle.is_some(),
+                measured: differences.len() as u64,
                 mean: stats::mean(&differences),
                 interval: interval_of_mean(&differences),
                 column: column.clone(),

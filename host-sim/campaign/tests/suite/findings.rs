@@ -179,6 +179,7 @@ fn of_a_target_with_limits_on_both_sides_the_change_is_that_of_the_distance_from
         (rest.change.mean.expect("four pairs") + 0.6).abs() < 1e-12,
         "{rest:?}"
     );
+    assert_eq!(rest.change.measured, 4);
     assert!(rest.change.of_distance && !of("overshoot").change.of_distance);
     let page = folder.path().join("cases.html");
     report.write(&page).expect("a page");

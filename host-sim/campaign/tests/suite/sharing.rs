@@ -204,6 +204,12 @@ fn a_table_is_no_file_of_its_campaign() {
     let beside = folder.path().join("deep/er/table.parquet");
     let merged = merge(&folders, &beside, &Stop::default()).expect("merged");
     assert_eq!(merged.expect("not stopped").rows, 8);
+    // Where no table is written, no folder is left.
+    let part = folder.path().join("parts/000000.parquet");
+    std::fs::remove_file(part).expect("removed");
+    let beside = folder.path().join("other/deep/table.parquet");
+    merge(&folders, &beside, &Stop::default()).expect_err("a block is missing");
+    assert!(!folder.path().join("other").exists());
 }
 
 /// A block is about a minute of work on one core, including a start-up for each case: a thousand short cases

@@ -278,10 +278,11 @@ pub(super) fn replayed(replayed: &Replayed) -> String {
         let _ = writeln!(out, "hash    {hash}");
     }
     if let Some(files) = &replayed.files {
-        let same = match replayed.same_recording() {
-            Some(true) => "bit-identical",
-            Some(false) => "DIFFERS",
-            None => "not compared",
+        let same = match (&replayed.before, replayed.same_recording()) {
+            (None, _) => "none before",
+            (_, Some(true)) => "bit-identical",
+            (_, Some(false)) => "DIFFERS",
+            (_, None) => "not compared",
         };
         let what = match files.result.recording {
             Recording::Log => "log  ",
