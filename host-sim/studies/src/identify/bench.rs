@@ -86,39 +86,6 @@ pub(super) fn limits(axis: &AxisParams, lab: &Lab) -> [[f64; 2]; UNKNOWNS] {
     limits
 }
 
-/// Shares of the way from the ambient to the supply at which the air of A is tried.
-const AIRS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-
-/// Starts of a search for the unknowns: as measured; without pressures also with the air at several levels, at which
-/// the piston stands. `axis` is that of the file.
-pub(super) fn airs(axis: &AxisParams, lab: &Lab) -> Vec<Unknowns> {
-    let mut all = vec![[0.0; UNKNOWNS]];
-    if has_pressures(lab) {
-        return all;
-    }
-    let before = Unmeasured::of(axis);
-    let [file_a_pa, file_b_pa] = before.file_pa;
-    let [least_pa, most_pa] = before.range_pa;
-    let [[_, _], [_, _], limits_a, limits_b] = limits(axis, lab);
-    let square = |diameter_m: f64| 0.25 * std::f64::consts::PI * diameter_m * diameter_m;
-    let [bore_m2, rod_m2] = [axis.cylinder.bore_m, axis.cylinder.rod_m].map(square);
-    let of = |pressure_pa: f64, file_pa: f64, [low, high]: [f64; 2]| {
-        ((pressure_pa - file_pa) / before.deviation_pa().max(1.0)).clamp(low, high)
-    };
-    all.extend(AIRS.map(|share| {
-        let a_pa = least_pa + share * (most_pa - least_pa);
-        let force_n = a_pa * bore_m2 - axis.gas.ambient_pressure_pa * rod_m2 + axis.load_n;
-        let b_pa = force_n / (bore_m2 - rod_m2);
-        [
-            0.0,
-            0.0,
-            of(a_pa, file_a_pa, limits_a),
-            of(b_pa, file_b_pa, limits_b),
-        ]
-    }));
-    all
-}
-
 /// The start of an axis with factors; `file` is that without.
 pub(super) fn start(axis: AxisParams, file: &AxisParams, lab: &Lab, unknowns: &Unknowns) -> Start {
     let still = at_rest(lab);

@@ -315,7 +315,7 @@ pub fn fitted<'a>(
     let go_on = || !progress.is_stopped();
     let refined =
         |of: &Problem<'_>, fit: Fit| of.fit(&fit.point, Exact::Fully, &go_on).unwrap_or(fit);
-    let free = searched(problem, refined(problem, first), channels, progress)?;
+    let free = searched(problem, refined(problem, first), channels, progress);
     // The model's errors are noise to the fit: they do not overrule the file.
     let left = |of: &Problem<'_>, fit: &Fit| of.noise.left(fit.residuals.as_slice(), channels);
     let second = Problem {
@@ -341,28 +341,16 @@ pub fn fitted<'a>(
     })
 }
 
-/// A fit that explains the fitted part. If the given one does not, it may be a local minimum: then the search begins again,
-/// with the air at several levels if nobody has measured it, and with ever more of the measurement.
-fn searched(
-    problem: &Problem<'_>,
-    found: Fit,
-    channels: usize,
-    progress: &Progress,
-) -> Result<Fit, StudyError> {
-    if found.position_error(channels) <= EXPLAINED {
-        return Ok(found);
+/// A fit that explains the fitted part. If the given one does not, it may be a local minimum: then the search begins again from
+/// the file's values with ever more of the measurement. That needs measured pressures: the air of the start decides how
+/// everything after it goes.
+fn searched(problem: &Problem<'_>, found: Fit, channels: usize, progress: &Progress) -> Fit {
+    if !bench::has_pressures(problem.lab) || found.position_error(channels) <= EXPLAINED {
+        return found;
     }
     let go_on = || !progress.is_stopped();
-    let others = progress.map(&bench::airs(problem.axis, problem.lab), |unknowns| {
-        let mut start = Point::of([0.0; COUNT]);
-        start.unknowns = *unknowns;
-        Ok::<_, StudyError>(problem.fit_growing(&start, channels, &go_on))
-    })?;
-    let others = others.into_iter().flatten().flatten();
-    Ok(others.fold(
-        found,
-        |best, fit| if fit.cost < best.cost { fit } else { best },
-    ))
+    let other = problem.fit_growing(&Point::of([0.0; COUNT]), channels, &go_on);
+    other.filter(|fit| fit.cost < found.cost).unwrap_or(found)
 }
 
 /// Changes of the axis file under these factors; `said` gives the source of each value.
