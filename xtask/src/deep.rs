@@ -73,7 +73,7 @@ const CHECKS: [Check; 33] = [
     ),
     Check(
         "ablation",
-        "each part of the predictive law taken out, 1 200 combinations with and without it",
+        "each part of the predictive law taken out, 1 200 combinations and 600 cylinders with and without it",
         10,
         ablation,
     ),

@@ -39,28 +39,20 @@ const BEGINNING_OF_DIGITS: usize = 8;
 pub(crate) struct Beginning(String);
 
 impl Beginning {
-    /// Whether an identity begins with it.
-    pub(crate) fn is_of(&self, case: CaseId) -> bool {
-        case.to_string().starts_with(&self.0)
-    }
-}
-
-impl FromStr for Beginning {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
+    /// A text as such a beginning; `None` if it is no beginning of an identity, or too short.
+    pub(crate) fn of(text: &str) -> Option<Self> {
         let own = text.trim_end_matches('…').to_lowercase();
         let least = match own.bytes().all(|b| b.is_ascii_digit()) {
             true => BEGINNING_OF_DIGITS,
             false => BEGINNING,
         };
         let is_hexadecimal = own.bytes().all(|b| b.is_ascii_hexdigit());
-        if is_hexadecimal && (least..=32).contains(&own.len()) {
-            return Ok(Self(own));
-        }
-        Err(format!(
-            "`{text}` is not the beginning of a case's identity"
-        ))
+        (is_hexadecimal && (least..=32).contains(&own.len())).then_some(Self(own))
+    }
+
+    /// Whether an identity begins with it.
+    pub(crate) fn is_of(&self, case: CaseId) -> bool {
+        case.to_string().starts_with(&self.0)
     }
 }
 

@@ -205,7 +205,7 @@ fn find(place: &From, plan: &PlanFile, case: &str) -> Result<(u64, Option<Row>),
         let row = row.into_iter().find(|row| row.index == index);
         return Ok((index, row));
     }
-    let beginning: Beginning = case.parse().map_err(|_| missing())?;
+    let beginning = Beginning::of(case).ok_or_else(missing)?;
     let mut rows = rows_at(place, None)?;
     rows.retain(|row| beginning.is_of(row.case));
     // Files of killed processes may have a row twice.

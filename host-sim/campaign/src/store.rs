@@ -278,10 +278,9 @@ impl Store {
             create_new(&path, text.as_bytes())?;
         }
         // Another process may have been the first.
-        Self::ensure_not_of_another(folder, &plan)?;
         Ok(Self {
             folder: folder.to_owned(),
-            plan: PlanFile::read(&path)?,
+            plan: Self::same_plan(PlanFile::read(&path)?, folder, &plan)?,
         })
     }
 
@@ -292,11 +291,20 @@ impl Store {
     /// [`CampaignError::Unreadable`] if its plan is invalid.
     pub fn ensure_not_of_another(folder: &Path, plan: &PlanFile) -> Result<(), CampaignError> {
         let path = folder.join(PLAN_FILE);
-        if !path.exists() {
-            return Ok(());
+        if path.exists() {
+            Self::same_plan(PlanFile::read(&path)?, folder, plan)?;
         }
-        let Some(difference) = PlanFile::read(&path)?.difference(plan) else {
-            return Ok(());
+        Ok(())
+    }
+
+    /// The plan found in a folder, if it is the one that is wanted.
+    fn same_plan(
+        found: PlanFile,
+        folder: &Path,
+        wanted: &PlanFile,
+    ) -> Result<PlanFile, CampaignError> {
+        let Some(difference) = found.difference(wanted) else {
+            return Ok(found);
         };
         Err(CampaignError::refused(
             format!(

@@ -164,9 +164,7 @@ impl<B: Board> AxisSim<B> {
     ) -> Result<Trace, AxisSimError> {
         let ticks = (duration_s * 1000.0).round() as usize;
         let mut rows = Vec::with_capacity(ticks);
-        let (mut latched, mut drove) = (Vec::new(), true);
-        // Those latched in an earlier recording.
-        let (mut faults, mut before) = (FaultBits::NONE, self.latched);
+        let (mut latched, mut faults, mut drove) = (Vec::new(), FaultBits::NONE, true);
         let start_air = self.state.core.cylinders[0].supply_mass_kg;
         let start_switches = self.switches();
         for k in 0..ticks {
@@ -197,13 +195,12 @@ impl<B: Board> AxisSim<B> {
             let new = action
                 .faults
                 .iter()
-                .filter(|fault| !before.contains(*fault));
+                .filter(|fault| !self.latched.contains(*fault));
             latched.extend(new.map(|fault| Latched { at_s: t, fault }));
-            before = before.union(action.faults);
+            self.latched = self.latched.union(action.faults);
             drove &= action.driving;
             rows.push(row);
         }
-        self.latched = before;
         Ok(Trace {
             motion: motion.clone(),
             rows,

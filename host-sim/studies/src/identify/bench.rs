@@ -36,8 +36,7 @@ pub(super) struct Start {
 
 /// Samples before the first valve is driven.
 fn at_rest(lab: &Lab) -> Vec<&Sample> {
-    let driven = lab.on_us.iter().position(|on| *on != [0; 4]);
-    let until = driven.unwrap_or(0).min(1000);
+    let until = lab.first_driven().unwrap_or(0).min(1000);
     lab.samples.iter().take_while(|s| s.tick <= until).collect()
 }
 

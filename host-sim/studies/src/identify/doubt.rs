@@ -61,7 +61,6 @@ impl std::fmt::Display for Doubt {
 
 /// Time at rest before the first valve opens, s.
 fn rest_s(lab: &Lab, noise_m: f64) -> f64 {
-    let driven = lab.on_us.iter().position(|on| *on != [0; 4]);
     let from_m = lab.samples.first().map_or(0.0, |s| s.position_m);
     let still_m = (STILL * noise_m).max(STILL_M);
     let moved = lab
@@ -69,7 +68,10 @@ fn rest_s(lab: &Lab, noise_m: f64) -> f64 {
         .iter()
         .find(|s| (s.position_m - from_m).abs() > still_m);
     let end = lab.on_us.len();
-    let ticks = driven.unwrap_or(end).min(moved.map_or(end, |s| s.tick));
+    let ticks = lab
+        .first_driven()
+        .unwrap_or(end)
+        .min(moved.map_or(end, |s| s.tick));
     ticks as f64 * 1e-3
 }
 

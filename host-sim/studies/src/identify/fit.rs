@@ -198,8 +198,7 @@ impl Problem<'_> {
         channels: usize,
         go_on: &dyn Fn() -> bool,
     ) -> Option<Fit> {
-        let driven = self.lab.on_us.iter().position(|on| *on != [0; 4]);
-        let driven = driven.unwrap_or(0).min(self.ticks);
+        let driven = self.lab.first_driven().unwrap_or(0).min(self.ticks);
         let mut point = *start;
         for part in [8, 4, 2] {
             let ticks = driven + (self.ticks - driven) / part;

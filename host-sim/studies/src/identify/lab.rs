@@ -234,6 +234,11 @@ fn mapped(file: &str, line: u64, names: &[String], map: &[Mapped]) -> Result<(),
 }
 
 impl Lab {
+    /// First tick in which a valve is driven; `None` if none ever is.
+    pub(super) fn first_driven(&self) -> Option<usize> {
+        self.on_us.iter().position(|on| *on != [0; 4])
+    }
+
     /// Reads a file; the axis has the ranges, `map` the columns with another name in it.
     ///
     /// # Errors
