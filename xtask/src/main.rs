@@ -64,7 +64,7 @@ enum Command {
     Setup,
     /// Set up, then run the whole test suite.
     Test,
-    /// Format, lints and bare-metal checks; no tests.
+    /// Format, lints, seeded bugs and bare-metal checks; no tests.
     Check,
     /// Build all board images into `target/firmware`, and check that none can panic.
     Firmware,
@@ -177,4 +177,5 @@ fn test(report: &mut Report) {
 fn lints(report: &mut Report) {
     report.step("cargo fmt --check", rust::fmt);
     report.step("cargo clippy -D warnings", rust::clippy);
+    report.step("fuzz: seeded bugs apply", fuzz::seeded_bugs_apply);
 }
