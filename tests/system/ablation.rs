@@ -40,6 +40,7 @@ const fn told(part: Part) -> &'static str {
         Part::Parabola => {
             "the parabola of the switching curve (straight line up to top speed instead)"
         }
+        Part::Landing => "landing by friction (the straight line down to the target)",
         Part::FrictionFeedForward => "friction feed-forward",
         Part::BreakawayRamp => {
             "break-away ramp: a slowly growing force until a piston at rest moves"

@@ -18,6 +18,8 @@ pub enum Part {
     DeadTimePredictor,
     /// The straight line replaces the parabola, up to top speed.
     Parabola,
+    /// The straight line of the switching curve reaches down to the target, without a landing by friction.
+    Landing,
     /// No friction is fed forward.
     FrictionFeedForward,
     /// The force on a stuck piston does not grow.
@@ -34,12 +36,13 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::LoadObserver,
         Self::MassEstimator,
         Self::AirIdentification,
         Self::DeadTimePredictor,
         Self::Parabola,
+        Self::Landing,
         Self::FrictionFeedForward,
         Self::BreakawayRamp,
         Self::StoppingDistance,

@@ -91,10 +91,11 @@ tuning! {
     SLOPE_PERCENT: u64 = 36, "slope of the curve times the dead time, × 100", "searched; 1/e = 37 is the aperiodic limit of an integrator with dead time", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     SLOPE_LEAST: i32 = 1 << 8, "1/s × 2^8 (1/s)", "format: 1/(2 k²) fits", "src/law/switching_curve.rs::the_slope_of_the_heaviest_mass_fits_its_format";
     DAMPING_PERCENT: u64 = 95, "gain of the speed error times the dead time, × 100", "searched", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
-    BRAKE_PERCENT: u64 = 60, "deceleration over slope times top speed, × 100", "searched", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
+    BRAKE_PERCENT: u64 = 50, "deceleration over slope times choked speed, × 100", "searched", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     FILL_FLOW_PERCENT: u64 = 90, "flow of filling over the choked flow, × 100", "ISO 6358 with b of 0.3, from 7 bar to the mean of that and the atmosphere", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     NIMBLE_PERCENT: u64 = 60, "nimble mass over the mass that half of Ḟ of both chambers could brake along the curve, × 100", "searched", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
-    TOP_SPEED_HALVES: u64 = 3, "largest top speed over the choked speed of the slower outlet (A), in halves; never above that of B", "searched: one top speed serves both directions, and retracting faster than A vents, the piston compresses A, which brakes it", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
+    CHOKED_SPEED_HALVES: u64 = 3, "largest choked speed that counts over that of the slower outlet (A), in halves; never above that of B", "searched: one speed serves both directions, and retracting faster than A vents, the piston compresses A, which brakes it", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
+    TOP_SPEED_HALVES: u64 = 3, "top speed over the choked speed that counts, in halves", "measured: stored air drives the fastest step beyond the choked speed for half of its way (decision 65)", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     PRESSURE_LOW_PERCENT: u64 = 103, "of the atmosphere", "below, venting takes for ever", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     PRESSURE_HIGH_PERMILLE: u64 = 985, "of the supply", "above, filling takes for ever", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
     RAMP_PER_SECOND: u64 = 5, "break-away forces in a second", "searched", "tests/suite/axis.rs::coefficients_are_those_of_the_formulas";
@@ -105,7 +106,7 @@ tuning! {
     BRAKE_FORCE_USED: i32 = 45_875, "share of the force that can brake, × 2^16 (0.7)", "searched: leaves the rest for what is not known", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
     BRAKE_LEAST: i32 = 200, "mm/s²", "a piston whose load is beyond its force still approaches", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
     IMPATIENT_DIVISOR: i32 = 2, "times less acceleration is asked for where patience is over and half is enough", "a swing that lasts is a loop with too much gain; a quarter was no better (decision 61)", "src/law/inverse_dynamics/tests.rs::half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pulse";
-    ACCELERATION_LIMIT_HALVES: i32 = 5, "limit over the deceleration of the curve, in halves", "searched", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
+    ACCELERATION_LIMIT_HALVES: i32 = 7, "limit over the deceleration of the curve, in halves", "searched", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
 
     // Law: allocation and pulses.
     SWAP_LAG: i32 = 10_000 << 8, "1/256 Pa (10 kPa)", "what a valve changes in a period", "src/law/allocation.rs::a_counter_chamber_that_lags_is_made_up_for";
@@ -141,6 +142,7 @@ tuning! {
     RELEASE_BEYOND_SIXTEENTHS: i32 = 8, "sixteenths of the band beyond one that is wider than the widest release", "searched: hysteresis of a wide band", "src/law/standstill/tests.rs::a_wide_band_is_released_within_the_bar";
     RELEASE_PERIODS: u16 = 5, "periods (20 ms)", "noise is outside for less long", "src/law/standstill/tests.rs::rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
     FRICTION_STOPS: i32 = 55_705, "share of the friction told, × 2^16 (0.85)", "searched", "src/law/standstill/tests.rs::friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
+    LANDING_PERIODS: u16 = 12, "periods near (48 ms)", "searched: a piston that has not come to rest by then would only be kept moving (decision 65)", "src/law/standstill/tests.rs::a_landing_lasts_for_twelve_periods_near_the_target";
     STOP_ZONE_BANDS: i32 = 12, "bands", "searched", "src/law/standstill/tests.rs::friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
     STOP_LEAST_SHIFT: u32 = 2, "log2 of the friction over the least that stops", "less is not to be counted on", "src/law/standstill/tests.rs::friction_that_a_force_takes_away_stops_nothing";
     PAUSE_SPENT: u16 = 8, "periods of a pause that one beside the band counts for", "searched", "src/law/standstill/tests.rs::a_pause_beside_the_band_is_short";

@@ -6,7 +6,7 @@
 //! w_i = C ρ0 R T0 / A_i                          speed at which a choked outlet of side i lets the piston go
 //! T_d = 1.5 ticks + t_on + line                  dead time
 //! k   = SLOPE / T_d     D = DAMPING / T_d        slope of the speed law, gain of the speed error
-//! v_top = min(w_B, TOP_SPEED w_A)     a_b = BRAKE k v_top
+//! v_c = min(w_B, CHOKED w_A)    a_b = BRAKE k v_c    v_top = TOP v_c
 //! Ḟ   = n/2 · C ρ0 R T0 Σ p_i A_i / V_i          how fast the force can change, at mid-stroke
 //! m_n = NIMBLE Ḟ / (a_b k)                       mass up to which the valves can follow the speed law
 //! F_1 = n C ρ0 R T0 p_B A_B / V_B (t_off + margin)   force of the finest pulse: the shortest, venting B at mid-stroke
@@ -24,9 +24,9 @@ use super::data::{AxisData, AxisField};
 use crate::observer::flow::FlowCurve;
 use crate::observer::valve_delay::ValveTimes;
 use crate::tuning::{
-    AMBIENT_PA, BRAKE_PERCENT, DAMPING_PERCENT, EXPONENT_PERCENT, FILL_FLOW_PERCENT, LOAD_PERCENT,
-    MEMORY, NIMBLE_PERCENT, PRESSURE_HIGH_PERMILLE, PRESSURE_LOW_PERCENT, RAMP_PER_SECOND,
-    SLOPE_PERCENT, TOP_SPEED_HALVES,
+    AMBIENT_PA, BRAKE_PERCENT, CHOKED_SPEED_HALVES, DAMPING_PERCENT, EXPONENT_PERCENT,
+    FILL_FLOW_PERCENT, LOAD_PERCENT, MEMORY, NIMBLE_PERCENT, PRESSURE_HIGH_PERMILLE,
+    PRESSURE_LOW_PERCENT, RAMP_PER_SECOND, SLOPE_PERCENT, TOP_SPEED_HALVES,
 };
 use wheeleg_units::{Micros, PositionMm, divide};
 
@@ -158,7 +158,7 @@ impl AxisModel {
     /// Checks the data and computes the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time T_d = 1.5 ticks + t_on + line, which bounds its
-    /// slope and damping, and the piston speed that a choked outlet allows, which bounds its top speed. The factors are
+    /// slope and damping, and the piston speed v_c that a choked outlet allows, which sets deceleration and top speed. The factors are
     /// those of [`crate::tuning`].
     ///
     /// Everything is computed in integers, as in the tick: every coefficient is within 0.1 % of the exact one, or a
@@ -206,7 +206,7 @@ impl AxisModel {
         );
 
         // Speed law. The larger side of the piston is the slower outlet, with choked speed C ρ0 R T0 / area.
-        let top_16 = flow_b_16.min(flow_a_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1));
+        let choked_16 = flow_b_16.min(flow_a_16.wrapping_mul(CHOKED_SPEED_HALVES).wrapping_shr(1));
         let per_dead_time_8 =
             |percents: u64| divide(percents.wrapping_mul(2_560_000), dead_time_us);
         // × 2^14, limited below 256/s: the slope for a dead time of 1.4 ms, and no steeper for less.
@@ -214,7 +214,7 @@ impl AxisModel {
         let slope_14 = divide((SLOPE_PERCENT * 10_000) << 14, dead_time_us).min(65_535 << 6);
         let slope_8 = slope_14.wrapping_shr(6);
         let brake = percent(
-            slope_14.wrapping_mul(top_16).wrapping_shr(30),
+            slope_14.wrapping_mul(choked_16).wrapping_shr(30),
             BRAKE_PERCENT,
         );
         // Both chambers at mid stroke and mean pressure, one filled and one vented: how fast the force can change,
@@ -307,7 +307,7 @@ impl AxisModel {
             slope: number(slope_8),
             damping: number(per_dead_time_8(DAMPING_PERCENT)),
             brake: number(brake),
-            top_speed: number(top_16),
+            top_speed: number(choked_16.wrapping_mul(TOP_SPEED_HALVES).wrapping_shr(1)),
             observe_stroke: number(OBSERVE_STROKE),
             observe_speed: ratio(OBSERVE_SPEED.wrapping_mul(1_000_000), period_us),
             observe_load: ratio(

@@ -3,8 +3,8 @@
 //! ```text
 //! e    = r + v_r T_r − x'
 //! a_b' = max(200 mm/s², min(a_b, 0.7 F_left / m))        F_left = F_in − load   for e > 0, F_out + load otherwise
-//! v*   = v_r + curve(e, a_b')
-//! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 5/2 a_b; half of it where patience is over and half is enough
+//! v*   = v_r + curve(e, a_b')                            with the landing while `standstill` allows it
+//! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 7/2 a_b; half of it where patience is over and half is enough
 //! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*
 //! ```
 //!
@@ -129,7 +129,13 @@ impl ForceDemand<'_> {
         };
         let possible = inertia.acceleration(mul_shr(clip::<26>(left), BRAKE_FORCE_USED, 16));
         let brake = gains.brake.min(possible).max(BRAKE_LEAST);
-        let (speed, slope) = gains.speed(error, brake, model.top_speed);
+        let curve = gains.speed(error, brake, model.top_speed);
+        let target_rests = reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        let (speed, slope) = if target_rests && rest.may_land() {
+            gains.landing(model, inertia, (error, brake), curve)
+        } else {
+            curve
+        };
         let wanted = reference_speed.saturating_add(speed);
         // 1/s × 2^8 times raw mm/s makes mm/s² × 2^24.
         let pull = mul_shr_sat(slope, reference_speed.saturating_sub(ahead.speed), 24);

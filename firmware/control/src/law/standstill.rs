@@ -18,6 +18,8 @@
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (e' − band) < m v²/2 <
 //!   F_s (e' + band), e' = e sgn v, F_s = 0.85 Fc − (F + load) sgn v. This is used within 12 bands of the target and
 //!   while F_s is at least Fc/4.
+//! * **Landing.** While the reference rests, and for the first 12 periods near it (as patience counts them), the piston
+//!   comes in as fast as friction can stop it (`switching_curve`).
 //! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
 //!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
 //!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
@@ -66,11 +68,11 @@ use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
 use crate::tuning::{
-    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
-    OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE, PATIENCE_MOST, PAUSE_ENDS_BEYOND,
-    PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS, RELEASE_PERIODS, RELEASE_SIXTEENTHS,
-    RELEASE_WIDEST, REST_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER,
-    WIDENS_SHIFT,
+    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, LANDING_PERIODS,
+    NEAR_BANDS, NEAR_PERIODS, OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE,
+    PATIENCE_MOST, PAUSE_ENDS_BEYOND, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS,
+    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, STILL_SPEED,
+    STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER, WIDENS_SHIFT,
 };
 
 /// Periods in which the band widens by its own width.
@@ -144,6 +146,11 @@ impl Standstill {
     /// Whether the piston has been near its target for some time.
     pub(super) const fn is_near(&self) -> bool {
         self.near > NEAR_PERIODS
+    }
+
+    /// Whether the piston may come in as fast as friction can stop it.
+    pub(super) const fn may_land(&self) -> bool {
+        self.near <= LANDING_PERIODS
     }
 
     /// Takes over the reference. Returns whether it is a new target: more than one band from the last one.

@@ -4,10 +4,12 @@
 //! e_l  = a_b / k²                            where straight line and parabola meet, with one slope
 //! v*   = k e                                 |e| ≤ e_l
 //!      = sgn(e) √(2 a_b (|e| − e_l/2))       beyond; both at most v_top, which begins at e_l/2 + v_top²/(2 a_b)
+//!      ≥ √(2 a_f |e|), times sgn(e)         landing: band < |e| ≤ e_l, a_f = min(0.85 Fc / m, a_b / 2)
 //!
-//! k = 0.36 σ / T_d, at least 1/s      D = 0.95 σ / T_d      a_b = 0.60 (0.36 / T_d) v_top σ², below 2^18 mm/s²
+//! k = 0.36 σ / T_d, at least 1/s      D = 0.95 σ / T_d      a_b = 0.50 (0.36 / T_d) v_c σ², below 2^18 mm/s²
 //! σ = min(1, ∛(m_n / m))                     a heavy piston is given less of each
-//! v_top = min(v_B, 1.5 v_A)                  v = C ρ0 R T0 / area of the chamber: its choked speed
+//! v_c = min(v_B, 1.5 v_A)                    v = C ρ0 R T0 / area of the chamber: its choked speed
+//! v_top = 1.5 v_c                            stored air drives the piston beyond the choked speed
 //! m_n   = 0.60 · ½ Ḟ / (a_b k)               with σ = 1; Ḟ: how fast both valves change the force at mid stroke
 //!
 //! half of the acceleration is enough:  m D k band > F_1
@@ -15,10 +17,15 @@
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time,
-//! s; m: mass in use, m_n: nimble mass, kg; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as an outlet, mm/s, as K in
-//! [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as there, p_m as in
+//! s; m: mass in use, m_n: nimble mass, kg; Fc: Coulomb friction, mN; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as
+//! an outlet, mm/s, as K in [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as there, p_m as in
 //! `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm. `inverse_dynamics` may lower
 //! a_b under a load.
+//!
+//! **Landing.** Along the straight line a piston slows down more than friction alone would slow it, so it is pushed all
+//! the way, and often stops a millimetre short and slips again. On the landing friction is the brake, with the valves at
+//! most helping. At e_l both curves meet, since a_f is at most a_b/2; a piston whose friction is small for its mass
+//! stays on the straight line. `standstill` decides how long a landing may last.
 //!
 //! **Half is enough.** A piston that stands off its target by e is moved by the force m D k e (`inverse_dynamics`),
 //! plus friction and ramp. Two halves meet on the way to the valves: `allocation` gives half of a force to each
@@ -32,11 +39,12 @@
 //!
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot removes
 //! the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve serves 1 and 400
-//! mm. Scaling by dead time, choked speed and mass is this project's (decision 38); the factors are searched
-//! ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l does not
+//! mm. Scaling by dead time, choked speed and mass is this project's (decision 38), and so is the landing (decision 65);
+//! the factors are searched ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l does not
 //! depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as specified; the mass in use; and that a force can be built up within
+//! Assumes: dead time, supply and conductance as specified; the mass in use; on the landing at least 0.85 of the
+//! specified friction; and that a force can be built up within
 //! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that
 //! it demands comes later or not at all, and the piston falls behind the curve or overshoots the target.
 //!
@@ -46,7 +54,8 @@
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root, within};
-use crate::tuning::{MASS_MIN, SLOPE_LEAST};
+use crate::observer::motion::Inertia;
+use crate::tuning::{FRICTION_STOPS, MASS_MIN, SLOPE_LEAST};
 
 /// The part of the law that depends on the moving mass; recomputed when the mass changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -107,27 +116,58 @@ impl SpeedGains {
             let line = mul_shr_sat(self.slope, error, 8);
             return (within(line, top), self.slope);
         }
-        // (32 v)² = 2 a_b e × 2^10; with raw e: × 2^11 / 2^16.
-        let square = i64::from(brake)
-            .wrapping_mul(i64::from(size.saturating_sub(half)))
-            .wrapping_shr(5);
-        let square = u32::try_from(square).unwrap_or(u32::MAX);
-        // At most 65 536 / 32 mm/s: fits raw mm/s.
-        let root = square_root(square).max(1) as i32;
-        let (speed, slope) = if root.wrapping_shl(11) >= top {
+        let (speed, slope) = parabola(brake, size.saturating_sub(half));
+        let (speed, slope) = if speed >= top {
             (top, 0)
         } else {
-            let slope = brake.wrapping_shl(13).checked_div(root).unwrap_or(0);
-            (root.wrapping_shl(11), slope)
+            (speed, slope)
         };
-        (
-            if error < 0 {
-                speed.wrapping_neg()
-            } else {
-                speed
-            },
-            slope,
-        )
+        (towards(error, speed), slope)
+    }
+
+    /// `curve`, or the landing where that is faster. `curve` is that of [`Self::speed`] for the same error and `brake`.
+    pub(super) fn landing(
+        &self,
+        model: &AxisModel,
+        inertia: &Inertia,
+        (error, brake): (i32, i32),
+        curve: (i32, i32),
+    ) -> (i32, i32) {
+        let size = error.saturating_abs();
+        let line_ends = mul_shr_sat(brake, self.linear, 15);
+        if size <= model.band || size > line_ends || is_without(Part::Landing) {
+            return curve;
+        }
+        let friction = inertia.acceleration(mul_shr(model.coulomb, FRICTION_STOPS, 16));
+        let (speed, slope) = parabola(friction.min(brake >> 1), size);
+        if speed > curve.0.saturating_abs() {
+            (towards(error, speed), slope)
+        } else {
+            curve
+        }
+    }
+}
+
+/// Speed, raw mm/s, from which this deceleration (mm/s²) stops the piston after `distance` (raw mm), and its slope over
+/// the distance, 1/s × 2^8.
+fn parabola(deceleration: i32, distance: i32) -> (i32, i32) {
+    // (32 v)² = 2 a e × 2^10; with raw e: × 2^11 / 2^16.
+    let square = i64::from(deceleration)
+        .wrapping_mul(distance.into())
+        .wrapping_shr(5);
+    let square = u32::try_from(square).unwrap_or(u32::MAX);
+    // At most 65 536 / 32 mm/s: fits raw mm/s.
+    let root = square_root(square).max(1) as i32;
+    let slope = deceleration.wrapping_shl(13).checked_div(root).unwrap_or(0);
+    (root.wrapping_shl(11), slope)
+}
+
+/// A speed with the sign of the error.
+const fn towards(error: i32, speed: i32) -> i32 {
+    if error < 0 {
+        speed.wrapping_neg()
+    } else {
+        speed
     }
 }
 
@@ -166,6 +206,61 @@ mod tests {
         };
         let ratio = f64::from(slope(1.01 * meet)) / f64::from(slope(0.99 * meet));
         assert!((0.97..=1.0).contains(&ratio), "{ratio}");
+    }
+
+    /// Compares with the documented formula: from one band to the end of the line, where it meets the curve; 0.85 of the
+    /// friction, bounded by half of the deceleration for a light piston, and nothing for a heavy one.
+    #[test]
+    fn a_landing_is_as_fast_as_friction_can_stop() {
+        for (mass_kg, mostly) in [(0.3, "bounded"), (1.5, "friction"), (60.0, "line")] {
+            let data = AxisData {
+                mass: PositionMm::from_f64(mass_kg),
+                ..AxisData::default()
+            };
+            let model = AxisModel::new(&data, Micros(1000)).expect("in range");
+            let gains = SpeedGains::new(&model, model.mass);
+            let inertia = Inertia::new(&model, model.mass);
+            let (k, b) = (f64::from(gains.slope) / 256.0, f64::from(gains.brake));
+            // mN/kg is mm/s².
+            let friction = 0.85 * f64::from(model.coulomb) / mass_kg;
+            let meet = b / (k * k);
+            let band = f64::from(model.band) / 65_536.0;
+            let mut kinds = [0; 3];
+            for e in [
+                0.9 * band,
+                1.1 * band,
+                0.3 * meet,
+                0.6 * meet,
+                0.99 * meet,
+                1.01 * meet,
+            ] {
+                let root = (2.0 * friction.min(0.5 * b) * e).sqrt();
+                let landed = e > band && e <= meet;
+                for sign in [-1.0, 1.0] {
+                    let raw = (sign * e * 65_536.0) as i32;
+                    let curve = gains.speed(raw, gains.brake, model.top_speed);
+                    let line = f64::from(curve.0.abs()) / 65_536.0;
+                    let (speed, slope) = gains.landing(&model, &inertia, (raw, gains.brake), curve);
+                    let speed = sign * f64::from(speed) / 65_536.0;
+                    let exact = if landed { root.max(line) } else { line };
+                    assert!((speed / exact - 1.0).abs() < 0.01, "{e}: {speed} {exact}");
+                    if landed && root > 1.02 * line {
+                        let exact = root / (2.0 * e);
+                        let slope = f64::from(slope) / 256.0;
+                        assert!((slope / exact - 1.0).abs() < 0.02, "{e}: {slope} {exact}");
+                    }
+                    let kind = if root <= line {
+                        2
+                    } else {
+                        usize::from(friction < 0.5 * b)
+                    };
+                    kinds[kind] += i32::from(landed);
+                }
+            }
+            let kind = ["bounded", "friction", "line"].map(|kind| kind == mostly);
+            let most = kinds.map(|cases| cases == kinds[0].max(kinds[1]).max(kinds[2]));
+            assert_eq!(most, kind, "{mass_kg}: {kinds:?}");
+        }
     }
 
     #[test]

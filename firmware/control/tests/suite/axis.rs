@@ -195,9 +195,9 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
     let ambient = 101_325.0;
     let (low, high, mean) = (1.03 * ambient, 0.985 * supply, 0.5 * (ambient + supply));
     let force_rod = 1e-3 * ambient * area_rod;
-    let top = choked_speed_b.min(1.5 * choked_speed_a);
+    let choked = choked_speed_b.min(1.5 * choked_speed_a);
     let slope = f64::min(0.36 / dead_time, 65_535.0 / 256.0);
-    let brake = 0.6 * slope * top;
+    let brake = 0.5 * slope * choked;
     let stiffness = 0.9 * supply * area_a / (dead_a + 0.5 * area_a * stroke)
         + mean * area_b / (dead_b + 0.5 * area_b * stroke);
     let nimble = 0.60 * 1.2 * 0.5e-3 * flow * stiffness / (brake * slope);
@@ -233,7 +233,7 @@ fn exact(data: &AxisData) -> Vec<(&'static str, f64)> {
         ("slope", slope * two(8)),
         ("damping", 0.95 / dead_time * two(8)),
         ("brake", brake),
-        ("top_speed", top * two(16)),
+        ("top_speed", 1.5 * choked * two(16)),
         ("nimble_mass", nimble.clamp(0.01, 1000.0) * two(16)),
         ("pulse_force", 1.2e-3 * flow * vented * opening),
         ("observe_stroke", (1.0 - theta.powi(3)) * two(16)),

@@ -102,6 +102,18 @@ fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_ta
     assert_eq!(moved.state, State::Servo);
 }
 
+/// Twelve periods near a target, 24 bands; a new target allows another landing.
+#[test]
+fn a_landing_lasts_for_twelve_periods_near_the_target() {
+    let mut standstill = aimed();
+    states(&mut standstill, 24 * 12 + 5, 50, 100);
+    states(&mut standstill, 24 * 12 - 5, 50, 12);
+    assert!(standstill.may_land());
+    states(&mut standstill, 24 * 12 - 5, 50, 1);
+    assert!(!standstill.may_land());
+    assert!(standstill.aim(&model(), 91 << 16) && standstill.may_land());
+}
+
 /// A piston that hunts beside its target gets a wider band after 0.88 s, up to 2.4 bands, and each gentle entry into it
 /// is answered by a pause.
 #[test]
