@@ -3,7 +3,7 @@
 //! ```text
 //! e    = r + v_r T_r − x'
 //! a_b' = max(200 mm/s², min(a_b, 0.7 F_left / m))        F_left = F_in − load   for e > 0, F_out + load otherwise
-//! v*   = v_r + curve(e, a_b')                            with the landing while `standstill` allows it
+//! v*   = v_r + curve(e, a_b')                            or the landing, on a first approach to a target that rests
 //! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 7/2 a_b; half of it where patience is over and half is enough
 //! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*
 //! ```
@@ -129,9 +129,9 @@ impl ForceDemand<'_> {
         };
         let possible = inertia.acceleration(mul_shr(clip::<26>(left), BRAKE_FORCE_USED, 16));
         let brake = gains.brake.min(possible).max(BRAKE_LEAST);
-        let curve = gains.speed(error, brake, model.top_speed);
+        let (curve, slope) = gains.speed(error, brake, model.top_speed);
         let target_rests = reference_speed.wrapping_abs() <= REFERENCE_RESTS;
-        let (speed, slope) = if target_rests && rest.may_land() {
+        let speed = if target_rests && rest.may_land() {
             gains.landing(model, inertia, (error, brake), curve)
         } else {
             curve

@@ -72,9 +72,10 @@
 //! `preload` are in `tests.rs` here and in `tests/preload.rs`. `tests/system/control_bars.rs` shows what all of it is
 //! worth in the closed loop.
 //!
-//! Three shares of Coulomb friction are used for sliding and stopping, on purpose. The observer and the predictor use
+//! Four shares of Coulomb friction are used for sliding and stopping, on purpose. The observer and the predictor use
 //! 0.92 of it, because more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward.
-//! `standstill` relies on 0.85 where friction has to stop the piston. `preload`, `seat` and `inching` have factors of
+//! `standstill` relies on 0.85 where friction has to stop the piston within the band, and the landing of
+//! `switching_curve` on 0.6, because it comes in from farther away. `preload`, `seat` and `inching` have factors of
 //! their own.
 
 mod allocation;

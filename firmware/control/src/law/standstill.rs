@@ -18,8 +18,8 @@
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (e' − band) < m v²/2 <
 //!   F_s (e' + band), e' = e sgn v, F_s = 0.85 Fc − (F + load) sgn v. This is used within 12 bands of the target and
 //!   while F_s is at least Fc/4.
-//! * **Landing.** While the reference rests, and for the first 12 periods near it (as patience counts them), the piston
-//!   comes in as fast as friction can stop it (`switching_curve`).
+//! * **Landing.** On its first approach to a resting target the piston comes in as fast as friction can stop it
+//!   (`switching_curve`). The approach is over once the piston stands or moves away within 24 bands of the target.
 //! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
 //!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
 //!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
@@ -68,11 +68,11 @@ use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
 use crate::tuning::{
-    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, LANDING_PERIODS,
-    NEAR_BANDS, NEAR_PERIODS, OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE,
-    PATIENCE_MOST, PAUSE_ENDS_BEYOND, PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS,
-    RELEASE_PERIODS, RELEASE_SIXTEENTHS, RELEASE_WIDEST, REST_PERIODS, STILL_SPEED,
-    STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER, WIDENS_SHIFT,
+    BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
+    OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE, PATIENCE_MOST, PAUSE_ENDS_BEYOND,
+    PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS, RELEASE_PERIODS, RELEASE_SIXTEENTHS,
+    RELEASE_WIDEST, REST_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER,
+    WIDENS_SHIFT,
 };
 
 /// Periods in which the band widens by its own width.
@@ -102,6 +102,8 @@ pub(super) struct Standstill {
     target: i32,
     /// The target has changed, and the piston has not yet come to rest at the new one.
     aimed: bool,
+    /// The piston has stood or moved away near the target: its first approach is over.
+    arrived: bool,
     /// Periods near the target without coming to rest: patience is over beyond [`PATIENCE`].
     near: u16,
     /// The piston was in the band in the last period.
@@ -148,9 +150,9 @@ impl Standstill {
         self.near > NEAR_PERIODS
     }
 
-    /// Whether the piston may come in as fast as friction can stop it.
+    /// Whether the piston is on its first approach to the target, on which it may land by friction.
     pub(super) const fn may_land(&self) -> bool {
-        self.near <= LANDING_PERIODS
+        !self.arrived
     }
 
     /// Takes over the reference. Returns whether it is a new target: more than one band from the last one.
@@ -161,6 +163,7 @@ impl Standstill {
             self.near = 0;
             self.pause = 0;
             self.aimed = true;
+            self.arrived = false;
         }
         other
     }
@@ -204,12 +207,16 @@ impl Standstill {
             self.inside = false;
             return;
         }
-        let error = now
-            .reference
-            .saturating_sub(now.motion.stroke)
-            .saturating_abs();
+        let ahead = now.reference.saturating_sub(now.motion.stroke);
+        let error = ahead.saturating_abs();
         // A band is at most 5 mm, below 2^19; times up to 24 all of it fits.
         self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
+            let approaches = if ahead < 0 {
+                now.motion.speed.saturating_neg()
+            } else {
+                now.motion.speed
+            };
+            self.arrived |= approaches < STILL_SPEED;
             self.near.wrapping_add(1).min(patience_most())
         } else {
             self.near.saturating_sub(1)

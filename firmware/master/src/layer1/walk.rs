@@ -90,6 +90,8 @@ pub struct Walk {
     wheels_um: [i64; WHEELS],
     /// Cycles since the last swing began.
     since_swing: u16,
+    /// Whose foot swung last.
+    swung: Option<Side>,
     /// Duration of a swing, from past swings, s.
     swing_s: f32,
     steps: u16,
@@ -143,6 +145,7 @@ impl Walk {
             segment,
             wheels_um: feedback.wheels_um,
             since_swing: u16::MAX,
+            swung: None,
             swing_s: SWING_S,
             steps: 0,
             stopping: false,
@@ -232,6 +235,7 @@ impl Walk {
             let higher_mm = if self.tries > 0 { HIGHER_MM } else { 0.0 };
             leg.swing(higher_mm, &self.acts);
             self.since_swing = 0;
+            self.swung = Some(side);
             self.steps = self.steps.saturating_add(1);
         }
         for leg in &mut self.legs {
@@ -342,7 +346,11 @@ impl Walk {
         if wanted == Twist::default() || self.back_off > 0 || !left.stands() || !right.stands() {
             return None;
         }
-        let (next, other) = if self.left_s(wanted, left) <= self.left_s(wanted, right) {
+        // The leg with less time left; but what one leg has run against, the other has to find, too, before the first
+        // one swings again.
+        let again = |leg: &Leg| leg.faces() && self.swung == Some(leg.side);
+        let left_first = self.left_s(wanted, left) <= self.left_s(wanted, right);
+        let (next, other) = if (left_first && !again(left)) || again(right) {
             (left, right)
         } else {
             (right, left)

@@ -102,16 +102,25 @@ fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_ta
     assert_eq!(moved.state, State::Servo);
 }
 
-/// Twelve periods near a target, 24 bands; a new target allows another landing.
+/// The first approach to a target ends where the piston stands or turns near it, on either side, and nowhere else; a
+/// new target allows another landing.
 #[test]
-fn a_landing_lasts_for_twelve_periods_near_the_target() {
-    let mut standstill = aimed();
-    states(&mut standstill, 24 * 12 + 5, 50, 100);
-    states(&mut standstill, 24 * 12 - 5, 50, 12);
-    assert!(standstill.may_land());
-    states(&mut standstill, 24 * 12 - 5, 50, 1);
-    assert!(!standstill.may_land());
-    assert!(standstill.aim(&model(), 91 << 16) && standstill.may_land());
+fn a_piston_lands_on_its_first_approach_only() {
+    for side in [-1, 1] {
+        let towards = -side;
+        let mut standstill = aimed();
+        // Standing far away, then coming in.
+        states(&mut standstill, 300 * side, 0, 10);
+        states(&mut standstill, 200 * side, 50 * towards, 10);
+        states(&mut standstill, 20 * side, 4 * towards, 10);
+        assert!(standstill.may_land());
+        for (off, speed) in [(200 * side, 2 * towards), (20 * towards, 50 * towards)] {
+            let mut arrived = standstill;
+            states(&mut arrived, off, speed, 1);
+            assert!(!arrived.may_land(), "{off} {speed}");
+            assert!(arrived.aim(&model(), 91 << 16) && arrived.may_land());
+        }
+    }
 }
 
 /// A piston that hunts beside its target gets a wider band after 0.88 s, up to 2.4 bands, and each gentle entry into it
