@@ -18,7 +18,7 @@ pub enum Part {
     DeadTimePredictor,
     /// The straight line replaces the parabola, up to top speed.
     Parabola,
-    /// The straight line of the switching curve reaches down to the target, without a landing by friction.
+    /// No landing: the straight line reaches down to the target.
     Landing,
     /// No friction is fed forward.
     FrictionFeedForward,

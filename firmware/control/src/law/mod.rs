@@ -31,7 +31,8 @@
 //! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, otherwise only 10.
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
 //!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`).
-//! 3. `plan_period`: if the target is new, patience starts afresh (`standstill`) and the ramp is forgotten.
+//! 3. `plan_period`: if the target is new, patience starts afresh, a landing is allowed (`standstill`), and the ramp is
+//!    forgotten.
 //! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
 //!    that force is already there.
 //! 5. `seat`, unless 4 has decided: if the target is an end stop and the piston is there, this gives a force, or rest.
@@ -75,7 +76,7 @@
 //! Four shares of Coulomb friction are used for sliding and stopping, on purpose. The observer and the predictor use
 //! 0.92 of it, because more than the real friction would hide speed. `inverse_dynamics` feeds all of it forward.
 //! `standstill` relies on 0.85 where friction has to stop the piston within the band, and the landing of
-//! `switching_curve` on 0.6, because it comes in from farther away. `preload`, `seat` and `inching` have factors of
+//! `switching_curve` on 0.6, because the true friction may be less. `preload`, `seat` and `inching` have factors of
 //! their own.
 
 mod allocation;

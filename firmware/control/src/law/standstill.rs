@@ -19,7 +19,8 @@
 //!   F_s (e' + band), e' = e sgn v, F_s = 0.85 Fc − (F + load) sgn v. This is used within 12 bands of the target and
 //!   while F_s is at least Fc/4.
 //! * **Landing.** On its first approach to a resting target the piston comes in as fast as friction can stop it
-//!   (`switching_curve`). The approach is over once the piston stands or moves away within 24 bands of the target.
+//!   (`switching_curve`). The approach is over once the piston rests, or stands (slower than 3 mm/s towards the target)
+//!   or moves away within 24 bands of it. Each target more than one band from the last one allows another landing.
 //! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
 //!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
 //!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
@@ -183,6 +184,7 @@ impl Standstill {
     const fn rest(&mut self) {
         self.state = State::Rest;
         self.aimed = false;
+        self.arrived = true;
         self.outside = 0;
     }
 
@@ -263,6 +265,7 @@ impl Standstill {
         if reference_rests && away <= release {
             self.outside = 0;
             self.aimed = false;
+            self.arrived = true;
             return true;
         }
         self.outside = self.outside.wrapping_add(1);

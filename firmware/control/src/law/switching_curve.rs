@@ -4,7 +4,7 @@
 //! e_l  = a_b / k²                            where straight line and parabola meet, with one slope
 //! v*   = k e                                 |e| ≤ e_l
 //!      = sgn(e) √(2 a_b (|e| − e_l/2))       beyond; both at most v_top, which begins at e_l/2 + v_top²/(2 a_b)
-//!      ≥ √(2 a_f |e|), times sgn(e)         landing: band < |e| ≤ e_l, a_f = min(0.60 Fc / m, a_b / 2)
+//! |v*| ≥ √(2 a_f |e|)                        landing: where band < |e| ≤ e_l, a_f = min(0.60 Fc / m, a_b / 2)
 //!
 //! k = 0.36 σ / T_d, at least 1/s      D = 0.95 σ / T_d      a_b = 0.50 (0.36 / T_d) v_c σ², below 2^18 mm/s²
 //! σ = min(1, ∛(m_n / m))                     a heavy piston is given less of each
@@ -25,7 +25,7 @@
 //! **Landing.** Near the target the straight line is slower than friction needs it to be: a piston that follows it is
 //! pushed all the way, often stops a millimetre short, stands there and slips again. On its first approach to a resting
 //! target (`standstill`) it comes in along the parabola of its friction, of which only a part is counted on, because the true one may be
-//! less. The piston is still asked for the slope k. Beyond e_l the landing is never the faster one, since a_f is at
+//! less. The demanded deceleration still uses the slope k, not that of the landing. Beyond e_l the landing is never the faster one, since a_f is at
 //! most a_b/2, and a piston with little friction for its mass stays on the straight line nearly all the way.
 //!
 //! **Half is enough.** A piston that stands off its target by e is moved by the force m D k e (`inverse_dynamics`),
@@ -49,8 +49,8 @@
 //! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that
 //! it demands comes later or not at all, and the piston falls behind the curve or overshoots the target.
 //!
-//! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each newly learnt mass; no state; update
-//! [`SpeedGains::speed`].
+//! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each newly learnt mass; no state; updates
+//! [`SpeedGains::speed`] and [`SpeedGains::landing`].
 
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
@@ -142,7 +142,10 @@ impl SpeedGains {
         }
         let friction = inertia.acceleration(mul_shr(model.coulomb, LANDING_FRICTION, 16));
         let (speed, _) = parabola(friction.min(brake >> 1), size);
-        towards(error, speed.max(curve.saturating_abs()))
+        towards(
+            error,
+            speed.min(model.top_speed).max(curve.saturating_abs()),
+        )
     }
 }
 

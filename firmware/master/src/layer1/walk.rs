@@ -9,6 +9,7 @@
 //!   (tandem);
 //! * where the speed leaves time, alternate legs swing earlier, to keep some reach for a swing that takes long;
 //! * a foot rises only when the other has been loaded for 100 ms;
+//! * a leg that has run against something that no wheel climbs does not swing twice in a row;
 //! * no foot is dragged: if a swing takes longer than planned, the wheels slow down until the standing foot has room
 //!   for it.
 
@@ -340,17 +341,20 @@ impl Walk {
         time_left_s(twist, &self.geometry, leg.side, leg.foot_m)
     }
 
+    /// Whether `leg` swings before `other`: it has less time left. But what one leg has run against, the other has to
+    /// find, too, before the first one swings again, unless that one hangs.
+    fn precedes(&self, twist: Twist, leg: &Leg, other: &Leg) -> bool {
+        let again = |leg: &Leg| leg.faces() && leg.loaded > 0 && self.swung == Some(leg.side);
+        !again(leg) && (again(other) || self.left_s(twist, leg) <= self.left_s(twist, other))
+    }
+
     /// The leg that swings next, if any, and in how many cycles as things stand: 0 means now.
     fn next_swing(&self, wanted: Twist) -> Option<(Side, u8)> {
         let [left, right] = &self.legs;
         if wanted == Twist::default() || self.back_off > 0 || !left.stands() || !right.stands() {
             return None;
         }
-        // The leg with less time left; but what one leg has run against, the other has to find, too, before the first
-        // one swings again.
-        let again = |leg: &Leg| leg.faces() && self.swung == Some(leg.side);
-        let left_first = self.left_s(wanted, left) <= self.left_s(wanted, right);
-        let (next, other) = if (left_first && !again(left)) || again(right) {
+        let (next, other) = if self.precedes(wanted, left, right) {
             (left, right)
         } else {
             (right, left)
@@ -366,7 +370,9 @@ impl Walk {
             WalkPattern::Tandem => cycle_s - self.swing_s,
         };
         let since_s = f32::from(self.since_swing) * CYCLE_S;
-        let spent = self.left_s(wanted, next) <= EXCHANGE_S;
+        let spent = [next, other]
+            .iter()
+            .any(|leg| self.left_s(wanted, leg) <= EXCHANGE_S);
         let apart = if self.steps == 0 || spent {
             0.0
         } else {
@@ -454,7 +460,7 @@ impl Walk {
             let since_s = f32::from(self.since_swing) * CYCLE_S;
             let wait_s = if !other.stands() {
                 (self.swing_s - since_s).max(0.2) + EXCHANGE_S
-            } else if self.left_s(wanted, leg) <= self.left_s(wanted, other) {
+            } else if self.precedes(wanted, leg, other) {
                 EXCHANGE_S
             } else {
                 self.swing_s + EXCHANGE_S

@@ -385,6 +385,32 @@ fn what_no_wheel_climbs_is_tried_once_more() {
     assert_eq!(gives_up(walking(), [60.0, 180.0]), None);
 }
 
+/// A leg that stands before a wall and has less time left than the other does not swing again before that one has.
+#[test]
+fn a_leg_at_a_face_does_not_swing_twice_in_a_row() {
+    for wall_mm in [[60.0; 2], [60.0, 180.0], [180.0, 60.0]] {
+        let mut robot = walking();
+        robot.wall_mm = wall_mm;
+        let (mut bumped, mut swings) = (false, Vec::new());
+        for _ in 0..2000 {
+            let stood = robot.last.walk.map(|walk| walk.legs);
+            robot.cycle();
+            bumped |= robot.told.iter().any(|act| matches!(act, Act::Bump(_)));
+            let (Some(stood), Some(walk)) = (stood, robot.last.walk) else {
+                break;
+            };
+            for i in 0..2 {
+                if bumped && stood[i] == LegPlan::Stance && walk.legs[i] == LegPlan::Lift {
+                    swings.push(i);
+                }
+            }
+        }
+        assert!(swings.len() >= 2, "{wall_mm:?}: {swings:?}");
+        let twice = swings.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        assert_eq!(twice, 0, "{wall_mm:?}: {swings:?}");
+    }
+}
+
 /// An attempt shortly before, for another cause, does not count.
 #[test]
 fn what_no_wheel_climbs_is_tried_once_more_after_another_try() {
