@@ -399,9 +399,9 @@ fn a_leg_at_a_face_does_not_swing_twice_in_a_row() {
             let (Some(stood), Some(walk)) = (stood, robot.last.walk) else {
                 break;
             };
-            for i in 0..2 {
-                if bumped && stood[i] == LegPlan::Stance && walk.legs[i] == LegPlan::Lift {
-                    swings.push(i);
+            for (leg, (before, now)) in stood.iter().zip(&walk.legs).enumerate() {
+                if bumped && (before, now) == (&LegPlan::Stance, &LegPlan::Lift) {
+                    swings.push(leg);
                 }
             }
         }
