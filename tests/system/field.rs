@@ -45,7 +45,7 @@ fn the_claims_that_hold_hold_on_five_seeds() {
     };
     assert_eq!(met("12 cm/s on flat sand"), Some(Met::Met));
     // Whether the claims over rocks hold takes more seeds: 83 of 100 passed (docs/records/known-shortfalls.md), and at
-    // that rate fewer than two of five come by chance in 1 of 300.
+    // that rate fewer than two of five come by chance in 1 of 280.
     let rocks = tried(&summary, "rocks-30");
     assert_ne!(met("7.5 cm/s over rocks"), Some(Met::NotMet));
     let mean_mm_s = bar(rocks, "speed").mean.expect("measured");
