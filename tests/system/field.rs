@@ -1,6 +1,6 @@
 //! The walks over terrain on five seeds, as the page of `wheeleg field` judges them.
 
-use wheeleg_studies::field::{self, CONTROLS, Measured, Met, Options, SCENARIOS, Summary, Tried};
+use wheeleg_campaign::field::{self, CONTROLS, Measured, Met, Options, SCENARIOS, Summary, Tried};
 use wheeleg_studies::study::Settings;
 
 fn field(scenarios: &[&str], seeds: u32) -> Summary {
@@ -12,6 +12,7 @@ fn field(scenarios: &[&str], seeds: u32) -> Summary {
             .filter(|name| scenarios.contains(name))
             .collect(),
         seeds,
+        program: None,
     };
     let finished = field::write(&options, &Settings::new(folder.path())).expect("written");
     let page = std::fs::read_to_string(&finished.report).expect("a page");

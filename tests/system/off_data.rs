@@ -5,9 +5,12 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Mutex;
 
 use crate::long_checks::number;
+use crate::many::{self, Many};
 use crate::sil::{robot, scenario};
+use wheeleg_campaign::Case;
 use wheeleg_config::{Motion, RobotConfig, Scenario, builtin};
 use wheeleg_node::joint::MotionAccount;
 use wheeleg_protocol::Fault;
@@ -167,13 +170,15 @@ fn loaded(number: u64, which: u64) -> Scenario {
     walk
 }
 
-/// Every scenario in which nothing goes wrong.
-fn fault_free() -> Vec<Scenario> {
-    let all = builtin::SCENARIOS.iter().map(|(name, ..)| scenario(name));
-    let fault_free = all.filter(|s| s.events.is_empty() && s.faults.is_empty());
-    // Walks of such robots still trip "no motion" now and then: docs/records/known-shortfalls.md.
-    let fault_free = fault_free.filter(|s| !matches!(s.motion, Motion::Walk(_)));
-    let fault_free: Vec<_> = fault_free.collect();
+/// The names of every scenario in which nothing goes wrong.
+fn fault_free() -> Vec<&'static str> {
+    let fault_free = |name: &&str| {
+        let s = scenario(name);
+        // Walks of such robots still trip "no motion" now and then: docs/records/known-shortfalls.md.
+        s.events.is_empty() && s.faults.is_empty() && !matches!(s.motion, Motion::Walk(_))
+    };
+    let all = builtin::SCENARIOS.iter().map(|(name, ..)| *name);
+    let fault_free: Vec<_> = all.filter(fault_free).collect();
     assert!(
         fault_free.len() >= 7,
         "{} scenarios without faults",
@@ -182,40 +187,72 @@ fn fault_free() -> Vec<Scenario> {
     fault_free
 }
 
+/// Walks many robots through scenarios; returns the number of walks, and what was told of those that stopped.
+/// `most` is the greatest doubt of those that were not.
+fn walks(
+    many: &Many<'_>,
+    most: &Mutex<Option<(String, Seen)>>,
+    of: impl Fn(&Case) -> Scenario + Sync,
+) -> (u64, Vec<String>) {
+    let (rows, _) = many.played(|case| {
+        let scenario = of(case);
+        let walk = walk(&scenario, &off_its_data(case.seed), case.seed);
+        let what = format!("robot {}, {}", case.seed, scenario.name);
+        let tripped = walk.tripped.map(|seen| seen.to_string());
+        let alarm = tripped.or(walk.stopped);
+        let alarm = alarm.map(|why| format!("{what}: {why}"));
+        let mut most = most.lock().expect("nobody panics with it");
+        if let Some(seen) = walk.doubt
+            && most
+                .as_ref()
+                .is_none_or(|(_, m)| seen.account.overdue > m.account.overdue)
+        {
+            *most = Some((what, seen));
+        }
+        many::outcome(alarm.is_none(), alarm, None)
+    });
+    let alarms = rows.iter().filter_map(|row| row.error.clone());
+    (rows.len() as u64, alarms.collect())
+}
+
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_on_a_robot_off_its_data() {
     let (first, robots) = (number(FIRST_VARIABLE, 1), number(ROBOTS_VARIABLE, 3));
-    let fault_free = fault_free();
-    let mut runs = 0;
-    let mut alarms = Vec::new();
-    let mut most: Option<(String, Seen)> = None;
-    for drawn in first..first + robots {
-        let robot = off_its_data(drawn);
-        let loads = (0..LOADS).map(|which| loaded(drawn, which));
-        for scenario in fault_free.iter().cloned().chain(loads) {
-            runs += 1;
-            let what = format!("robot {drawn}, {}", scenario.name);
-            let walk = walk(&scenario, &robot, drawn);
-            if let Some(seen) = walk.tripped {
-                alarms.push(format!("{what}: {seen}"));
-            } else if let Some(why) = walk.stopped {
-                alarms.push(format!("{what}: {why}"));
-            }
-            let overdue = |seen: &Seen| seen.account.overdue;
-            if let Some(seen) = walk.doubt
-                && most
-                    .as_ref()
-                    .is_none_or(|(_, m)| overdue(&seen) > overdue(m))
-            {
-                most = Some((what, seen));
-            }
-        }
+    let seeds = first..first + robots;
+    let names: Vec<String> = fault_free().iter().map(|s| format!("{s:?}")).collect();
+    let factors = format!(
+        "[factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]",
+        names.join(", ")
+    );
+    let most = Mutex::new(None);
+    let unloaded = Many {
+        name: "off-data",
+        base: "scenario = \"three-step\"",
+        factors: &factors,
+        seeds: seeds.clone(),
+    };
+    let (mut runs, mut alarms) = walks(&unloaded, &most, |case| {
+        let setup = case.setup.as_ref().expect("built in");
+        let (scenario, _) = setup.robot().expect("a scenario");
+        scenario.clone()
+    });
+    for which in 0..LOADS {
+        let loads = Many {
+            name: &format!("off-data-load-{which}"),
+            factors: "",
+            seeds: seeds.clone(),
+            ..unloaded
+        };
+        let (loaded_runs, loaded_alarms) = walks(&loads, &most, |case| loaded(case.seed, which));
+        runs += loaded_runs;
+        alarms.extend(loaded_alarms);
     }
     for alarm in &alarms {
         println!("{alarm}");
     }
-    let doubt = most.map_or("no doubt".to_owned(), |(what, seen)| {
+    let doubt = most.into_inner().expect("nobody panics with it");
+    let doubt = doubt.map_or("no doubt".to_owned(), |(what, seen)| {
         format!("greatest doubt in {what}: {seen}")
     });
     println!(

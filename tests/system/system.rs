@@ -3,6 +3,7 @@
 //! its working directory, which is the process's.
 
 mod long_checks;
+mod many;
 mod program;
 mod random_cylinder;
 mod sil;

@@ -258,19 +258,12 @@ fn factor_column(factor: &Factor) -> Column {
         Values::Grid(list) if matches!(list[0], Value::Flag(_)) => Kind::Flag,
         _ => Kind::Number,
     };
-    let meaning = match &factor.sets {
-        Sets::Base(setting) => setting.name().to_owned(),
-        Sets::Fault(template) => format!("fault {template}"),
-        Sets::Fields(fields) => {
-            let how = if factor.scale {
-                "times the file's "
-            } else {
-                ""
-            };
-            let paths: Vec<String> = fields.iter().map(ToString::to_string).collect();
-            format!("{how}{}", paths.join(", "))
-        }
+    let how = if factor.scale {
+        "times the file's "
+    } else {
+        ""
     };
+    let meaning = format!("{how}{}", factor.sets.names().join(", "));
     Column::new(&name, kind, &factor.unit, &meaning)
 }
 
@@ -289,7 +282,7 @@ fn longest_name(factor: &Factor) -> usize {
 }
 
 /// The targets, without values.
-fn targets_of(case: &Resolved) -> Vec<Target> {
+pub(crate) fn targets_of(case: &Resolved) -> Vec<Target> {
     match case {
         Resolved::Robot(case) => Analyser::new(&case.scenario, &case.robot).finish().targets,
         Resolved::Axis(case) => bench::unmeasured(case.bench.motion),

@@ -1,4 +1,4 @@
-//! JSON that the commands of campaigns print, and `plan.json`, with their published schemas.
+//! JSON that the commands of campaigns print, `plan.json` and the summary of the field tests, with their published schemas.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
-use wheeleg_studies::study::schema::{Form, of_file, of_form};
+use wheeleg_studies::study::schema::{Form, of_file, of_form, schema};
 
 use crate::report::{Findings, Pairs};
 use crate::store::{FORMAT, PlanFile};
@@ -171,5 +171,6 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         of_form::<MergeForm>(),
         of_form::<ReportForm<'static>>(),
         plan,
+        schema::<crate::field::Summary>(),
     ]
 }

@@ -3,6 +3,8 @@
 //! Index, shard and order do not enter. Two programs that run the same content have the same case, so their
 //! results can be compared case by case.
 //!
+//! The seed follows from the content, too, unless a factor of the plan lists seeds.
+//!
 //! If a plan draws from lists alone, many of its samples would be the same case, run again with the same
 //! noise. For such plans the sample number is part of the content.
 
@@ -86,7 +88,12 @@ pub(crate) fn identity(
     let hash = blake3::hash(&whole);
     let (half, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
     let case = CaseId(u128::from_be_bytes(*half));
-    let paired = || plan.factors.iter().zip(values).filter(|(f, _)| f.paired);
+    let with_values = || plan.factors.iter().zip(values);
+    let listed = with_values().find(|(factor, _)| factor.sets == Sets::Seed);
+    if let Some(seed) = listed.and_then(|(_, value)| value.seed()) {
+        return (case, seed);
+    }
+    let paired = || with_values().filter(|(f, _)| f.paired);
     for (factor, value) in paired() {
         remove(&mut content, &factor.name, &factor.sets, value);
     }
@@ -182,6 +189,8 @@ fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
             }
         }
         Sets::Base(setting) => content["bench"][setting.name()] = Json::Null,
+        // Seeds are not paired.
+        Sets::Seed => {}
         Sets::Fault(template) => {
             let fault = template.replace("{}", &value.to_string());
             if let Some(list) = content["scenario"]["faults"].as_array_mut() {

@@ -26,6 +26,7 @@ mod columns;
 mod compute;
 mod draw;
 mod error;
+pub mod field;
 mod forms;
 mod host;
 mod identity;

@@ -17,6 +17,9 @@ pub(crate) const PROGRAM: &str = "wheeleg.program";
 /// Key of the hash of the values, which reveals damaged bytes wherever they are.
 const ROWS: &str = "wheeleg.rows";
 
+/// Why a table is not one of rows.
+pub(crate) const NO_ROWS: &str = "rows that are none";
+
 /// The effort of computing a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Effort {
@@ -98,7 +101,7 @@ pub(crate) enum NotAPart {
 pub(crate) fn read(path: &Path, plan: &str) -> Result<(Vec<Row>, Vec<Column>), NotAPart> {
     let table = read_table(path, plan)?;
     let rows = row::rows(&table);
-    let rows = rows.ok_or_else(|| NotAPart::Torn("rows that are none".to_owned()))?;
+    let rows = rows.ok_or_else(|| NotAPart::Torn(NO_ROWS.to_owned()))?;
     Ok((rows, table.columns))
 }
 

@@ -95,6 +95,14 @@ impl Row {
     pub fn is_failed(&self) -> bool {
         is_failed(self.passed)
     }
+
+    /// The figure of a target; an empty one if the table has no such target.
+    #[must_use]
+    pub fn figure(&self, columns: &Columns, target: &str) -> Figure {
+        let at = columns.targets.iter().position(|id| id == target);
+        let figure = at.and_then(|at| self.figures.get(at));
+        figure.copied().unwrap_or_default()
+    }
 }
 
 /// Whether a row with this value of `passed` counts as failed. A row without a result does.

@@ -13,7 +13,7 @@
 //! A file appears under its name only when it is complete: it is written under another name and then renamed.
 //! For what a killed process leaves, see `leftovers.rs`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -26,8 +26,8 @@ use wheeleg_report::output::same_file;
 use wheeleg_studies::study::Stop;
 
 use crate::columns::Columns;
-use crate::part::NotAPart;
-use crate::row::Row;
+use crate::part::{NO_ROWS, NotAPart};
+use crate::row::{self, Row};
 use crate::table::Table;
 use crate::{CampaignError, host, part, program};
 
@@ -452,6 +452,23 @@ impl Store {
     pub(crate) fn new_partial(&self, block: u64) -> PathBuf {
         let name = format!("parts/{block:06}.{}.partial.parquet", host::unique());
         self.folder.join(name)
+    }
+
+    /// All rows so far, in the order of the plan.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] for a part that is damaged.
+    pub fn rows(&self) -> Result<Vec<Row>, CampaignError> {
+        let mut rows = BTreeMap::new();
+        for block in self.begun() {
+            let unreadable = |why| CampaignError::unreadable(self.part(block), why);
+            let found = match self.table(block).map_err(unreadable)? {
+                Some(table) => row::rows(&table).ok_or_else(|| unreadable(NO_ROWS.to_owned()))?,
+                None => self.kept_rows(block)?.0,
+            };
+            rows.extend(found.into_iter().map(|row| (row.index, row)));
+        }
+        Ok(rows.into_values().collect())
     }
 
     /// Rows in the files of an unfinished block, and those files; unreadable files are set aside.

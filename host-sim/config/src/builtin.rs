@@ -4,12 +4,12 @@ use std::borrow::Cow;
 use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 
-use toml_edit::{ArrayOfTables, DocumentMut, Item};
+use toml_edit::DocumentMut;
 
 use super::error::{ConfigError, Problem, word};
 pub use super::source::Source;
 use super::terrain::Files;
-use super::{RobotConfig, Scenario, closest};
+use super::{RobotConfig, Scenario, closest, overlay};
 
 macro_rules! embedded {
     ($folder:literal: $($name:literal),* $(,)?) => {
@@ -133,7 +133,14 @@ pub fn scenario(name_or_path: &str) -> Result<Scenario, ConfigError> {
 /// As [`scenario`].
 pub fn scenario_on_ground(name: &str, seed: u64) -> Result<Scenario, ConfigError> {
     let (file, text) = find("scenario", name, SCENARIOS)?;
-    let text = with_ground_seed(&text, seed).unwrap_or(text);
+    let text = match text.parse::<DocumentMut>() {
+        Ok(mut document) => {
+            overlay::set_ground_seed(&mut document, seed);
+            document.to_string()
+        }
+        // Its reader says what is wrong with it.
+        Err(_) => text,
+    };
     parse_built_in(&file, &text)
 }
 
@@ -148,24 +155,6 @@ pub(crate) fn files_of(name_or_path: &str, file: &str) -> Files<'static> {
 fn parse_built_in(file: &str, text: &str) -> Result<Scenario, ConfigError> {
     let read = Scenario::parse_with(file, text, &Files::BuiltIn(DATA));
     read.map(|(scenario, _)| scenario)
-}
-
-/// The text of a scenario with another seed of its rocks; `None` if it is not TOML.
-fn with_ground_seed(text: &str, seed: u64) -> Option<String> {
-    let mut document: DocumentMut = text.parse().ok()?;
-    let parts = document
-        .get_mut("terrain")
-        .and_then(Item::as_array_of_tables_mut);
-    for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
-        if let Some(value) = part.get_mut("seed") {
-            // TOML has no whole number above 2^63: such a seed is quoted.
-            *value = match i64::try_from(seed) {
-                Ok(number) => toml_edit::value(number),
-                Err(_) => toml_edit::value(seed.to_string()),
-            };
-        }
-    }
-    Some(document.to_string())
 }
 
 /// Whether a name is that of a file.

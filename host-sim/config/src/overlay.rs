@@ -46,6 +46,22 @@ fn holder<'a>(document: &'a mut DocumentMut, path: &str) -> Option<&'a mut Item>
     Some(item)
 }
 
+/// Replaces the seed of each of a scenario's fields of rocks.
+pub(crate) fn set_ground_seed(document: &mut DocumentMut, seed: u64) {
+    let parts = document
+        .get_mut("terrain")
+        .and_then(Item::as_array_of_tables_mut);
+    for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
+        if let Some(value) = part.get_mut("seed") {
+            // TOML has no whole number above 2^63: such a seed is quoted.
+            *value = match i64::try_from(seed) {
+                Ok(number) => toml_edit::value(number),
+                Err(_) => toml_edit::value(seed.to_string()),
+            };
+        }
+    }
+}
+
 fn last(path: &str) -> &str {
     path.rsplit('.').next().unwrap_or(path)
 }

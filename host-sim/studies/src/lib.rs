@@ -28,7 +28,6 @@ pub mod compare;
 pub mod delay;
 mod error;
 pub mod export;
-pub mod field;
 pub mod figures;
 pub mod identify;
 pub mod matrix;

@@ -14,7 +14,6 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
         schema::<crate::tune::Summary<'static>>(),
         schema::<crate::delay::Summary<'static>>(),
         schema::<crate::matrix::Summary<'static>>(),
-        schema::<crate::field::Summary>(),
         schema::<crate::figures::Summary<'static>>(),
         schema::<crate::identify::Summary<'static>>(),
     ]

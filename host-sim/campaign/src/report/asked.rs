@@ -47,11 +47,7 @@ impl OfFactor {
     fn of(factor: &Factor) -> Self {
         Self {
             name: factor.name.clone(),
-            sets: match &factor.sets {
-                Sets::Base(setting) => vec![setting.name().to_owned()],
-                Sets::Fault(template) => vec![format!("fault {template}")],
-                Sets::Fields(fields) => fields.iter().map(ToString::to_string).collect(),
-            },
+            sets: factor.sets.names(),
             scale: factor.scale,
             values: match &factor.values {
                 Values::Grid(list) => {

@@ -50,6 +50,7 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
             (setting.is_of_bench() != on_bench).then(|| setting.name().to_owned())
         }
         Sets::Fault(fault) => on_bench.then(|| fault.clone()),
+        Sets::Seed => None,
         Sets::Fields(fields) => {
             let other = fields.iter().find(|f| f.part.is_of_bench() != on_bench);
             other.map(ToString::to_string)
@@ -61,17 +62,17 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
     let (base, allowed) = match on_bench {
         true => (
             "a cylinder on the bench (`base.axis`)",
-            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`",
+            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`, `seed`",
         ),
         false => (
             "a robot in a scenario (`base.scenario`)",
-            "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, and a `fault`",
+            "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, `seed`, and a `fault`",
         ),
     };
     let span = span_of_path(r, factor, &other);
     let what = match factor.sets {
         Sets::Fault(_) => "a fault".to_owned(),
-        Sets::Base(_) | Sets::Fields(_) => format!("`{other}`"),
+        Sets::Base(_) | Sets::Fields(_) | Sets::Seed => format!("`{other}`"),
     };
     let message = format!(
         "`factor.{}` sets {what}, and every case is {base}",
@@ -105,9 +106,9 @@ fn span_of_path(r: &Reader, factor: &Factor, full: &str) -> Option<Range<usize>>
 /// The paths that a factor sets, as in a plan.
 fn set_by(factor: &Factor) -> Vec<String> {
     match &factor.sets {
-        Sets::Base(setting) => vec![setting.name().to_owned()],
+        // Two faults do not exclude each other.
         Sets::Fault(_) => Vec::new(),
-        Sets::Fields(fields) => fields.iter().map(ToString::to_string).collect(),
+        sets => sets.names(),
     }
 }
 
@@ -163,7 +164,7 @@ const WITHOUT_EFFECT: [(&str, &str); 8] = [
     (
         "scenario.seed",
         "each case has a seed of its own, which follows from `root`: `replicates` repeats a case with other \
-         noise, and `paired = true` gives the values of a factor the same",
+         noise, `paired = true` gives the values of a factor the same, and `parameter = \"seed\"` lists seeds",
     ),
     (
         "scenario.robot",
@@ -598,7 +599,7 @@ fn endless(r: &mut Reader, factor: &Factor) {
     let [least, most] = LOAD_SHARES;
     let whose = match factor.sets {
         Sets::Base(_) => format!("of `load_share`, {least} to {most}"),
-        Sets::Fault(_) | Sets::Fields(_) => "of any fault".to_owned(),
+        Sets::Fault(_) | Sets::Fields(_) | Sets::Seed => "of any fault".to_owned(),
     };
     let message = format!(
         "`factor.{}`: a distribution without an end can leave the range {whose}",

@@ -149,6 +149,7 @@ impl Plan {
                 check::check(&mut r, plan)?;
             }
             ensure_samples_differ(&mut r, plan);
+            ensure_replicates_differ(&mut r, plan);
             ensure_saltelli_is_whole(&mut r, plan);
         }
         r.finish(&what, plan).map(|(plan, _)| plan)
@@ -343,6 +344,30 @@ fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
         ),
         "no factor is drawn",
         Some("for other noise write `replicates`; for other values let a factor be drawn".into()),
+    );
+}
+
+/// Reports replicates beside a list of seeds: each would be the same run.
+fn ensure_replicates_differ(r: &mut Reader, plan: &Plan) {
+    let replicates = plan.replicates;
+    let mut factors = plan.factors.iter();
+    let Some(seeds) = factors.find(|factor| factor.sets == Sets::Seed) else {
+        return;
+    };
+    if replicates == 1 {
+        return;
+    }
+    let top = r.table("");
+    let key = top.as_ref().and_then(|top| top.get("replicates"));
+    r.problem(
+        key.map(|(key, _)| key),
+        format!(
+            "`replicates` = {replicates} would compute each case {replicates} times, as `factor.{}` sets the \
+             seed: allowed is 1",
+            seeds.name
+        ),
+        "the same noise",
+        Some("leave `replicates` out, and list more seeds".into()),
     );
 }
 

@@ -206,9 +206,17 @@ impl<'a> Resolver<'a> {
         let mut scenario_text = scenario.document.clone();
         let robot_text = changed(robot, factors, Part::Robot)?;
         for (factor, value) in factors {
-            if let Sets::Fault(template) = &factor.sets {
-                let fault = template.replace("{}", &value.to_string());
-                overlay::add_fault(&mut scenario_text, &fault);
+            match &factor.sets {
+                Sets::Fault(template) => {
+                    let fault = template.replace("{}", &value.to_string());
+                    overlay::add_fault(&mut scenario_text, &fault);
+                }
+                Sets::Seed => {
+                    if let Some(seed) = value.seed() {
+                        overlay::set_ground_seed(&mut scenario_text, seed);
+                    }
+                }
+                Sets::Base(_) | Sets::Fields(_) => {}
             }
         }
         change(scenario, &mut scenario_text, factors, Part::Scenario)?;
@@ -324,7 +332,7 @@ fn chosen<'v>(factors: &[(&Factor, &'v Value)], setting: Setting) -> Option<&'v 
 fn sets(factor: &Factor, part: Part) -> bool {
     match &factor.sets {
         Sets::Fields(fields) => fields.iter().any(|field| field.part == part),
-        Sets::Base(_) | Sets::Fault(_) => false,
+        Sets::Base(_) | Sets::Fault(_) | Sets::Seed => false,
     }
 }
 

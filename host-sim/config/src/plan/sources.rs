@@ -52,9 +52,16 @@ impl Sources {
     pub fn load(name_or_path: &str) -> Result<Self, ConfigError> {
         let Source { file, text } = builtin::plan_source(name_or_path)?;
         let path = Path::new(name_or_path);
-        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::of(Text { file, text }, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// The same for a plan that is no file. A relative path in it counts from `folder`.
+    ///
+    /// # Errors
+    /// As [`Sources::load`].
+    pub fn of(plan: Text, folder: &Path) -> Result<Self, ConfigError> {
         let mut sources = Self {
-            plan: Text { file, text },
+            plan,
             scenarios: BTreeMap::new(),
             robots: BTreeMap::new(),
             axes: BTreeMap::new(),

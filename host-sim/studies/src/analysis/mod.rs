@@ -27,8 +27,8 @@ use rest::StandMeter;
 use safe_state::SafeStateMeter;
 pub(crate) use safe_state::commanded_open;
 use sinusoid::SinusoidMeter;
-pub use target::{Judgement, Target};
-pub(crate) use target::{asked_text, band_text, measured_text};
+pub use target::{Judgement, Target, band_text};
+pub(crate) use target::{asked_text, measured_text};
 use three_step::ThreeStepMeter;
 use travel::TravelMeter;
 

@@ -57,7 +57,8 @@ pub struct Target {
 }
 
 /// A band as shown on every page and in the terminal.
-pub(crate) fn band_text(min: Option<f64>, max: Option<f64>) -> String {
+#[must_use]
+pub fn band_text(min: Option<f64>, max: Option<f64>) -> String {
     match (min, max) {
         (Some(a), Some(b)) if a == b => format!("= {a}"),
         (Some(a), Some(b)) => format!("{a} … {b}"),

@@ -6,11 +6,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
+use wheeleg_campaign::field::{self, Options, SCENARIOS, Summary};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::field::{self, Options, SCENARIOS, Summary};
 use wheeleg_studies::study::Finished;
 
-use super::{end, place, settings, whole};
+use super::{campaign, end, place, settings, whole};
 
 /// Arguments of `wheeleg field`.
 #[derive(Debug, Args)]
@@ -24,8 +24,8 @@ pub(super) struct FieldArgs {
     /// Seeds of each scenario, 1 to 1000: of the noise and, on rocks, of the field.
     #[arg(long, default_value_t = 5, value_parser = whole(1_u32, 1000))]
     seeds: u32,
-    /// Folder for page, pictures and summary. Results of an earlier run in it move to its subfolder
-    /// `previous`.
+    /// Folder for page, pictures and summary, and in its subfolder `campaign` the runs: those that are there
+    /// already are not repeated. Results of an earlier run in it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/field")]
     out: PathBuf,
     /// Write the pictures as PNG as well as SVG, if the program was built with `--features png`.
@@ -49,8 +49,12 @@ pub(super) fn command(args: &FieldArgs) -> Result<ExitCode, StudyError> {
             .filter(|name| wanted(name))
             .collect(),
         seeds: args.seeds,
+        program: std::env::current_exe().ok(),
     };
-    let finished = field::write(&options, &settings(&args.out, args.png)?)?;
+    let finished = match field::write(&options, &settings(&args.out, args.png)?) {
+        Ok(finished) => finished,
+        Err(error) => return Ok(campaign::failed(error)),
+    };
     let text = |finished: &Finished<Summary>| {
         let mut out = text(&finished.result);
         out.push_str(&place(&finished.report, 11));

@@ -3,29 +3,34 @@
 //!
 //! A seed sets all noise and, if there are rocks, the field of rocks: another seed, another field. A
 //! scenario's bars judge a run; a claim names the scenario that tests it, and its interpretation.
+//!
+//! The runs are the cases of a campaign, scenarios by seeds, in the folder `campaign` of the results: whoever
+//! stops or kills them runs them again, and the page is made of the rows that are there.
 
 mod charts;
 mod claims;
 mod controls;
 mod page;
 
-use std::ops::ControlFlow;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use wheeleg_config::plan::{Plan, Sources, Text};
 use wheeleg_config::{ConfigError, builtin};
 use wheeleg_report::stats;
-use wheeleg_sim::Boards;
-use wheeleg_telemetry::{Keep, Recorder};
+use wheeleg_studies::analysis::{Analyser, Target};
+use wheeleg_studies::study::schema::json;
+use wheeleg_studies::study::{self, Finished, Job, Settings};
 
 pub use claims::{CLAIMS, Claim, Met};
 pub use controls::{CONTROLS, Compared, Control};
 
-use crate::StudyError;
-use crate::analysis::Target;
-use crate::run::simulate;
-use crate::study::schema::json;
-use crate::study::{self, Finished, Job, Settings};
+use crate::{
+    CampaignError, Cases, Options as Work, PlanFile, Row, SAVE_EVERY, Setup, Shard, Status, Store,
+    run, simulate,
+};
 
 /// The scenarios, in the order of the page.
 pub const SCENARIOS: &[&str] = &[
@@ -65,6 +70,29 @@ pub struct Options {
     pub scenarios: Vec<&'static str>,
     /// Seeds of each, 1 to this.
     pub seeds: u32,
+    /// This program, to run cases that may crash the process; if `None`, they run in this process.
+    pub program: Option<PathBuf>,
+}
+
+/// Folder of the campaign, among the results.
+const CAMPAIGN: &str = "campaign";
+
+impl Options {
+    /// The plan: each scenario on each seed.
+    fn plan(&self) -> Result<Plan, ConfigError> {
+        let first = self.scenarios.first().copied().unwrap_or_default();
+        let scenarios: Vec<String> = self.scenarios.iter().map(|s| format!("{s:?}")).collect();
+        let seeds: Vec<String> = (1..=self.seeds).map(|seed| seed.to_string()).collect();
+        let text = format!(
+            "name = \"field\"\nroot = 1\n\n[base]\nscenario = {first:?}\n\n\
+             [factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]\n\n\
+             [factor.seed]\nparameter = \"seed\"\ngrid = [{}]\n",
+            scenarios.join(", "),
+            seeds.join(", ")
+        );
+        let file = "field.toml".to_owned();
+        Plan::of(Sources::of(Text { file, text }, Path::new(""))?)
+    }
 }
 
 /// A run, judged.
@@ -74,13 +102,15 @@ pub struct Run {
     pub scenario: &'static str,
     /// Seed of noise and rocks.
     pub seed: u64,
+    /// Its case in the campaign, for `wheeleg campaign replay`.
+    pub case: String,
     /// Why it ended early; null if it did not.
     pub error: Option<String>,
     /// It came to its end and met all required bars.
     pub passed: bool,
-    /// Hash of its log.
+    /// Hash of its log; empty if there is none.
     pub hash: String,
-    /// The bars with their measurements.
+    /// The bars with their measurements; none of a run that ended early.
     pub bars: Vec<Target>,
 }
 
@@ -220,59 +250,82 @@ impl study::Summary for Summary {
     const SCHEMA: &'static str = "wheeleg.field/1";
 }
 
-/// One run in memory; `None` if it was stopped before its end.
-fn tried(
-    (name, seed): (&'static str, u64),
-    stop: &study::Progress,
-) -> Result<Option<Run>, StudyError> {
-    let scenario = builtin::scenario_on_ground(name, seed)?;
-    let robot = builtin::robot_of(&scenario, name)?;
-    let recorder = Recorder::new(Keep::nothing());
-    let simulated = simulate(
-        Boards::default(),
-        &scenario,
-        &robot,
-        seed,
-        recorder,
-        &mut |_| {
-            if stop.is_stopped() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
+/// The rows as runs, each with the bars of its scenario.
+fn runs(options: &Options, cases: &Cases<'_>, rows: Vec<Row>) -> Vec<Run> {
+    let mut bars: BTreeMap<&str, Vec<Target>> = BTreeMap::new();
+    let mut runs = Vec::new();
+    for row in rows {
+        let case = cases.case(row.index);
+        let Ok(Setup::Robot(both)) = &case.setup else {
+            continue;
+        };
+        let named = |name: &&&str| **name == both.0.name;
+        let Some(scenario) = options.scenarios.iter().find(named) else {
+            continue;
+        };
+        let unmeasured = bars
+            .entry(scenario)
+            .or_insert_with(|| Analyser::new(&both.0, &both.1).finish().targets);
+        let measured = unmeasured.iter().map(|bar| {
+            let figure = row.figure(cases.columns(), &bar.id);
+            Target {
+                value: figure.value,
+                // Without limits there is nothing to miss.
+                pass: figure.pass.unwrap_or(figure.value.is_some()),
+                ..bar.clone()
             }
-        },
-    )?;
-    if simulated.outcome.stopped && simulated.outcome.failure.is_none() {
-        return Ok(None);
+        });
+        runs.push(Run {
+            scenario,
+            seed: row.seed,
+            case: row.case.to_string(),
+            passed: row.passed == Some(true),
+            bars: match row.status {
+                Status::Ok => measured.collect(),
+                _ => Vec::new(),
+            },
+            error: row.error,
+            hash: row.log_hash.unwrap_or_default(),
+        });
     }
-    let error = simulated.outcome.failure.map(|why| why.to_string());
-    Ok(Some(Run {
-        scenario: name,
-        seed,
-        passed: error.is_none() && simulated.analysis.passed(),
-        error,
-        hash: simulated.recording.hash,
-        bars: simulated.analysis.targets,
-    }))
+    runs
 }
 
-/// Runs everything and writes page, pictures and summary.
+/// Runs everything and writes page, pictures and summary. Runs that an earlier process of the same program has
+/// finished are not repeated.
 ///
 /// # Errors
-/// [`StudyError`] if a scenario or robot is wrong, or a result cannot be drawn or written.
-pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>, StudyError> {
-    let job = Job::begin("field", settings, &[])?;
-    let cases: Vec<(&'static str, u64)> = options
-        .scenarios
-        .iter()
-        .flat_map(|name| (1..=u64::from(options.seeds)).map(|seed| (*name, seed)))
-        .collect();
-    let results = job
-        .progress
-        .each("runs", &cases, |case| tried(*case, &job.progress))?;
-    let runs: Vec<Run> = results.into_iter().flatten().flatten().collect();
-    let (done, of) = (runs.len() as u64, cases.len() as u64);
+/// [`CampaignError`] if a scenario or robot is wrong, or a result cannot be drawn or written.
+pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>, CampaignError> {
+    let plan = options.plan()?;
+    let cases = Cases::new(&plan)?;
+    let file = PlanFile::of(&plan, cases.work_s());
+    let folder = settings.out.join(CAMPAIGN);
+    // Runs of other scenarios, seeds or another program go with the results that were made of them.
+    let also: &[&str] = match Store::ensure_not_of_another(&folder, &file) {
+        Ok(()) => &[],
+        Err(_) => &[CAMPAIGN],
+    };
+    let job = Job::begin_with("field", settings, &[], also)?;
+    let store = Store::create(&folder, file, &settings.stop)?;
+    let work = Work {
+        shard: Shard::ALL,
+        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        first: None,
+        stop: settings.stop.clone(),
+        program: options.program.clone(),
+        json: false,
+        save_every: SAVE_EVERY,
+    };
+    let one = |case: &_| simulate(case, None, &settings.stop);
+    let ran = run(&store, &cases, &work, &one)?;
+    for (path, why) in &ran.aside {
+        let told = format!("set aside: {}: {why}", path.display());
+        job.progress.tell(&told);
+    }
+    let (done, of) = (ran.found + ran.computed, ran.of);
     let stopped = job.progress.stopped(done, of, "runs");
+    let runs = runs(options, &cases, store.rows()?);
     let summary = Summary::of(options, runs)?;
     let text = json(&summary, stopped.as_ref());
     let why = stopped.clone();

@@ -92,7 +92,6 @@ impl Control {
 mod tests {
     use super::*;
     use wheeleg_config::{Motion, Scenario, builtin};
-    use wheeleg_units::VelocityMmS;
 
     /// Without exactly the same ground and robot it would not be a control.
     #[test]
@@ -106,7 +105,7 @@ mod tests {
             assert_eq!(legs.robot, idle.robot, "{}", control.ground);
             assert_eq!(legs.ground, idle.ground, "{}", control.ground);
             let goes = |scenario: &Scenario| match scenario.motion {
-                Motion::Walk(order) => order.speed_mm_s != VelocityMmS::ZERO,
+                Motion::Walk(order) => order.speed_mm_s != Default::default(),
                 _ => false,
             };
             assert!(goes(&legs) && !goes(&idle), "{}", control.ground);

@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::{Measured, Met, Summary};
-use crate::StudyError;
-use crate::analysis::band_text;
-use crate::study::Stopped;
 use wheeleg_report::number::fixed;
 use wheeleg_report::{Picture, page, pictures, plot::Figure};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::analysis::band_text;
+use wheeleg_studies::study::Stopped;
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -93,6 +93,8 @@ struct MeasuredRow<'a> {
 struct Failure<'a> {
     run: &'a super::Run,
     why: String,
+    /// The beginning of its case, enough for a replay.
+    case: &'a str,
 }
 
 /// A mean with its range, at a useful number of digits.
@@ -195,6 +197,7 @@ pub(super) fn render(
         Failure {
             run,
             why: why.join("; "),
+            case: run.case.get(..12).unwrap_or(&run.case),
         }
     });
     let values = Page {
@@ -242,6 +245,7 @@ mod tests {
         let run = |scenario| super::super::Run {
             scenario,
             seed: 1,
+            case: String::new(),
             error: None,
             passed: false,
             hash: String::new(),
