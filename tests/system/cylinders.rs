@@ -6,11 +6,10 @@
 //! not tuned to them. 1,000 here; `cargo xtask deep cylinders` draws as many as a bar needs.
 
 use crate::long_checks::number;
-use crate::many::{self, Many};
-use crate::random_cylinder::{drawn, is_coarse, played};
+use crate::many::{found, many};
+use crate::random_cylinder::{drawn, is_coarse, played as moves};
 use crate::step_back::is_no_step_back;
-use wheeleg_campaign::{Outcome, Status};
-use wheeleg_report::stats::{failure_bound, quantile};
+use wheeleg_report::stats::failure_bound;
 use wheeleg_studies::compare::judging_root;
 
 /// How many cylinders are drawn, and the number of the first, instead of the hash.
@@ -52,58 +51,42 @@ fn few_combinations_miss_on_cylinders_drawn_at_random() {
         number(FIRST_VARIABLE, judging_root()),
         number(CYLINDERS_VARIABLE, 1_000),
     );
-    let many = Many {
-        name: "cylinders",
-        base: "axis = \"bench-vq110u\"",
-        factors: "",
-        seeds: first..first + cylinders,
-    };
-    let (rows, columns) = many.played(|case| {
-        let outcome = played(&drawn(case.seed), case.seed);
-        let settled = outcome.judged.iter().map(|m| m.settle_s);
-        let settled: Option<Vec<f64>> = settled.collect();
-        let slower_s = settled.and_then(|all| all.into_iter().reduce(f64::max));
-        Outcome {
-            // The cylinder was taken for a faulty one: it has no result.
-            status: match outcome.alarm() {
-                true => Status::Error,
-                false => Status::Ok,
-            },
-            ..many::outcome(
-                outcome.keeps(),
-                (!outcome.keeps()).then(|| format!("{outcome:?}")),
-                slower_s.map(|s| ("settling", s)),
-            )
-        }
+    let seeds = first..first + cylinders;
+    let played = many("[base]\naxis = \"bench-vq110u\"\n", &seeds, |case| {
+        let outcome = moves(&drawn(case.seed), case.seed);
+        let settled: Option<Vec<f64>> = outcome.judged.iter().map(|m| m.settle_s).collect();
+        let slower_s = settled.and_then(|both| both.into_iter().reduce(f64::max));
+        let alarm = f64::from(u8::from(outcome.alarm()));
+        let figures = [("settling", slower_s), ("faults", Some(alarm))];
+        found(outcome.keeps(), None, &figures)
     });
     let mut times = Vec::new();
     // Of fine and of coarse valves.
     let mut tallies = [Tally::default(), Tally::default()];
-    for row in &rows {
-        let coarse = is_coarse(&drawn(row.seed));
-        times.push(
-            row.figure(&columns, "settling")
-                .value
-                .unwrap_or(f64::INFINITY),
-        );
+    for row in &played.rows {
+        let which = row.seed;
+        let sheet = drawn(which);
+        let coarse = is_coarse(&sheet);
+        times.push(played.figure(row, "settling").unwrap_or(f64::INFINITY));
         let tally = &mut tallies[usize::from(coarse)];
         tally.cylinders += 1;
-        tally.faults += u64::from(row.status == Status::Error);
+        tally.faults += u64::from(played.figure(row, "faults") != Some(0.0));
         if row.is_failed() {
             tally.missed += 1;
-            let told = row.error.as_deref().unwrap_or_default();
-            println!("cylinder {}, coarse valves: {coarse}: {told}", row.seed);
+            let outcome = moves(&sheet, which);
+            println!("cylinder {which}, coarse valves: {coarse}: {outcome:?}");
         }
     }
-    let share = |share: f64| quantile(&times, share).unwrap_or(f64::NAN);
+    times.sort_by(f64::total_cmp);
+    let share = |percent: usize| times[times.len() * percent / 100];
     let [fine, coarse] = tallies;
     // One line: it goes into the record of long checks.
     println!(
         "{cylinders} cylinders from number {first}; fine valves: {}; coarse valves: {}; settled in {:.2} s, nine tenths in {:.2} s (the slower of two moves)",
         fine.told(),
         coarse.told(),
-        share(0.5),
-        share(0.9)
+        share(50),
+        share(90)
     );
     assert!(is_no_step_back(fine.missed, fine.cylinders, FINE_MISSED));
     assert!(is_no_step_back(fine.faults, fine.cylinders, FINE_FAULTS));

@@ -1,9 +1,8 @@
-//! Many cases of a check, computed by the engine of campaigns: on all cores, each row on disk soon after it is known.
-//!
-//! `cargo xtask deep` names a folder for the rows, so that a check that was stopped goes on where it was.
+//! Many cases of a check, computed by the engine of campaigns, on all cores. What no plan can draw, a check draws and
+//! plays itself, in place of the simulation.
 
-use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::ops::Range;
+use std::path::Path;
 
 use wheeleg_campaign::{
     Case, Cases, Columns, Options, Outcome, PlanFile, Row, SAVE_EVERY, Shard, Status, Store, run,
@@ -12,15 +11,16 @@ use wheeleg_config::plan::{Plan, Sources, Text};
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::study::Stop;
 
-/// The folder in which `cargo xtask deep` keeps the rows.
-const FOLDER_VARIABLE: &str = "WHEELEG_DEEP_FOLDER";
-
-/// The outcome of a case that a check has played itself: whether it passed, what it has to tell, and a figure.
-pub(crate) fn outcome(passed: bool, told: Option<String>, figure: Option<(&str, f64)>) -> Outcome {
-    let target = |(id, value): (&str, f64)| Target {
-        id: id.to_owned(),
+/// What a check found in a case: whether it passed, and figures, which must be among the targets of its plan.
+pub(crate) fn found(
+    passed: bool,
+    told: Option<String>,
+    figures: &[(&str, Option<f64>)],
+) -> Outcome {
+    let target = |(id, value): &(&str, Option<f64>)| Target {
+        id: (*id).to_owned(),
         description: String::new(),
-        value: Some(value),
+        value: *value,
         unit: "",
         min: None,
         max: None,
@@ -33,73 +33,58 @@ pub(crate) fn outcome(passed: bool, told: Option<String>, figure: Option<(&str, 
         log_hash: None,
         simulated_s: None,
         passed: Some(passed),
-        targets: figure.map(target).into_iter().collect(),
+        targets: figures.iter().map(target).collect(),
     }
 }
 
-/// A check's cases: a plan's `[base]`, its factors but the seeds, and the seeds.
-pub(crate) struct Many<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) base: &'a str,
-    pub(crate) factors: &'a str,
-    pub(crate) seeds: std::ops::Range<u64>,
+/// Rows in the order of the plan, and the columns of their figures.
+pub(crate) struct Played {
+    pub(crate) rows: Vec<Row>,
+    columns: Columns,
 }
 
-impl Many<'_> {
-    /// The rows of all cases, and the columns of their figures; `play` simulates one.
-    pub(crate) fn played(&self, play: impl Fn(&Case) -> Outcome + Sync) -> (Vec<Row>, Columns) {
-        let plan = self.plan();
-        let cases = Cases::new(&plan).expect("its files are built in");
-        let file = PlanFile::of(&plan, cases.work_s());
-        let temporary = tempfile::tempdir().expect("a folder");
-        let kept = std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from);
-        let folder = kept.unwrap_or_else(|| temporary.path().to_owned());
-        let folder = folder.join(self.name);
-        if folder.exists() && Store::ensure_not_of_another(&folder, &file).is_err() {
-            std::fs::remove_dir_all(&folder).expect("rows of another program");
-        }
-        let stop = Stop::default();
-        let store = Store::create(&folder, file, &stop).expect("a folder for the rows");
-        let options = Options {
-            shard: Shard::ALL,
-            threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            first: None,
-            stop,
-            program: None,
-            json: false,
-            save_every: SAVE_EVERY,
-        };
-        run(&store, &cases, &options, &|case| Some(play(case))).expect("rows are written");
-        let rows = store.rows().expect("rows");
-        assert_eq!(rows.len() as u64, plan.cases());
-        std::fs::remove_dir_all(&folder).expect("nothing is left to go on with");
-        (rows, cases.columns().clone())
-    }
-
-    fn plan(&self) -> Plan {
-        let Self {
-            name,
-            base,
-            factors,
-            seeds,
-        } = self;
-        let seeds: Vec<String> = seeds.clone().map(|seed| seed.to_string()).collect();
-        let seeds = seeds.join(", ");
-        // The engine knows the sources of the program, not those of a check.
-        let check = built_s();
-        let text = format!(
-            "# by a check built at {check} s\nname = \"{name}\"\nroot = 1\n[base]\n{base}\n{factors}\n\
-             [factor.seed]\nparameter = \"seed\"\ngrid = [{seeds}]\n"
-        );
-        let file = format!("{name}.toml");
-        let sources = Sources::of(Text { file, text }, Path::new("")).expect("built in");
-        Plan::of(sources).expect("a plan")
+impl Played {
+    pub(crate) fn figure(&self, row: &Row, target: &str) -> Option<f64> {
+        row.figure(&self.columns, target).value
     }
 }
 
-/// When this test program was built.
-fn built_s() -> u64 {
-    let about = std::env::current_exe().and_then(std::fs::metadata);
-    let built = about.and_then(|about| about.modified()).expect("a program");
-    built.duration_since(UNIX_EPOCH).map_or(0, |t| t.as_secs())
+/// Plays a plan of this base and these factors on each of the seeds.
+pub(crate) fn many(
+    base_and_factors: &str,
+    seeds: &Range<u64>,
+    play: impl Fn(&Case) -> Outcome + Sync,
+) -> Played {
+    let (first, count) = (seeds.start, seeds.end - seeds.start);
+    let text = format!(
+        "name = \"check\"\nroot = 1\nfirst_seed = {first}\nreplicates = {count}\n{base_and_factors}"
+    );
+    let file = "check.toml".to_owned();
+    let sources = Sources::of(Text { file, text }, Path::new("")).expect("built in");
+    let plan = Plan::of(sources).unwrap_or_else(|e| panic!("{:?}", e.problems()));
+    let cases = Cases::new(&plan).expect("built in");
+    let file = PlanFile::of(&plan, cases.work_s());
+    let folder = tempfile::tempdir().expect("a folder");
+    let stop = Stop::default();
+    let store = Store::create(folder.path(), file, &stop).expect("a folder for the rows");
+    let options = Options {
+        shard: Shard::ALL,
+        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        first: None,
+        stop,
+        program: None,
+        json: false,
+        save_every: SAVE_EVERY,
+    };
+    run(&store, &cases, &options, &|case| Some(play(case))).expect("rows are written");
+    let rows = store.rows().expect("rows");
+    assert_eq!(rows.len() as u64, plan.cases());
+    for row in &rows {
+        // The engine goes on after a panic; a check does not.
+        assert_eq!(row.status, Status::Ok, "seed {}: {:?}", row.seed, row.error);
+    }
+    Played {
+        rows,
+        columns: cases.columns().clone(),
+    }
 }

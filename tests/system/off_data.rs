@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::Range;
 use std::sync::Mutex;
 
 use crate::long_checks::number;
-use crate::many::{self, Many};
+use crate::many::{Played, found, many};
 use crate::sil::{robot, scenario};
 use wheeleg_campaign::Case;
 use wheeleg_config::{Motion, RobotConfig, Scenario, builtin};
@@ -187,71 +188,64 @@ fn fault_free() -> Vec<&'static str> {
     fault_free
 }
 
-/// Walks many robots through scenarios; returns the number of walks, and what was told of those that stopped.
-/// `most` is the greatest doubt of those that were not.
+/// The greatest doubt of a board without a fault, and where it was.
+type Doubt = (String, Seen);
+
+/// Walks many robots through scenarios; returns what was told of those that stopped.
 fn walks(
-    many: &Many<'_>,
-    most: &Mutex<Option<(String, Seen)>>,
+    base_and_factors: &str,
+    robots: &Range<u64>,
+    greatest: &Mutex<Option<Doubt>>,
     of: impl Fn(&Case) -> Scenario + Sync,
-) -> (u64, Vec<String>) {
-    let (rows, _) = many.played(|case| {
+) -> Played {
+    many(base_and_factors, robots, |case| {
         let scenario = of(case);
         let walk = walk(&scenario, &off_its_data(case.seed), case.seed);
         let what = format!("robot {}, {}", case.seed, scenario.name);
         let tripped = walk.tripped.map(|seen| seen.to_string());
         let alarm = tripped.or(walk.stopped);
         let alarm = alarm.map(|why| format!("{what}: {why}"));
-        let mut most = most.lock().expect("nobody panics with it");
-        if let Some(seen) = walk.doubt
-            && most
-                .as_ref()
-                .is_none_or(|(_, m)| seen.account.overdue > m.account.overdue)
-        {
-            *most = Some((what, seen));
+        if let Some(seen) = walk.doubt {
+            let doubt = (what, seen);
+            // Whichever thread is first: of equal ones, by their names.
+            let rank = |(what, seen): &Doubt| (seen.account.overdue.get(), what.clone());
+            let mut greatest = greatest.lock().expect("nobody panics with it");
+            if greatest.as_ref().is_none_or(|g| rank(g) < rank(&doubt)) {
+                *greatest = Some(doubt);
+            }
         }
-        many::outcome(alarm.is_none(), alarm, None)
-    });
-    let alarms = rows.iter().filter_map(|row| row.error.clone());
-    (rows.len() as u64, alarms.collect())
+        found(alarm.is_none(), alarm, &[])
+    })
 }
 
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn nothing_trips_on_a_robot_off_its_data() {
     let (first, robots) = (number(FIRST_VARIABLE, 1), number(ROBOTS_VARIABLE, 3));
-    let seeds = first..first + robots;
+    let numbers = first..first + robots;
     let names: Vec<String> = fault_free().iter().map(|s| format!("{s:?}")).collect();
-    let factors = format!(
-        "[factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]",
+    let base = "[base]\nscenario = \"three-step\"\n";
+    let scenarios = format!(
+        "{base}[factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]\n",
         names.join(", ")
     );
-    let most = Mutex::new(None);
-    let unloaded = Many {
-        name: "off-data",
-        base: "scenario = \"three-step\"",
-        factors: &factors,
-        seeds: seeds.clone(),
-    };
-    let (mut runs, mut alarms) = walks(&unloaded, &most, |case| {
+    let greatest = Mutex::new(None);
+    let mut rows = walks(&scenarios, &numbers, &greatest, |case| {
         let setup = case.setup.as_ref().expect("built in");
         let (scenario, _) = setup.robot().expect("a scenario");
         scenario.clone()
-    });
+    })
+    .rows;
     for which in 0..LOADS {
-        let loads = Many {
-            name: &format!("off-data-load-{which}"),
-            factors: "",
-            seeds: seeds.clone(),
-            ..unloaded
-        };
-        let (loaded_runs, loaded_alarms) = walks(&loads, &most, |case| loaded(case.seed, which));
-        runs += loaded_runs;
-        alarms.extend(loaded_alarms);
+        let under_load = |case: &Case| loaded(case.seed, which);
+        rows.extend(walks(base, &numbers, &greatest, under_load).rows);
     }
+    let runs = rows.len();
+    let alarms: Vec<String> = rows.into_iter().filter_map(|row| row.error).collect();
     for alarm in &alarms {
         println!("{alarm}");
     }
-    let doubt = most.into_inner().expect("nobody panics with it");
+    let doubt = greatest.into_inner().expect("nobody panics with it");
     let doubt = doubt.map_or("no doubt".to_owned(), |(what, seen)| {
         format!("greatest doubt in {what}: {seen}")
     });

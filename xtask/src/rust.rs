@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 
-use crate::process::{cargo, figures, run, target_dir, wheeleg};
+use crate::process::{cargo, figures, run, wheeleg};
 use crate::report::StepResult;
 
 /// Everything that needs neither boards nor an emulator's build tools: without the builds of `cargo xtask
@@ -79,8 +79,6 @@ pub(crate) fn measured(
     for (variable, amount) in amounts {
         test_run.env(variable, amount.to_string());
     }
-    // Rows of a check that is stopped stay there.
-    test_run.env("WHEELEG_DEEP_FOLDER", target_dir().join("deep"));
     let found = figures(&mut test_run, |line| line.contains(marker))?;
     let first = found.into_iter().next();
     Ok(first.with_context(|| format!("no line with `{marker}`"))?)

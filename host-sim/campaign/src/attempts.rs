@@ -33,8 +33,10 @@ struct Line {
 pub(crate) enum Event {
     /// A process has begun the case.
     Begun,
-    /// The case has a row, or was abandoned because the process was asked to stop.
+    /// The case has a row.
     Ended,
+    /// The case was abandoned because the process was asked to stop.
+    Abandoned,
     /// The case crashed the separate process that ran it.
     EndedItsProcess,
 }
@@ -86,6 +88,13 @@ impl Attempts {
             match line.event {
                 Event::Begun => of.open += 1,
                 Event::Ended => of.open = of.open.saturating_sub(1),
+                Event::Abandoned => {
+                    of.open = of.open.saturating_sub(1);
+                    // Nobody has anything to save.
+                    if of.ends() == 0 {
+                        known.remove(&line.case);
+                    }
+                }
                 Event::EndedItsProcess => {
                     of.open = of.open.saturating_sub(1);
                     of.proven += 1;
@@ -159,6 +168,8 @@ mod tests {
             (6, Event::Ended),
             (7, Event::Begun),
             (7, Event::EndedItsProcess),
+            (8, Event::Begun),
+            (8, Event::Abandoned),
         ] {
             attempts.note(case, event).expect("written");
         }
@@ -175,6 +186,8 @@ mod tests {
         };
         let none = Known::default();
         assert_eq!(known, [of(1, 0), of(0, 0), of(0, 1), none]);
+        // Neither lost nor to be saved.
+        assert!(attempts.all().all(|(case, _)| case != 8));
         assert!(!attempts.is_shared(), "only this process has worked on it");
         attempts.remove();
         assert!(!path.exists());

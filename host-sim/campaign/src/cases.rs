@@ -162,7 +162,8 @@ impl<'a> Cases<'a> {
     pub fn case(&self, index: u64) -> Case {
         let place = self.place(index);
         let values = self.values(place);
-        let resolved = self.resolver.resolve(&values);
+        let seed = self.plan.seed(place.replicate);
+        let resolved = self.resolver.resolve_on_ground(&values, seed);
         let (id, seed) = identity(self.plan, &values, place, resolved.as_ref().ok());
         let setup = match resolved {
             Ok(resolved) => checked(self.plan, resolved),

@@ -62,6 +62,23 @@ impl Column {
         }
     }
 
+    /// Joins the same target of another scenario or move: one may require what another only reports, and each
+    /// may have limits of its own.
+    fn join(&mut self, other: &Target) {
+        if other.required && !self.required {
+            self.required = true;
+            (self.min, self.max) = (other.min, other.max);
+        } else if other.required == self.required
+            && self.has_limits()
+            && (other.min.is_some() || other.max.is_some())
+            && (self.min, self.max) != (other.min, other.max)
+        {
+            (self.min, self.max) = (None, None);
+            self.meaning
+                .push_str(" (each scenario or move has limits of its own)");
+        }
+    }
+
     /// Whether the column is a target with a limit. For other targets, the verdict only says whether there is
     /// a value.
     pub(crate) fn has_limits(&self) -> bool {
@@ -117,7 +134,12 @@ const BEFORE: [(&str, Kind, &str, &str); 6] = [
         "",
         "which of the cases that differ in their noise alone",
     ),
-    ("seed", Kind::Whole, "", "seed of all noise"),
+    (
+        "seed",
+        Kind::Whole,
+        "",
+        "seed of all noise; with `first_seed`, of rocks too",
+    ),
 ];
 const BETWEEN: [(&str, Kind, &str, &str); 5] = [
     (
@@ -174,11 +196,9 @@ impl Columns {
         for values in probes(plan) {
             for target in targets_of(&resolver.resolve(&values)?) {
                 if targets.contains(&target.id) {
-                    // One scenario or move may require what another only reports.
                     let known = all.iter_mut().find(|column| column.name == target.id);
-                    if let Some(known) = known.filter(|known| target.required && !known.required) {
-                        known.required = true;
-                        (known.min, known.max) = (target.min, target.max);
+                    if let Some(known) = known {
+                        known.join(&target);
                     }
                     continue;
                 }
@@ -282,7 +302,7 @@ fn longest_name(factor: &Factor) -> usize {
 }
 
 /// The targets, without values.
-pub(crate) fn targets_of(case: &Resolved) -> Vec<Target> {
+fn targets_of(case: &Resolved) -> Vec<Target> {
     match case {
         Resolved::Robot(case) => Analyser::new(&case.scenario, &case.robot).finish().targets,
         Resolved::Axis(case) => bench::unmeasured(case.bench.motion),

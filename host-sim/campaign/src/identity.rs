@@ -3,7 +3,8 @@
 //! Index, shard and order do not enter. Two programs that run the same content have the same case, so their
 //! results can be compared case by case.
 //!
-//! The seed follows from the content, too, unless a factor of the plan lists seeds.
+//! The seed follows from the content, too, unless the plan counts seeds: then the seed is content instead of the
+//! replicate's number.
 //!
 //! If a plan draws from lists alone, many of its samples would be the same case, run again with the same
 //! noise. For such plans the sample number is part of the content.
@@ -84,16 +85,19 @@ pub(crate) fn identity(
     if plan.draws_from_lists_alone() {
         content["sample"] = json!(place.sample);
     }
+    let counted = plan.seed(place.replicate);
+    if let Some(seed) = counted {
+        content["replicate"] = Json::Null;
+        content["seed"] = json!(seed);
+    }
     let mut whole = canonical(&content);
     let hash = blake3::hash(&whole);
     let (half, _) = hash.as_bytes().split_first_chunk().expect("32 bytes");
     let case = CaseId(u128::from_be_bytes(*half));
-    let with_values = || plan.factors.iter().zip(values);
-    let listed = with_values().find(|(factor, _)| factor.sets == Sets::Seed);
-    if let Some(seed) = listed.and_then(|(_, value)| value.seed()) {
+    if let Some(seed) = counted {
         return (case, seed);
     }
-    let paired = || with_values().filter(|(f, _)| f.paired);
+    let paired = || plan.factors.iter().zip(values).filter(|(f, _)| f.paired);
     for (factor, value) in paired() {
         remove(&mut content, &factor.name, &factor.sets, value);
     }
@@ -189,8 +193,6 @@ fn remove(content: &mut Json, name: &str, sets: &Sets, value: &Value) {
             }
         }
         Sets::Base(setting) => content["bench"][setting.name()] = Json::Null,
-        // Seeds are not paired.
-        Sets::Seed => {}
         Sets::Fault(template) => {
             let fault = template.replace("{}", &value.to_string());
             if let Some(list) = content["scenario"]["faults"].as_array_mut() {

@@ -5,6 +5,8 @@
 //! computes a shard of them into a folder of part files ([`Store`]), [`merge`] combines the parts into one
 //! table, [`report`] writes a page, and [`replay`] repeats one case in full.
 //!
+//! The [`field`] tests are such a campaign, with a page of their own.
+//!
 //! There is no scheduler here. A shard is a process that anybody may start, kill and start again.
 //!
 //! # Glossary

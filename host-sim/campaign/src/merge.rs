@@ -401,6 +401,17 @@ mod tests {
         assert_eq!(groups(), [65_000, 1_500]);
         assert!(indices().into_iter().eq(0..CASES));
 
+        // A byte that is not what was written is found wherever it is: of the rows, in both groups.
+        let whole = std::fs::read(&out).expect("a table");
+        let damaged = folder.path().join("damaged.parquet");
+        for share in [0.01, 0.3, 0.6, 0.9] {
+            let mut bytes = whole.clone();
+            let at = (share * bytes.len() as f64) as usize;
+            bytes[at] ^= 0x10;
+            std::fs::write(&damaged, &bytes).expect("written");
+            assert!(report::Merged::read(&damaged).is_err(), "{share}");
+        }
+
         std::fs::remove_file(store.part(3)).expect("there");
         write(&store.new_partial(3), 3_000..3_400);
         let merged = merge_partial(&folders, &out, &Stop::default()).expect("merged");

@@ -230,7 +230,7 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             for block in blocks {
                 match part::read(&store.part(block), &store.plan().hash) {
                     Ok((found, _)) => rows.extend(found),
-                    Err(_) => rows.extend(store.kept_rows(block)?.0),
+                    Err(_) => rows.extend(store.kept_rows(block)?.rows),
                 }
             }
             Ok(rows)
@@ -239,7 +239,7 @@ fn rows_at(place: &From, block: Option<u64>) -> Result<Vec<Row>, CampaignError> 
             let file = open_file(path).map_err(|e| CampaignError::unreadable(path, e))?;
             let read = TableReader::new(file).and_then(|reader| reader.read());
             let table = read.map_err(|e| CampaignError::unreadable(path, e))?;
-            row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, "rows that are none"))
+            row::rows(&table).ok_or_else(|| CampaignError::unreadable(path, part::NO_ROWS))
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::CampaignError;
 use crate::attempts::Attempts;
 use crate::causes::Causes;
-use crate::part;
+use crate::part::{self, NotAPart};
 use crate::row::{Status, is_failed};
 use crate::shard::Shard;
 use crate::store::Store;
@@ -80,10 +80,18 @@ pub fn status(store: &Store, shard: Shard) -> Result<State, CampaignError> {
                 if let Err(why) = unfinished {
                     state.bad.push((store.part(block), why));
                 }
-                let partials = store.partials(block).into_iter();
-                partials
-                    .filter_map(|path| part::read_table(&path, &store.plan().hash).ok())
-                    .collect()
+                let mut tables = Vec::new();
+                for path in store.partials(block) {
+                    match part::read_table(&path, &store.plan().hash) {
+                        Ok(table) => tables.push(table),
+                        // Its process has replaced it meanwhile.
+                        Err(NotAPart::Missing) => {}
+                        Err(NotAPart::Torn(why) | NotAPart::Foreign(why)) => {
+                            state.bad.push((path, why));
+                        }
+                    }
+                }
+                tables
             }
         };
         let unfinished = state.missing.last() == Some(&block);

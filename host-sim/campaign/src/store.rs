@@ -178,9 +178,6 @@ impl PlanFile {
         if self.hash == other.hash {
             return None;
         }
-        if self.block != other.block {
-            return Some(format!("block {}, not {}", self.block, other.block));
-        }
         let (own, others) = (texts(self), texts(other));
         for (name, text) in &own {
             let same = others.iter().find(|(other, _)| other == name);
@@ -191,6 +188,9 @@ impl PlanFile {
                 let place = first_difference(&text.text, &found.text);
                 return Some(format!("the {name} differs, first in {place}"));
             }
+        }
+        if self.block != other.block {
+            return Some(format!("block {}, not {}", self.block, other.block));
         }
         Some("it lacks a scenario, a robot or an axis".to_owned())
     }
@@ -246,6 +246,16 @@ fn hash(sources: &Sources, block: u64) -> String {
         }
     }
     hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// Rows of an unfinished block.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    pub(crate) rows: Vec<Row>,
+    /// The files that they are in.
+    pub(crate) files: Vec<PathBuf>,
+    /// Unreadable files, where they are now, and why.
+    pub(crate) aside: Vec<(PathBuf, String)>,
 }
 
 /// A folder with the parts of one plan.
@@ -464,31 +474,31 @@ impl Store {
             let unreadable = |why| CampaignError::unreadable(self.part(block), why);
             let found = match self.table(block).map_err(unreadable)? {
                 Some(table) => row::rows(&table).ok_or_else(|| unreadable(NO_ROWS.to_owned()))?,
-                None => self.kept_rows(block)?.0,
+                None => self.kept_rows(block)?.rows,
             };
             rows.extend(found.into_iter().map(|row| (row.index, row)));
         }
         Ok(rows.into_values().collect())
     }
 
-    /// Rows in the files of an unfinished block, and those files; unreadable files are set aside.
-    pub(crate) fn kept_rows(&self, block: u64) -> Result<(Vec<Row>, Vec<PathBuf>), CampaignError> {
-        let (mut rows, mut files) = (Vec::new(), Vec::new());
+    /// What the files of an unfinished block have; unreadable ones are set aside.
+    pub(crate) fn kept_rows(&self, block: u64) -> Result<Kept, CampaignError> {
+        let mut kept = Kept::default();
         for path in self.partials(block) {
             match part::read(&path, &self.plan.hash) {
                 Ok((found, _)) => {
-                    rows.extend(found);
-                    files.push(path);
+                    kept.rows.extend(found);
+                    kept.files.push(path);
                 }
                 Err(NotAPart::Missing) => {}
-                Err(NotAPart::Torn(_) | NotAPart::Foreign(_)) => {
-                    self.set_aside(&path)?;
+                Err(NotAPart::Torn(why) | NotAPart::Foreign(why)) => {
+                    kept.aside.push((self.set_aside(&path)?, why));
                 }
             }
         }
         let cases = self.cases_of(block);
-        rows.retain(|row| cases.contains(&row.index));
-        Ok((rows, files))
+        kept.rows.retain(|row| cases.contains(&row.index));
+        Ok(kept)
     }
 }
 

@@ -27,6 +27,9 @@ use crate::panics::caught;
 /// ([`crate::pages::NAMES_MOST`]).
 const TEXT_PER_BYTE: u64 = 64;
 
+/// Key of the hashes of the row groups, which reveal damaged bytes wherever they are.
+pub(crate) const ROWS: &str = "wheeleg.rows";
+
 /// Values of one column; `None` is null.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {
@@ -225,6 +228,8 @@ impl Table {
 /// Writes one table, one row group after another.
 pub(crate) struct TableWriter<W: std::io::Write + Send> {
     file: SerializedFileWriter<W>,
+    /// Hash of each group so far.
+    hashes: Vec<String>,
 }
 
 impl<W: std::io::Write + Send> TableWriter<W> {
@@ -245,7 +250,10 @@ impl<W: std::io::Write + Send> TableWriter<W> {
             .set_key_value_metadata(Some(facts.collect()))
             .build();
         let file = SerializedFileWriter::new(to, schema(columns)?, Arc::new(properties))?;
-        Ok(Self { file })
+        Ok(Self {
+            file,
+            hashes: Vec::new(),
+        })
     }
 
     /// Writes rows as one group; an empty table makes no group.
@@ -280,11 +288,16 @@ impl<W: std::io::Write + Send> TableWriter<W> {
             column.close()?;
         }
         group.close()?;
+        self.hashes.push(table.digest());
         Ok(())
     }
 
     /// Writes the footer and returns the underlying writer.
-    pub(crate) fn finish(self) -> Result<W, ParquetError> {
+    pub(crate) fn finish(mut self) -> Result<W, ParquetError> {
+        self.file.append_key_value_metadata(KeyValue {
+            key: ROWS.to_owned(),
+            value: Some(self.hashes.join(" ")),
+        });
         self.file.into_inner()
     }
 }
@@ -373,12 +386,22 @@ impl TableReader {
         groups.map(|group| group.num_rows()).collect()
     }
 
-    /// Reads all rows.
+    /// Reads all rows, and checks that they are those that were written; tables of earlier versions do not say.
     pub(crate) fn read(&self) -> Result<Table, ParquetError> {
         let mut table = Table::empty(self.columns.clone());
         let mut text_left = self.text_most;
+        let mut hashes = self.fact(ROWS).map(|hashes| hashes.split_whitespace());
         for group in 0..self.file.num_row_groups() {
-            table.append(sound(|| self.group(group, &mut text_left))?);
+            let rows = sound(|| self.group(group, &mut text_left))?;
+            if let Some(hashes) = &mut hashes
+                && hashes.next() != Some(rows.digest().as_str())
+            {
+                return Err(ParquetError::General("its values were changed".to_owned()));
+            }
+            table.append(rows);
+        }
+        if hashes.is_some_and(|mut more| more.next().is_some()) {
+            return Err(ParquetError::General("rows are missing".to_owned()));
         }
         Ok(table)
     }

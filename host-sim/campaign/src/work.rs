@@ -15,7 +15,7 @@ use crate::isolate::{Isolated, isolate};
 use crate::part::{self, Effort};
 use crate::row::{Row, Status, is_failed};
 use crate::simulate::Outcome;
-use crate::store::{Store, write_whole};
+use crate::store::{Kept, Store, write_whole};
 
 /// Number of separate processes that a case must have crashed before it is given up.
 const ENDS: u32 = 2;
@@ -182,9 +182,14 @@ impl Work<'_> {
         let wanted = self.store.cases_of(number);
         let wanted: Vec<u64> = wanted.filter(|index| *index < self.first).collect();
         let mut rows = BTreeMap::new();
-        let (kept, files) = self.store.kept_rows(number)?;
-        for row in kept {
-            rows.insert(row.index, row);
+        let Kept {
+            rows: kept,
+            files,
+            aside,
+        } = self.store.kept_rows(number)?;
+        rows.extend(kept.into_iter().map(|row| (row.index, row)));
+        for (path, why) in aside {
+            (self.aside)(&path, &why);
         }
         let found = || rows.values().filter(|row| row.index < self.first);
         let failed = found().filter(|row| row.is_failed()).count();
@@ -242,7 +247,11 @@ impl Work<'_> {
         let Some(program) = self.program.filter(|_| known.ends() > 0) else {
             attempts.note(index, Event::Begun)?;
             let row = row(self.cases, index, self.store.plan().block, self.simulate);
-            attempts.note(index, Event::Ended)?;
+            let event = match row {
+                Some(_) => Event::Ended,
+                None => Event::Abandoned,
+            };
+            attempts.note(index, event)?;
             return Ok(row);
         };
         let mut last = "an earlier process".to_owned();
@@ -261,7 +270,7 @@ impl Work<'_> {
                     return Ok(Some(*row));
                 }
                 Isolated::Stopped => {
-                    attempts.note(index, Event::Ended)?;
+                    attempts.note(index, Event::Abandoned)?;
                     return Ok(None);
                 }
                 Isolated::Ended(how) => {

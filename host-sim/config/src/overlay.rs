@@ -46,19 +46,34 @@ fn holder<'a>(document: &'a mut DocumentMut, path: &str) -> Option<&'a mut Item>
     Some(item)
 }
 
-/// Replaces the seed of each of a scenario's fields of rocks.
+/// Distance between the seeds of two fields of rocks in one scenario: farther than seeds are counted.
+const NEXT_FIELD: u64 = 1 << 56;
+
+/// Replaces the seed of each of a scenario's fields of rocks. The first gets this seed; each of the others one of
+/// its own, or all fields would have the same rocks.
 pub(crate) fn set_ground_seed(document: &mut DocumentMut, seed: u64) {
-    let parts = document
-        .get_mut("terrain")
-        .and_then(Item::as_array_of_tables_mut);
-    for part in parts.into_iter().flat_map(ArrayOfTables::iter_mut) {
-        if let Some(value) = part.get_mut("seed") {
-            // TOML has no whole number above 2^63: such a seed is quoted.
-            *value = match i64::try_from(seed) {
-                Ok(number) => toml_edit::value(number),
-                Err(_) => toml_edit::value(seed.to_string()),
-            };
+    // TOML has no whole number above 2^63: such a seed is quoted.
+    let value = |seed: u64| -> Value {
+        match i64::try_from(seed) {
+            Ok(number) => number.into(),
+            Err(_) => seed.to_string().into(),
         }
+    };
+    let fields = (0_u64..).map(|field| value(seed.wrapping_add(field.wrapping_mul(NEXT_FIELD))));
+    match document.get_mut("terrain") {
+        Some(Item::ArrayOfTables(parts)) => {
+            let parts = parts.iter_mut().filter_map(|part| part.get_mut("seed"));
+            for (part, seed) in parts.zip(fields) {
+                *part = Item::Value(seed);
+            }
+        }
+        Some(Item::Value(Value::Array(parts))) => {
+            let parts = parts.iter_mut().filter_map(Value::as_inline_table_mut);
+            for (part, seed) in parts.filter_map(|part| part.get_mut("seed")).zip(fields) {
+                *part = seed;
+            }
+        }
+        _ => {}
     }
 }
 
@@ -149,5 +164,47 @@ pub(crate) fn add_fault(document: &mut DocumentMut, fault: &str) {
             let list: toml_edit::Array = [fault].into_iter().collect();
             table.insert("faults", Item::Value(Value::Array(list)));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts of a terrain may be sections or a list.
+    #[test]
+    fn the_seed_of_rocks_is_replaced_however_a_terrain_is_written() {
+        for text in [
+            "[[terrain]]\nkind = \"plane\"\n[[terrain]]\nkind = \"rocks\"\nseed = 1\n",
+            "terrain = [{ kind = \"plane\" }, { kind = \"rocks\", seed = 1 }]\n",
+        ] {
+            for (seed, written) in [
+                (7, "seed = 7"),
+                (u64::MAX, "seed = \"18446744073709551615\""),
+            ] {
+                let mut document: DocumentMut = text.parse().expect("TOML");
+                set_ground_seed(&mut document, seed);
+                let said = document.to_string();
+                assert!(
+                    said.contains(written) && !said.contains("seed = 1\n"),
+                    "{said}"
+                );
+                assert_eq!(said.matches("seed").count(), 1, "{said}");
+            }
+        }
+    }
+
+    /// Two fields of one scenario have rocks of their own.
+    #[test]
+    fn every_field_of_rocks_gets_a_seed_of_its_own() {
+        let text = "[[terrain]]\nseed = 1\n[[terrain]]\nkind = \"plane\"\n[[terrain]]\nseed = 2\n";
+        let mut document: DocumentMut = text.parse().expect("TOML");
+        set_ground_seed(&mut document, 5);
+        let said = document.to_string();
+        assert!(said.contains("seed = 5\n"), "{said}");
+        assert!(
+            said.contains(&format!("seed = {}\n", 5 + (1_u64 << 56))),
+            "{said}"
+        );
     }
 }

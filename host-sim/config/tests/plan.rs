@@ -114,47 +114,38 @@ fn a_value_goes_to_the_field_that_it_is_of_and_to_no_other() {
     assert!(case.scenario_json.get("seed").is_none());
 }
 
-/// A listed seed is that of the rocks, too.
+/// A counted seed is that of the rocks, too, however the parts of the terrain are written.
 #[test]
-fn a_list_of_seeds_is_one_of_grounds() {
-    let head = "name = \"test\"\nroot = 1\n[base]\nscenario = \"rocks-30\"\n";
-    let seeds = "[factor.seed]\nparameter = \"seed\"\ngrid = [7, 9007199254740992]\n";
-    let plan = Plan::of(sources(&format!("{head}{seeds}"))).expect("usable");
-    assert_eq!(plan.cases(), 2);
+fn a_counted_seed_is_one_of_a_ground() {
+    let head = "name = \"test\"\nroot = 1\nfirst_seed = 7\nreplicates = 3\n";
+    let plan = Plan::of(sources(&format!("{head}[base]\nscenario = \"rocks-30\"\n")));
+    let plan = plan.expect("usable");
+    assert_eq!([0, 2].map(|k| plan.seed(k)), [Some(7), Some(9)]);
     let resolver = Resolver::new(&plan).expect("usable");
-    for seed in [7, 1 << 53] {
-        let case = resolver.resolve(&[Value::Number(seed as f64)]);
-        let case = case.expect("a case").on_robot().expect("a robot");
-        let alone = builtin::scenario_on_ground("rocks-30", seed).expect("built in");
-        assert_eq!(case.scenario.ground, alone.ground);
-    }
-    for (factor, told) in [
-        ("grid = [1.5]", "seeds are given as `grid = [1, 2, …]`"),
-        ("grid = [-1]", "seeds are given as"),
-        ("grid = [9007199254740994]", "seeds are given as"),
-        ("grid = [\"1\"]", "seeds are given as"),
-        ("grid = [1]\nunit = \"s\"", "seeds are given as"),
-        ("uniform = { min = 1, max = 9 }", "seeds are given as"),
-        ("grid = [1, 2]\npaired = true", "seeds differ"),
-        ("grid = [1, 2]\nscale = true", "`scale` is for parameters"),
+    let case = |seed| {
+        let case = resolver.resolve_on_ground(&[], seed).expect("a case");
+        case.on_robot().expect("a robot")
+    };
+    let alone = |seed| builtin::scenario_on_ground("rocks-30", seed).expect("built in");
+    assert_eq!(case(Some(9)).scenario.ground, alone(9).ground);
+    assert_ne!(alone(9).ground, case(None).scenario.ground);
+    for (first, told) in [
+        (
+            "-1",
+            "`first_seed` = -1 must be a whole number from 0 to 9007199254740992",
+        ),
+        (
+            "9007199254740993",
+            "`first_seed` = 9007199254740993 must be",
+        ),
+        ("1.5", "`first_seed` = 1.5 must be"),
     ] {
-        let text = format!("{head}[factor.x]\nparameter = \"seed\"\n{factor}\n");
-        let error = Plan::of(sources(&text)).expect_err(factor);
+        let text =
+            format!("name = \"x\"\nroot = 1\nfirst_seed = {first}\n[base]\nscenario = \"stand\"\n");
+        let error = Plan::of(sources(&text)).expect_err(first);
         let said = error.problems()[0].summary();
-        assert!(said.contains(told), "{factor}: {said}");
+        assert!(said.contains(told), "{first}: {said}");
     }
-    // Of one seed there are no replicates, and two lists contradict each other.
-    let told = refused(seeds);
-    let expected =
-        "`replicates` = 10 would compute each case 10 times, as `factor.seed` sets the seed";
-    assert!(told.iter().any(|told| told.contains(expected)), "{told:?}");
-    let twice = format!(
-        "{head}{seeds}{}",
-        seeds.replace("factor.seed", "factor.other")
-    );
-    let error = Plan::of(sources(&twice)).expect_err("two lists");
-    let said = error.problems()[0].summary();
-    assert!(said.contains("both set `seed`"), "{said}");
 }
 
 /// A case has its own seed, robot and name: a factor that sets them would do nothing.

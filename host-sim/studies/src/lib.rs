@@ -1,7 +1,6 @@
 //! Studies with the simulator, one module per question.
 //!
 //! * [`run`]: one scenario with log, targets and report; [`analysis`] judges it;
-//! * [`field`]: the walks over terrain on several seeds, beside the paper's claims;
 //! * [`matrix`]: every fault, and the required response;
 //! * [`compare`], [`tune`], [`delay`]: controllers on one cylinder ([`axis_sim`]);
 //! * [`mod@bench`]: one cylinder off its data sheet, a case of a campaign;

@@ -172,6 +172,7 @@ mod tests {
                 min: None,
                 max: None,
                 required: true,
+                measured: 5,
                 met,
                 mean: None,
                 lowest: None,

@@ -48,7 +48,7 @@ pub struct Side {
     pub way: Measured,
     /// Runs.
     pub runs: u64,
-    /// Runs in which the tail touched the ground; `None` if there is no bar on it.
+    /// Runs in which the tail is known to have touched the ground; `None` if there is no bar on it.
     pub on_tail: Option<u64>,
 }
 
@@ -72,7 +72,7 @@ impl Side {
             scenario: tried.scenario,
             way: bar(MEASURE)?.clone(),
             runs: tried.runs,
-            on_tail: tail.map(|m| tried.runs - m.met),
+            on_tail: tail.map(|m| m.measured - m.met),
         })
     }
 }

@@ -12,12 +12,11 @@ mod claims;
 mod controls;
 mod page;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use wheeleg_config::plan::{Plan, Sources, Text};
+use wheeleg_config::plan::{Plan, Sources, Text, Value};
 use wheeleg_config::{ConfigError, builtin};
 use wheeleg_report::stats;
 use wheeleg_studies::analysis::{Analyser, Target};
@@ -28,7 +27,7 @@ pub use claims::{CLAIMS, Claim, Met};
 pub use controls::{CONTROLS, Compared, Control};
 
 use crate::{
-    CampaignError, Cases, Options as Work, PlanFile, Row, SAVE_EVERY, Setup, Shard, Status, Store,
+    CampaignError, Cases, Columns, Options as RunOptions, PlanFile, Row, SAVE_EVERY, Shard, Store,
     run, simulate,
 };
 
@@ -82,13 +81,12 @@ impl Options {
     fn plan(&self) -> Result<Plan, ConfigError> {
         let first = self.scenarios.first().copied().unwrap_or_default();
         let scenarios: Vec<String> = self.scenarios.iter().map(|s| format!("{s:?}")).collect();
-        let seeds: Vec<String> = (1..=self.seeds).map(|seed| seed.to_string()).collect();
         let text = format!(
-            "name = \"field\"\nroot = 1\n\n[base]\nscenario = {first:?}\n\n\
-             [factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]\n\n\
-             [factor.seed]\nparameter = \"seed\"\ngrid = [{}]\n",
-            scenarios.join(", "),
-            seeds.join(", ")
+            "name = \"field\"\nroot = 1\nfirst_seed = 1\nreplicates = {}\n\n\
+             [base]\nscenario = {first:?}\n\n\
+             [factor.scenario]\nparameter = \"scenario\"\ngrid = [{}]\n",
+            self.seeds,
+            scenarios.join(", ")
         );
         let file = "field.toml".to_owned();
         Plan::of(Sources::of(Text { file, text }, Path::new(""))?)
@@ -108,9 +106,9 @@ pub struct Run {
     pub error: Option<String>,
     /// It came to its end and met all required bars.
     pub passed: bool,
-    /// Hash of its log; empty if there is none.
+    /// Hash of its log; empty without one.
     pub hash: String,
-    /// The bars with their measurements; none of a run that ended early.
+    /// The bars with their measurements; a run that ended early has none.
     pub bars: Vec<Target>,
 }
 
@@ -129,6 +127,8 @@ pub struct Measured {
     pub max: Option<f64>,
     /// A run fails without it.
     pub required: bool,
+    /// Runs in which it was measured.
+    pub measured: u64,
     /// Runs in which it is met.
     pub met: u64,
     /// Mean of the runs with a value.
@@ -179,6 +179,7 @@ impl Tried {
                 min: bar.min,
                 max: bar.max,
                 required: bar.required,
+                measured: values.len() as u64,
                 met: same.iter().filter(|b| b.pass).count() as u64,
                 mean: stats::mean(&values),
                 lowest: values.iter().copied().reduce(f64::min),
@@ -250,45 +251,41 @@ impl study::Summary for Summary {
     const SCHEMA: &'static str = "wheeleg.field/1";
 }
 
-/// The rows as runs, each with the bars of its scenario.
-fn runs(options: &Options, cases: &Cases<'_>, rows: Vec<Row>) -> Vec<Run> {
-    let mut bars: BTreeMap<&str, Vec<Target>> = BTreeMap::new();
-    let mut runs = Vec::new();
-    for row in rows {
-        let case = cases.case(row.index);
-        let Ok(Setup::Robot(both)) = &case.setup else {
-            continue;
-        };
-        let named = |name: &&&str| **name == both.0.name;
-        let Some(scenario) = options.scenarios.iter().find(named) else {
-            continue;
-        };
-        let unmeasured = bars
-            .entry(scenario)
-            .or_insert_with(|| Analyser::new(&both.0, &both.1).finish().targets);
-        let measured = unmeasured.iter().map(|bar| {
-            let figure = row.figure(cases.columns(), &bar.id);
-            Target {
-                value: figure.value,
-                // Without limits there is nothing to miss.
-                pass: figure.pass.unwrap_or(figure.value.is_some()),
-                ..bar.clone()
-            }
-        });
-        runs.push(Run {
-            scenario,
-            seed: row.seed,
-            case: row.case.to_string(),
-            passed: row.passed == Some(true),
-            bars: match row.status {
-                Status::Ok => measured.collect(),
-                _ => Vec::new(),
-            },
-            error: row.error,
-            hash: row.log_hash.unwrap_or_default(),
-        });
-    }
-    runs
+/// The bars of a scenario, not measured.
+fn bars_of(name: &str) -> Result<Vec<Target>, ConfigError> {
+    let scenario = builtin::scenario(name)?;
+    let robot = builtin::robot_of(&scenario, name)?;
+    Ok(Analyser::new(&scenario, &robot).finish().targets)
+}
+
+/// The rows of a scenario as runs. A run that ended early has measured nothing.
+fn runs<'a>(
+    scenario: &'static str,
+    rows: impl Iterator<Item = &'a Row>,
+    columns: &Columns,
+) -> Result<Vec<Run>, ConfigError> {
+    let bars = bars_of(scenario)?;
+    let run = |row: &Row| Run {
+        scenario,
+        seed: row.seed,
+        case: row.case.to_string(),
+        error: row.error.clone(),
+        passed: row.passed == Some(true),
+        hash: row.log_hash.clone().unwrap_or_default(),
+        bars: bars
+            .iter()
+            .map(|bar| {
+                let figure = row.figure(columns, &bar.id);
+                Target {
+                    value: figure.value,
+                    // Without limits there is nothing to miss.
+                    pass: figure.pass.unwrap_or(figure.value.is_some()),
+                    ..bar.clone()
+                }
+            })
+            .collect(),
+    };
+    Ok(rows.map(run).collect())
 }
 
 /// Runs everything and writes page, pictures and summary. Runs that an earlier process of the same program has
@@ -301,14 +298,15 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
     let cases = Cases::new(&plan)?;
     let file = PlanFile::of(&plan, cases.work_s());
     let folder = settings.out.join(CAMPAIGN);
-    // Runs of other scenarios, seeds or another program go with the results that were made of them.
     let also: &[&str] = match Store::ensure_not_of_another(&folder, &file) {
         Ok(()) => &[],
-        Err(_) => &[CAMPAIGN],
+        // Runs of other scenarios, seeds or another program go with the results that were made of them.
+        Err(CampaignError::Refused { .. }) => &[CAMPAIGN],
+        Err(damaged) => return Err(damaged),
     };
     let job = Job::begin_with("field", settings, &[], also)?;
     let store = Store::create(&folder, file, &settings.stop)?;
-    let work = Work {
+    let run_options = RunOptions {
         shard: Shard::ALL,
         threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         first: None,
@@ -318,19 +316,56 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
         save_every: SAVE_EVERY,
     };
     let one = |case: &_| simulate(case, None, &settings.stop);
-    let ran = run(&store, &cases, &work, &one)?;
+    let ran = run(&store, &cases, &run_options, &one)?;
     for (path, why) in &ran.aside {
         let told = format!("set aside: {}: {why}", path.display());
         job.progress.tell(&told);
     }
     let (done, of) = (ran.found + ran.computed, ran.of);
     let stopped = job.progress.stopped(done, of, "runs");
-    let runs = runs(options, &cases, store.rows()?);
-    let summary = Summary::of(options, runs)?;
+    let rows = store.rows()?;
+    let mut all = Vec::new();
+    for scenario in &options.scenarios {
+        // The one factor is the scenario.
+        let own = |row: &&Row| row.factors == [Value::Text((*scenario).to_owned())];
+        all.extend(runs(scenario, rows.iter().filter(own), cases.columns())?);
+    }
+    let summary = Summary::of(options, all)?;
     let text = json(&summary, stopped.as_ref());
     let why = stopped.clone();
     Ok(job.finish(summary, text, stopped, |job, summary| {
         let drawn = job.draw(charts::figures(summary));
         (page::render(summary, why.as_ref(), &drawn), drawn)
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Outcome;
+    use crate::compute::row_of;
+    use crate::row::Status;
+
+    #[test]
+    fn a_claim_whose_runs_all_ended_early_stands_as_not_met() {
+        let options = Options {
+            scenarios: vec!["rocks-30"],
+            seeds: 2,
+            program: None,
+        };
+        let plan = options.plan().expect("usable");
+        let cases = Cases::new(&plan).expect("built in");
+        let ended = |index| {
+            let outcome = Outcome::without(Status::Error, "left physics".to_owned());
+            row_of(&cases, &cases.case(index), 2, outcome)
+        };
+        let rows = [ended(0), ended(1)];
+        let runs = runs("rocks-30", rows.iter(), cases.columns()).expect("built in");
+        let summary = Summary::of(&options, runs).expect("built in");
+        let seeds: Vec<u64> = summary.runs.iter().map(|run| run.seed).collect();
+        assert_eq!(seeds, [1, 2]);
+        assert!(!summary.passed());
+        let met: Vec<Met> = summary.claims.iter().map(|claim| claim.met).collect();
+        assert_eq!(met, [Met::NotMet; 2]);
+    }
 }

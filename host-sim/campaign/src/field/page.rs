@@ -9,6 +9,9 @@ use wheeleg_studies::StudyError;
 use wheeleg_studies::analysis::band_text;
 use wheeleg_studies::study::Stopped;
 
+/// Characters of a case that are shown: enough for a replay.
+const CASE: usize = 12;
+
 const TEMPLATE: &str = include_str!("page.html");
 
 /// Assumptions behind every number of this page.
@@ -93,7 +96,7 @@ struct MeasuredRow<'a> {
 struct Failure<'a> {
     run: &'a super::Run,
     why: String,
-    /// The beginning of its case, enough for a replay.
+    /// The beginning of its case.
     case: &'a str,
 }
 
@@ -191,13 +194,18 @@ pub(super) fn render(
         sides: [&control.legs, &control.idle].map(SideRow::of),
     });
     let failures = summary.judged().filter(|run| !run.passed).map(|run| {
-        let missed = run.bars.iter().filter(|b| b.required && !b.pass);
-        let missed = missed.map(|b| format!("{} {}", b.id, b.value_text()));
+        // A run that ended early has measured nothing: why it ended says it all.
+        let whole = run.error.is_none();
+        let missed = run.bars.iter().filter(|b| whole && b.required && !b.pass);
+        let missed = missed.map(|b| {
+            let (measured, asked) = (b.measured_text(), b.asked_text());
+            format!("{} {measured} (asked {asked})", b.id)
+        });
         let why: Vec<String> = run.error.iter().cloned().chain(missed).collect();
         Failure {
             run,
             why: why.join("; "),
-            case: run.case.get(..12).unwrap_or(&run.case),
+            case: run.case.get(..CASE).unwrap_or(&run.case),
         }
     });
     let values = Page {

@@ -20,6 +20,8 @@ pub struct Asked {
     pub samples: u64,
     /// Cases that differ only in their noise.
     pub replicates: u64,
+    /// Seed of the first replicate; null if seeds follow from the cases.
+    pub first_seed: Option<u64>,
     /// Root of all randomness, a whole number as text: JSON numbers are exact only up to 2^53.
     pub root: String,
     /// The text of the plan.
@@ -79,6 +81,7 @@ impl Asked {
             sampler: sampler.map_or(String::new(), |(name, _)| (*name).to_owned()),
             samples: plan.samples,
             replicates: plan.replicates,
+            first_seed: plan.first_seed,
             root: plan.root.to_string(),
             text: plan.sources.plan.text.clone(),
         }

@@ -193,6 +193,8 @@ pub(super) fn worst(merged: &Merged) -> Vec<Worst> {
                 .into_iter()
                 .map(
                     |(column, by)| match table.numbers(&column.name)[row].zip(by) {
+                        // Limits that differ from case to case give no measure.
+                        Some(_) if !column.has_limits() => format!("{} missed", column.name),
                         Some((value, by)) => {
                             format!("{} by {}", column.name, amount(value, by, column))
                         }

@@ -50,7 +50,6 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
             (setting.is_of_bench() != on_bench).then(|| setting.name().to_owned())
         }
         Sets::Fault(fault) => on_bench.then(|| fault.clone()),
-        Sets::Seed => None,
         Sets::Fields(fields) => {
             let other = fields.iter().find(|f| f.part.is_of_bench() != on_bench);
             other.map(ToString::to_string)
@@ -62,17 +61,17 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
     let (base, allowed) = match on_bench {
         true => (
             "a cylinder on the bench (`base.axis`)",
-            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`, `seed`",
+            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`",
         ),
         false => (
             "a robot in a scenario (`base.scenario`)",
-            "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, `seed`, and a `fault`",
+            "allowed are `scenario.…`, `robot.…`, `scenario`, `robot`, and a `fault`",
         ),
     };
     let span = span_of_path(r, factor, &other);
     let what = match factor.sets {
         Sets::Fault(_) => "a fault".to_owned(),
-        Sets::Base(_) | Sets::Fields(_) | Sets::Seed => format!("`{other}`"),
+        Sets::Base(_) | Sets::Fields(_) => format!("`{other}`"),
     };
     let message = format!(
         "`factor.{}` sets {what}, and every case is {base}",
@@ -164,7 +163,7 @@ const WITHOUT_EFFECT: [(&str, &str); 8] = [
     (
         "scenario.seed",
         "each case has a seed of its own, which follows from `root`: `replicates` repeats a case with other \
-         noise, `paired = true` gives the values of a factor the same, and `parameter = \"seed\"` lists seeds",
+         noise, `paired = true` gives the values of a factor the same, and `first_seed` counts the seeds",
     ),
     (
         "scenario.robot",
@@ -535,7 +534,7 @@ fn ends(r: &mut Reader, plan: &Plan, resolver: &Resolver<'_>) {
         // If a factor is wrong by itself, its place is known.
         let mut named = false;
         for (factor, value) in plan.factors.iter().zip(&middle) {
-            if let Err(error) = resolver.resolve_only(&[(factor, value)]) {
+            if let Err(error) = resolver.resolve_only(&[(factor, value)], None) {
                 let span = span_of(r, factor);
                 report(
                     r,
@@ -599,7 +598,7 @@ fn endless(r: &mut Reader, factor: &Factor) {
     let [least, most] = LOAD_SHARES;
     let whose = match factor.sets {
         Sets::Base(_) => format!("of `load_share`, {least} to {most}"),
-        Sets::Fault(_) | Sets::Fields(_) | Sets::Seed => "of any fault".to_owned(),
+        Sets::Fault(_) | Sets::Fields(_) => "of any fault".to_owned(),
     };
     let message = format!(
         "`factor.{}`: a distribution without an end can leave the range {whose}",

@@ -17,9 +17,6 @@ pub enum Sets {
     Fields(Vec<Field>),
     /// A fault, with the value in place of its `{}`.
     Fault(String),
-    /// The seed of all noise, and of rocks if there are any, instead of the one that the case gets by its
-    /// content.
-    Seed,
 }
 
 impl Sets {
@@ -30,13 +27,9 @@ impl Sets {
             Self::Base(setting) => vec![setting.name().to_owned()],
             Self::Fields(fields) => fields.iter().map(ToString::to_string).collect(),
             Self::Fault(template) => vec![format!("fault {template}")],
-            Self::Seed => vec![SEED.to_owned()],
         }
     }
 }
-
-/// The parameter that sets the seed.
-const SEED: &str = "seed";
 
 /// A file of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -144,15 +137,6 @@ impl Factor {
         })
     }
 
-    /// Whether its values are a list of seeds.
-    fn lists_seeds(&self) -> bool {
-        let Values::Grid(list) = &self.values else {
-            return false;
-        };
-        let seed = |value: &Value| value.seed().is_some();
-        self.unit.is_empty() && list.iter().all(seed)
-    }
-
     /// The values that the plan lists; none of a distribution of numbers.
     fn listed(&self) -> impl Iterator<Item = &Value> {
         let (grid, choices): (&[Value], &[Choice]) = match &self.values {
@@ -252,11 +236,7 @@ fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
         Sets::Fields(_) if factor.scale && !factor.unit.is_empty() => {
             "a factor that scales has no unit"
         }
-        Sets::Base(_) | Sets::Fault(_) | Sets::Seed if factor.scale => "`scale` is for parameters",
-        Sets::Seed if !factor.lists_seeds() => {
-            "seeds are given as `grid = [1, 2, …]`, whole numbers from 0 to 9007199254740992 (2^53) without a unit"
-        }
-        Sets::Seed if factor.paired => "values with one seed are `paired`: seeds differ",
+        Sets::Base(_) | Sets::Fault(_) if factor.scale => "`scale` is for parameters",
         Sets::Fault(template) if template.matches("{}").count() != 1 => {
             "a fault has `{}` once, where its value goes, as in \"pot-open:joint3@{}s\""
         }
@@ -268,7 +248,7 @@ fn fits(r: &mut Reader, entry: &Entry, factor: &Factor) -> bool {
         Sets::Fields(_) if factor.scale => {
             Some("leave `scale` out, or give numbers without a unit".to_owned())
         }
-        Sets::Fields(_) | Sets::Fault(_) | Sets::Seed => None,
+        Sets::Fields(_) | Sets::Fault(_) => None,
     };
     r.problem(
         Some(entry.span.clone()),
@@ -290,13 +270,10 @@ fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
             } else {
                 vec![r.text(entry, "parameter")?]
             };
-            if let [one] = texts.as_slice() {
-                if one == SEED {
-                    return Some(Sets::Seed);
-                }
-                if let Some(setting) = Setting::ALL.into_iter().find(|s| s.name() == one) {
-                    return Some(Sets::Base(setting));
-                }
+            if let [one] = texts.as_slice()
+                && let Some(setting) = Setting::ALL.into_iter().find(|s| s.name() == one)
+            {
+                return Some(Sets::Base(setting));
             }
             let mut fields = Vec::new();
             let mut ok = !texts.is_empty();
@@ -310,8 +287,7 @@ fn sets(r: &mut Reader, entry: &Entry) -> Option<Sets> {
                     continue;
                 }
                 ok = false;
-                let settings = Setting::ALL.map(Setting::name).into_iter().chain([SEED]);
-                let settings: Vec<String> = settings.map(|name| format!("`{name}`")).collect();
+                let settings = Setting::ALL.map(|setting| format!("`{}`", setting.name()));
                 r.problem(
                     item.span().or(Some(span.clone())),
                     format!(
@@ -355,7 +331,7 @@ fn meant(r: &Reader, text: &str) -> String {
         false => [Part::Robot.prefix(), "robot.supply.set_pressure"],
     };
     let meant = match text.split_once('.') {
-        None => closest(text, settings.map(Setting::name).chain([SEED])).map(str::to_owned),
+        None => closest(text, settings.map(Setting::name)).map(str::to_owned),
         Some((first, rest)) => parts
             .find(|part| closest(&format!("{first}."), [part.prefix()]).is_some())
             .map(|part| format!("{}{rest}", part.prefix()))

@@ -84,8 +84,11 @@ pub struct Plan {
     pub root: u64,
     /// Samples of each cell of the grid.
     pub samples: u64,
-    /// Cases of each sample, which differ only in their noise.
+    /// Cases of each sample, which differ only in their seeds.
     pub replicates: u64,
+    /// Seed of the first replicate; the others count on. `None`: each case has a seed that follows from its
+    /// content.
+    pub first_seed: Option<u64>,
     /// How samples are drawn.
     pub sampler: Sampler,
     /// Cases of a part file; `None`: as many as are 30 to 120 s of work.
@@ -104,11 +107,12 @@ pub struct Plan {
     pub sources: Sources,
 }
 
-const TOP: [&str; 11] = [
+const TOP: [&str; 12] = [
     "name",
     "root",
     "samples",
     "replicates",
+    "first_seed",
     "sampler",
     "block",
     "keep",
@@ -124,6 +128,8 @@ pub const MOST_IN_BLOCK: u64 = 1 << 16;
 pub const MOST_BLOCKS: u64 = 1_000_000;
 /// Most samples, replicates and cases of a plan: indices stay exact in tables of floats, too.
 const MOST: u64 = MOST_IN_BLOCK * MOST_BLOCKS;
+/// Largest first seed, for the same reason.
+const SEED_MOST: u64 = 1 << f64::MANTISSA_DIGITS;
 
 impl Plan {
     /// A plan by built-in name, or from a TOML file.
@@ -149,7 +155,6 @@ impl Plan {
                 check::check(&mut r, plan)?;
             }
             ensure_samples_differ(&mut r, plan);
-            ensure_replicates_differ(&mut r, plan);
             ensure_saltelli_is_whole(&mut r, plan);
         }
         r.finish(&what, plan).map(|(plan, _)| plan)
@@ -165,6 +170,12 @@ impl Plan {
     #[must_use]
     pub fn cases(&self) -> u64 {
         self.cells() * self.samples * self.replicates
+    }
+
+    /// Seed of all noise, and of rocks, of a replicate; `None` if it follows from the content of a case.
+    #[must_use]
+    pub fn seed(&self, replicate: u64) -> Option<u64> {
+        self.first_seed.map(|first| first + replicate)
     }
 
     /// Factors that are drawn, in the order of the file.
@@ -211,6 +222,10 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
     };
     let samples = count("samples", MOST);
     let replicates = count("replicates", MOST);
+    let first_seed = match top.get("first_seed") {
+        Some(_) => r.whole(&top, "first_seed", 0..=SEED_MOST).map(Some),
+        None => Some(None),
+    };
     let block = match top.get("block") {
         Some(_) => r.whole(&top, "block", 1..=MOST_IN_BLOCK).map(Some),
         None => Some(None),
@@ -260,6 +275,7 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         root: root?,
         samples: samples?,
         replicates: replicates?,
+        first_seed: first_seed?,
         sampler: sampler?,
         block: block?,
         keep: keep?,
@@ -344,30 +360,6 @@ fn ensure_samples_differ(r: &mut Reader, plan: &Plan) {
         ),
         "no factor is drawn",
         Some("for other noise write `replicates`; for other values let a factor be drawn".into()),
-    );
-}
-
-/// Reports replicates beside a list of seeds: each would be the same run.
-fn ensure_replicates_differ(r: &mut Reader, plan: &Plan) {
-    let replicates = plan.replicates;
-    let mut factors = plan.factors.iter();
-    let Some(seeds) = factors.find(|factor| factor.sets == Sets::Seed) else {
-        return;
-    };
-    if replicates == 1 {
-        return;
-    }
-    let top = r.table("");
-    let key = top.as_ref().and_then(|top| top.get("replicates"));
-    r.problem(
-        key.map(|(key, _)| key),
-        format!(
-            "`replicates` = {replicates} would compute each case {replicates} times, as `factor.{}` sets the \
-             seed: allowed is 1",
-            seeds.name
-        ),
-        "the same noise",
-        Some("leave `replicates` out, and list more seeds".into()),
     );
 }
 

@@ -170,18 +170,31 @@ impl<'a> Resolver<'a> {
     /// # Errors
     /// [`ConfigError`] if the values do not make a valid scenario or robot, or a valid axis.
     pub fn resolve(&self, values: &[Value]) -> Result<Resolved, ConfigError> {
+        self.resolve_on_ground(values, None)
+    }
+
+    /// The same on other ground: a seed replaces that of each of the scenario's fields of rocks.
+    ///
+    /// # Errors
+    /// As [`Resolver::resolve`].
+    pub fn resolve_on_ground(
+        &self,
+        values: &[Value],
+        seed: Option<u64>,
+    ) -> Result<Resolved, ConfigError> {
         let all: Vec<_> = self.plan.factors.iter().zip(values).collect();
-        self.resolve_only(&all)
+        self.resolve_only(&all, seed)
     }
 
     /// The same for some factors, with the others' fields as in the files.
     pub(super) fn resolve_only(
         &self,
         factors: &[(&Factor, &Value)],
+        seed: Option<u64>,
     ) -> Result<Resolved, ConfigError> {
         Ok(match &self.plan.base {
             Base::Robot { scenario, robot } => {
-                let case = self.on_robot(factors, scenario, robot.as_ref())?;
+                let case = self.on_robot(factors, scenario, robot.as_ref(), seed)?;
                 Resolved::Robot(Box::new(case))
             }
             Base::Axis(base) => Resolved::Axis(Box::new(self.on_bench(factors, base)?)),
@@ -193,6 +206,7 @@ impl<'a> Resolver<'a> {
         factors: &[(&Factor, &Value)],
         scenario: &str,
         robot: Option<&String>,
+        seed: Option<u64>,
     ) -> Result<OnRobot, ConfigError> {
         let chosen = |setting| chosen(factors, setting).map(ToString::to_string);
         let scenario_name = chosen(Setting::Scenario).unwrap_or_else(|| scenario.to_owned());
@@ -205,18 +219,13 @@ impl<'a> Resolver<'a> {
         let robot = self.known(Kept::Robot, &robot_name)?;
         let mut scenario_text = scenario.document.clone();
         let robot_text = changed(robot, factors, Part::Robot)?;
+        if let Some(seed) = seed {
+            overlay::set_ground_seed(&mut scenario_text, seed);
+        }
         for (factor, value) in factors {
-            match &factor.sets {
-                Sets::Fault(template) => {
-                    let fault = template.replace("{}", &value.to_string());
-                    overlay::add_fault(&mut scenario_text, &fault);
-                }
-                Sets::Seed => {
-                    if let Some(seed) = value.seed() {
-                        overlay::set_ground_seed(&mut scenario_text, seed);
-                    }
-                }
-                Sets::Base(_) | Sets::Fields(_) => {}
+            if let Sets::Fault(template) = &factor.sets {
+                let fault = template.replace("{}", &value.to_string());
+                overlay::add_fault(&mut scenario_text, &fault);
             }
         }
         change(scenario, &mut scenario_text, factors, Part::Scenario)?;
@@ -332,7 +341,7 @@ fn chosen<'v>(factors: &[(&Factor, &'v Value)], setting: Setting) -> Option<&'v 
 fn sets(factor: &Factor, part: Part) -> bool {
     match &factor.sets {
         Sets::Fields(fields) => fields.iter().any(|field| field.part == part),
-        Sets::Base(_) | Sets::Fault(_) | Sets::Seed => false,
+        Sets::Base(_) | Sets::Fault(_) => false,
     }
 }
 

@@ -5,8 +5,6 @@ use toml_edit::Item;
 
 use crate::reader::{Entry, Reader};
 
-/// Largest seed: whole numbers up to here are exact as floats, as which values are kept.
-const SEED_MOST: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
 /// Longest text, bytes: every row of a table holds it.
 const TEXT_MOST: usize = 500;
 
@@ -20,17 +18,6 @@ pub enum Value {
     Number(f64),
     /// A name: of a scenario, a robot, a law, or of anything else that files name.
     Text(String),
-}
-
-impl Value {
-    /// The value as a seed: a whole number that a float holds exactly.
-    #[must_use]
-    pub fn seed(&self) -> Option<u64> {
-        match self {
-            Self::Number(n) if n.fract() == 0.0 && (0.0..=SEED_MOST).contains(n) => Some(*n as u64),
-            Self::Number(_) | Self::Flag(_) | Self::Text(_) => None,
-        }
-    }
 }
 
 impl std::fmt::Display for Value {

@@ -193,14 +193,11 @@ pub(super) fn command(args: &CampaignArgs) -> Result<ExitCode, StudyError> {
         Command::Replay(args) => replay_command(args),
         Command::Case(args) => case_command(args),
     };
-    Ok(result.unwrap_or_else(failed))
-}
-
-/// Tells an error, and returns its exit code.
-pub(super) fn failed(error: CampaignError) -> ExitCode {
-    let code = error.exit_code();
-    tell_error(error);
-    ExitCode::from(code)
+    Ok(result.unwrap_or_else(|error| {
+        let code = error.exit_code();
+        tell_error(error);
+        ExitCode::from(code)
+    }))
 }
 
 /// Exit code of a command that a signal has stopped: a scheduler restarts what it has ended.

@@ -10,7 +10,8 @@ use wheeleg_campaign::field::{self, Options, SCENARIOS, Summary};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::study::Finished;
 
-use super::{campaign, end, place, settings, whole};
+use super::exit::FAILED;
+use super::{end, place, settings, tell_error, whole};
 
 /// Arguments of `wheeleg field`.
 #[derive(Debug, Args)]
@@ -24,8 +25,8 @@ pub(super) struct FieldArgs {
     /// Seeds of each scenario, 1 to 1000: of the noise and, on rocks, of the field.
     #[arg(long, default_value_t = 5, value_parser = whole(1_u32, 1000))]
     seeds: u32,
-    /// Folder for page, pictures and summary, and in its subfolder `campaign` the runs: those that are there
-    /// already are not repeated. Results of an earlier run in it move to its subfolder `previous`.
+    /// Folder for page, pictures and summary, and in its subfolder `campaign` the runs, which are not repeated
+    /// for the same scenarios and seeds. Results of an earlier run in it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/field")]
     out: PathBuf,
     /// Write the pictures as PNG as well as SVG, if the program was built with `--features png`.
@@ -53,7 +54,11 @@ pub(super) fn command(args: &FieldArgs) -> Result<ExitCode, StudyError> {
     };
     let finished = match field::write(&options, &settings(&args.out, args.png)?) {
         Ok(finished) => finished,
-        Err(error) => return Ok(campaign::failed(error)),
+        Err(error) => {
+            tell_error(error);
+            // As of any other study, not as of a campaign that a scheduler restarts.
+            return Ok(ExitCode::from(FAILED));
+        }
     };
     let text = |finished: &Finished<Summary>| {
         let mut out = text(&finished.result);
