@@ -1,6 +1,8 @@
 //! The walks over terrain on five seeds, as the page of `wheeleg field` judges them.
 
+use crate::walk::broken_switches;
 use wheeleg_campaign::field::{self, CONTROLS, Measured, Met, Options, SCENARIOS, Summary, Tried};
+use wheeleg_config::builtin;
 use wheeleg_studies::study::Settings;
 
 fn field(scenarios: &[&str], seeds: u32) -> Summary {
@@ -89,6 +91,11 @@ fn a_wall_and_steep_sand_are_not_climbed() {
         if measured.measure != "stuck-after" {
             assert_eq!(measured.met, wall.runs, "{}", measured.measure);
         }
+    }
+    // A foot hangs at the wall by its front switch in one swing after another: nothing is broken.
+    for seed in 1..=6 {
+        let wall = builtin::scenario("wall-30").expect("built in");
+        assert_eq!(broken_switches(&wall, seed), [], "seed {seed}");
     }
     let summary = field(&["sand-slope-20", "dry-sand-slope-20"], 1);
     let sand = tried(&summary, "dry-sand-slope-20");

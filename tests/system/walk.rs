@@ -3,8 +3,12 @@
 use crate::behaviours::metrics::drag_of;
 use crate::sil;
 use wheeleg_config::{Bar, Measure, Motion, Scenario, builtin};
+use wheeleg_master::contact::{Sector, Side};
+use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_master::layer1::walk::{WalkGeometry, WalkOrder};
+use wheeleg_protocol::Warning;
 use wheeleg_studies::analysis::{Target, analyse};
+use wheeleg_telemetry::Cause;
 use wheeleg_units::VelocityMmS;
 
 /// Results of the scenario's bars for a seed.
@@ -169,4 +173,49 @@ fn a_robot_whose_wheels_and_feet_slip_slides_down_a_slope() {
     assert!(slides("") > -1.0, "it stands or climbs");
     // g (sin 10° - 0.05 cos 10°) = 1.2 m/s²: metres in 3 s.
     assert!(slides("foot-slips=0.05@5s") < -500.0);
+}
+
+/// Switches told as broken: side of the robot, side of the foot, and how it is broken.
+pub(crate) fn broken_switches(
+    scenario: &Scenario,
+    seed: u64,
+) -> Vec<(Side, Option<Sector>, Warning)> {
+    let robot = builtin::robot(&scenario.robot).expect("built in");
+    let recording = sil::run(scenario, &robot, seed);
+    let told = recording.events.iter().filter_map(|e| match e.v.cause {
+        Cause::Master(MasterEvent::FootSwitch {
+            side,
+            sector,
+            warning,
+        }) => {
+            println!("{} {}: {}", scenario.name, e.t_ns / 1_000_000, e.v);
+            Some((side, sector, warning))
+        }
+        _ => None,
+    });
+    told.collect()
+}
+
+/// Whether it sticks while the foot stands or while it swings, on the level or in front of a wall: a switch
+/// that sticks is told, although the leg then hardly moves forward any more.
+#[test]
+fn a_switch_that_sticks_closed_in_a_walk_is_told() {
+    let front = (Side::Left, Some(Sector::Front), Warning::SwitchStuckClosed);
+    let rear = (Side::Left, Some(Sector::Rear), Warning::SwitchStuckClosed);
+    let outer = (Side::Left, Some(Sector::Left), Warning::SwitchStuckClosed);
+    let cases = [
+        ("walk", "foot-switch-on:left.front@6s", front),
+        ("walk", "foot-switch-on:left.front@7.4s", front),
+        ("walk", "foot-switch-on:left.back@9s", rear),
+        ("walk", "foot-switch-on:left.left@6s", outer),
+        ("wall-30", "foot-switch-on:left.front@6s", front),
+        ("wall-30", "foot-switch-on:left.front@14s", front),
+    ];
+    for (name, fault, told) in cases {
+        let mut scenario = builtin::scenario(name).expect("built in");
+        scenario.duration_s = if name == "walk" { 14.0 } else { 28.0 };
+        scenario.bars.clear();
+        scenario.faults = vec![fault.parse().expect("a fault")];
+        assert_eq!(broken_switches(&scenario, 1), [told], "{name}, {fault}");
+    }
 }

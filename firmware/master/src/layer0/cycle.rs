@@ -16,6 +16,7 @@ use crate::config::SwitchFrame;
 use crate::contact::{FootSwitches, INNER, OUTER, Side};
 use crate::event::{Event, Events};
 use crate::layer1::params::in_stroke;
+use crate::layer1::units::mm_to_um;
 use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Setpoints};
 use crate::telemetry::Record;
 
@@ -283,9 +284,13 @@ impl Layer0 {
                 .copied()
                 .flatten()
                 .is_some_and(|joint| joint.on_link_loss == OnLinkLoss::HoldThenExhaust);
+            // A foot that keeps its place on the ground is drawn back by b5 as the wheel moves on.
+            let b5 = senses.joint(side, Cylinder::Horizontal).unwrap_or_default();
+            let forward_um = mm_to_um(b5.stroke_mm).saturating_add(self.odometry.wheel_um(side));
+            let b6_mm = reply.joint_position();
             let watch = self.foot_watches.get_mut(side.index());
-            if let Some(stuck) = watch
-                .and_then(|watch| watch.sample(now, reply.joint_position(), shorter_mm, swings))
+            if let Some(stuck) =
+                watch.and_then(|watch| watch.sample(now, b6_mm, shorter_mm, forward_um, swings))
             {
                 let warning = if stuck.closed {
                     Warning::SwitchStuckClosed

@@ -4,7 +4,9 @@
 //! closed, or closed while they are open, proves nothing yet. Two observations do:
 //!
 //! * **Stuck closed.** During a swing, clear of where the foot stood, nothing should close it. If it
-//!   is seen closed in two swings without having opened in between, it is stuck.
+//!   is seen closed there, and without having opened the foot then moves over the ground with it alone closed, it is
+//!   stuck. A foot that hangs by a switch at a wall keeps its place, whether it swings or "stands", and drawn back it
+//!   opens the switch. How far it moves is known along the wheels only: a robot that turns on the spot is told nothing.
 //! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as even
 //!   ground does. If the other three close twice in a row and it does not, it is stuck: on uneven
 //!   ground it would have closed once.
@@ -25,20 +27,23 @@ const AGREE: u8 = 20;
 const CLEAR_MM: i16 = 15;
 /// Legs extended at least this far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
-/// Swings in which a switch must stay closed.
-const SWINGS: u8 = 2;
 /// Stances in which a switch must stay open.
 const STANCES: u8 = 2;
+/// Nothing holds a foot that has moved over the ground by this much, µm. One that hangs at a wall moves by what its sole,
+/// its leg and the wall give: up to 24 mm in simulation, where a wall gives like the ground.
+const FREE_UM: i64 = 60_000;
 
 /// One switch compared with the other three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct One {
     /// Cycles of this swing or stance in which the others have agreed.
     agreed: u8,
-    /// Swings in which it stayed closed.
-    closed: u8,
+    /// It has been closed in a swing, and has not opened since.
+    closed: bool,
     /// Stances in which it stayed open.
     open: u8,
+    /// Rearmost and foremost place of the foot over the ground, µm, with it alone closed, in that swing and since.
+    span_um: Option<[i64; 2]>,
     /// Already reported.
     told: bool,
 }
@@ -63,8 +68,6 @@ pub struct FootWatch {
     /// Stroke of b6 when the foot last was not swinging.
     stood: Option<PositionMm>,
     switches: [One; SWITCHES],
-    /// Switches for which this swing has already been counted.
-    counted: u8,
 }
 
 /// A switch that does not follow the others.
@@ -76,20 +79,42 @@ pub struct Stuck {
     pub closed: bool,
 }
 
+impl One {
+    /// Notes where the foot is over the ground with it alone closed.
+    fn note_alone(&mut self, forward_um: i64) {
+        let [rear, front] = self.span_um.unwrap_or([forward_um; 2]);
+        self.span_um = Some([rear.min(forward_um), front.max(forward_um)]);
+    }
+
+    /// Whether the foot has moved while it alone was closed, so that nothing presses on it.
+    fn moves_freely(&self) -> bool {
+        self.span_um
+            .is_some_and(|[rear, front]| front.saturating_sub(rear) >= FREE_UM)
+    }
+
+    /// What it is found to be.
+    fn stuck(&self, bit: u8) -> Option<Stuck> {
+        let closed = self.closed && self.moves_freely();
+        let switch = FootSwitches(bit);
+        (closed || self.open >= STANCES).then_some(Stuck { switch, closed })
+    }
+}
+
 impl FootWatch {
-    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, and
-    /// whether the leg swings; returns a switch that has just been found stuck.
+    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, how far
+    /// forward the foot is over the ground, µm, and whether the leg swings; returns a switch that has just been found
+    /// stuck.
     pub fn sample(
         &mut self,
         now: FootSwitches,
         b6_mm: PositionMm,
         shorter_mm: PositionMm,
+        forward_um: i64,
         swings: bool,
     ) -> Option<Stuck> {
         let now = now.0 & ALL;
         if !swings {
             self.stood = Some(b6_mm);
-            self.counted = 0;
         }
         let clear = PositionMm::from_int(CLEAR_MM);
         let drawn_up = self
@@ -114,23 +139,21 @@ impl FootWatch {
                 *one = One::default();
             }
             let others = now & ALL & !bit;
-            let (count, times, closed) = match place {
-                Place::Air if others == 0 && now & bit != 0 => (&mut one.closed, SWINGS, true),
-                Place::Ground if others == ALL & !bit && now & bit == 0 => {
-                    (&mut one.open, STANCES, false)
-                }
-                _ => continue,
-            };
-            one.agreed = one.agreed.saturating_add(1);
-            // A foot that scrapes along something leaves its place and returns to it, so a swing counts only once.
-            if one.agreed == AGREE && !(closed && self.counted & bit != 0) {
-                *count = count.saturating_add(1);
-                self.counted |= bit;
+            let alone = others == 0 && now & bit != 0;
+            if alone && (place == Place::Air || one.closed) {
+                one.note_alone(forward_um);
             }
-            if !one.told && *count >= times {
+            let missing = others == ALL & !bit && now & bit == 0;
+            if place == Place::Air && alone || place == Place::Ground && missing {
+                one.agreed = one.agreed.saturating_add(1);
+                if one.agreed == AGREE {
+                    one.closed |= alone;
+                    one.open = one.open.saturating_add(u8::from(missing));
+                }
+            }
+            if let Some(stuck) = one.stuck(bit).filter(|_| !one.told) {
                 one.told = true;
-                let switch = FootSwitches(bit);
-                found = Some(Stuck { switch, closed });
+                found = Some(stuck);
             }
         }
         found
@@ -145,18 +168,28 @@ mod tests {
     /// A pattern, the stroke of b6, and the number of cycles.
     type Stretch = (u8, i16, u32);
 
-    /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`.
-    fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
+    /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`, and a swinging foot moves
+    /// forward by `step_um` per cycle.
+    fn watched(stretches: &[Stretch], other_mm: i16, step_um: i64) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
         let mut found = Vec::new();
+        let mut forward_um = 0;
         for (raw, b6, cycles) in stretches {
             for _ in 0..*cycles {
+                let swings = *b6 <= 120;
+                forward_um += if swings { step_um } else { 0 };
                 let b6_mm = PositionMm::from_int(*b6);
                 let shorter_mm = b6_mm.limit(PositionMm::ZERO, PositionMm::from_int(other_mm));
-                found.extend(watch.sample(FootSwitches(*raw), b6_mm, shorter_mm, *b6 <= 120));
+                let raw = FootSwitches(*raw);
+                found.extend(watch.sample(raw, b6_mm, shorter_mm, forward_um, swings));
             }
         }
         found
+    }
+
+    /// The same with feet that swing freely, by 1 mm per cycle.
+    fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
+        watched(stretches, other_mm, 1_000)
     }
 
     #[test]
@@ -172,11 +205,8 @@ mod tests {
                 };
                 let walk = [&[stand][..], &step, &step, &step].concat();
                 assert_eq!(stuck_switches(&walk, 180), [stuck]);
-                // Not before it has been seen often enough.
-                assert_eq!(
-                    stuck_switches(&[&[stand][..], &step[..1]].concat(), 180),
-                    []
-                );
+                // Not before it has been seen often enough, or has moved far enough.
+                assert_eq!(stuck_switches(&[stand, (stick(0), 100, 50)], 180), []);
                 // Repaired, and stuck again.
                 let mended = [(0, 100, 50), (ALL, 180, 50)];
                 let again = [&walk[..], &mended, &walk, &step].concat();
@@ -200,6 +230,40 @@ mod tests {
             let steps = [step, step, step, step].concat();
             assert_eq!(stuck_switches(&steps, 180), [], "{touching}");
         }
+    }
+
+    #[test]
+    fn a_foot_that_hangs_at_a_wall_has_no_stuck_switch() {
+        let front = Stuck {
+            switch: FootSwitches(FRONT),
+            closed: true,
+        };
+        // It comes down on the floor in front of the wall, or hangs at the wall.
+        for stand in [(ALL, 180, 200), (FRONT, 140, 300)] {
+            let start = (ALL, 180, 100);
+            let step = [(FRONT, 100, 40), stand];
+            let at_the_wall = [&[start][..], &step, &step, &step, &step].concat();
+            // The wall gives by 4 mm in each swing.
+            assert_eq!(watched(&at_the_wall, 180, 100), []);
+            // The same without a wall: the foot moves on by 40 mm in each swing.
+            assert_eq!(watched(&at_the_wall, 180, 1_000), [front]);
+            // Drawn back from the wall, it opens.
+            let drawn_back = [&at_the_wall[..], &[(0, 100, 40)]].concat();
+            assert_eq!(watched(&drawn_back, 180, 100), []);
+        }
+        // A switch that sticks in front of the wall is found when the foot has gone back from it, even if the switch has
+        // ended its lowering in the air.
+        let mut watch = FootWatch::default();
+        let mut found = Vec::new();
+        for cycle in 0..400 {
+            let swings = cycle % 100 >= 50;
+            let b6_mm = PositionMm::from_int(if swings { 100 } else { 140 });
+            let forward_um = if cycle < 220 { 0 } else { -100_000 };
+            let raw = FootSwitches(if cycle < 50 { ALL } else { FRONT });
+            let stuck = watch.sample(raw, b6_mm, b6_mm, forward_um, swings);
+            found.extend(stuck.map(|stuck| (cycle, stuck)));
+        }
+        assert_eq!(found, [(220, front)]);
     }
 
     #[test]
