@@ -21,6 +21,8 @@
 //! * **Landing.** On its first approach to a resting target the piston comes in as fast as friction can stop it
 //!   (`switching_curve`). The approach is over once the piston rests, or stands (slower than 3 mm/s towards the target)
 //!   or moves away within 24 bands of it. Each target more than one band from the last one allows another landing.
+//! * **Start.** A piston that has rested counts as standing there until it has moved by two bands, however fast it
+//!   yields on the spring of its friction (`inverse_dynamics`).
 //! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
 //!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
 //!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
@@ -72,8 +74,8 @@ use crate::tuning::{
     BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
     OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE, PATIENCE_MOST, PAUSE_ENDS_BEYOND,
     PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS, RELEASE_PERIODS, RELEASE_SIXTEENTHS,
-    RELEASE_WIDEST, REST_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER,
-    WIDENS_SHIFT,
+    RELEASE_WIDEST, REST_PERIODS, START_BANDS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS,
+    WIDENS_AFTER, WIDENS_SHIFT,
 };
 
 /// Periods in which the band widens by its own width.
@@ -125,6 +127,8 @@ pub(super) struct Standstill {
     pause: u16,
     /// Periods outside the band of release.
     outside: u16,
+    /// Stroke at which the piston rested last, raw mm, until it has moved away from there.
+    rested_at: Option<i32>,
 }
 
 impl Standstill {
@@ -171,6 +175,11 @@ impl Standstill {
         matches!(self.arrival, Arrival::First)
     }
 
+    /// Whether the piston still stands where it rested last.
+    pub(super) const fn has_not_left(&self) -> bool {
+        self.rested_at.is_some()
+    }
+
     /// Takes over the reference. Returns whether it is a new target: more than one band from the last one.
     pub(super) const fn aim(&mut self, model: &AxisModel, reference: i32) -> bool {
         let other = reference.saturating_sub(self.target).saturating_abs() > model.band;
@@ -204,6 +213,7 @@ impl Standstill {
     /// One period.
     pub(super) fn update(&mut self, model: &AxisModel, now: &Approach) {
         let reference_rests = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        self.note_rest(model, now.motion.stroke);
         if self.is_at_rest() {
             if self.stays(model, now, reference_rests) {
                 return;
@@ -251,6 +261,18 @@ impl Standstill {
             } else {
                 State::Servo
             };
+        }
+    }
+
+    /// Remembers where the piston rests, until it has moved by [`START_BANDS`].
+    fn note_rest(&mut self, model: &AxisModel, stroke: i32) {
+        // A band is at most 5 mm, below 2^19.
+        let far = model.band.wrapping_mul(START_BANDS);
+        let left = |from: i32| stroke.saturating_sub(from).saturating_abs() > far;
+        if self.is_at_rest() {
+            self.rested_at = Some(stroke);
+        } else if self.rested_at.is_some_and(left) {
+            self.rested_at = None;
         }
     }
 
