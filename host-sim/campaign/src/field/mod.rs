@@ -94,7 +94,7 @@ impl Options {
 }
 
 /// A run, judged.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Run {
     /// Scenario.
     pub scenario: &'static str,
