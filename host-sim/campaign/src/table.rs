@@ -193,25 +193,21 @@ impl Table {
     pub(crate) fn digest(&self) -> String {
         // Hashed in one call: a call for each value takes longer than the hash itself.
         let mut all = serde_json::to_vec(&self.columns).expect("columns are JSON");
-        let mut add = |there: bool, bytes: &[u8]| {
-            all.push(u8::from(there));
-            all.extend((bytes.len() as u64).to_le_bytes());
-            all.extend(bytes);
-        };
+        all.extend((self.rows() as u64).to_le_bytes());
         for data in &self.data {
             match data {
-                Data::Whole(list) => list
-                    .iter()
-                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0).to_le_bytes())),
-                Data::Number(list) => list
-                    .iter()
-                    .for_each(|v| add(v.is_some(), &v.unwrap_or(0.0).to_bits().to_le_bytes())),
-                Data::Flag(list) => list
-                    .iter()
-                    .for_each(|v| add(v.is_some(), &[u8::from(*v == Some(true))])),
-                Data::Text(list) => list
-                    .iter()
-                    .for_each(|v| add(v.is_some(), v.as_deref().unwrap_or("").as_bytes())),
+                Data::Whole(list) => add_all(&mut all, list, i64::to_le_bytes),
+                Data::Number(list) => add_all(&mut all, list, |v| v.to_bits().to_le_bytes()),
+                // 2 is null.
+                Data::Flag(list) => all.extend(list.iter().map(|v| v.map_or(2, u8::from))),
+                Data::Text(list) => {
+                    for text in list {
+                        let bytes = text.as_deref().unwrap_or("").as_bytes();
+                        all.push(u8::from(text.is_some()));
+                        all.extend((bytes.len() as u64).to_le_bytes());
+                        all.extend(bytes);
+                    }
+                }
             }
         }
         blake3::hash(&all).to_hex()[..32].to_owned()
@@ -222,6 +218,15 @@ impl Table {
         for (own, other) in self.data.iter_mut().zip(other.data) {
             own.append(other);
         }
+    }
+}
+
+/// Adds to `all`, for each value, whether there is one, and its bytes.
+fn add_all<T: Copy + Default>(all: &mut Vec<u8>, list: &[Option<T>], bytes: impl Fn(T) -> [u8; 8]) {
+    all.reserve(9 * list.len());
+    for value in list {
+        all.push(u8::from(value.is_some()));
+        all.extend_from_slice(&bytes(value.unwrap_or_default()));
     }
 }
 
