@@ -4,9 +4,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use wheeleg_campaign::{
-    Case, Cases, Columns, Options, Outcome, PlanFile, Row, SAVE_EVERY, Shard, Status, Store, run,
-};
+use wheeleg_campaign::{Case, Cases, Columns, Options, Outcome, PlanFile, Row, Status, Store, run};
 use wheeleg_config::plan::{Plan, Sources, Text};
 use wheeleg_studies::analysis::Target;
 use wheeleg_studies::study::Stop;
@@ -67,15 +65,7 @@ pub(crate) fn many(
     let folder = tempfile::tempdir().expect("a folder");
     let stop = Stop::default();
     let store = Store::create(folder.path(), file, &stop).expect("a folder for the rows");
-    let options = Options {
-        shard: Shard::ALL,
-        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        first: None,
-        stop,
-        program: None,
-        json: false,
-        save_every: SAVE_EVERY,
-    };
+    let options = Options::whole(&stop);
     run(&store, &cases, &options, &|case| Some(play(case))).expect("rows are written");
     let rows = store.rows().expect("rows");
     assert_eq!(rows.len() as u64, plan.cases());

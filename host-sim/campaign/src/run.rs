@@ -41,6 +41,22 @@ pub struct Options {
     pub save_every: Duration,
 }
 
+impl Options {
+    /// All cases, on all cores, in this process.
+    #[must_use]
+    pub fn whole(stop: &Stop) -> Self {
+        Self {
+            shard: Shard::ALL,
+            threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            first: None,
+            stop: stop.clone(),
+            program: None,
+            json: false,
+            save_every: SAVE_EVERY,
+        }
+    }
+}
+
 /// Saving a block of 4096 cases takes less than a thousandth of this.
 pub const SAVE_EVERY: Duration = Duration::from_secs(30);
 

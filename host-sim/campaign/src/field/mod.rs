@@ -27,8 +27,7 @@ pub use claims::{CLAIMS, Claim, Met};
 pub use controls::{CONTROLS, Compared, Control};
 
 use crate::{
-    CampaignError, Cases, Columns, Options as RunOptions, PlanFile, Row, SAVE_EVERY, Shard, Store,
-    run, simulate,
+    CampaignError, Cases, Columns, Options as RunOptions, PlanFile, Row, Store, run, simulate,
 };
 
 /// The scenarios, in the order of the page.
@@ -307,13 +306,8 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
     let job = Job::begin_with("field", settings, &[], also)?;
     let store = Store::create(&folder, file, &settings.stop)?;
     let run_options = RunOptions {
-        shard: Shard::ALL,
-        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        first: None,
-        stop: settings.stop.clone(),
         program: options.program.clone(),
-        json: false,
-        save_every: SAVE_EVERY,
+        ..RunOptions::whole(&settings.stop)
     };
     let one = |case: &_| simulate(case, None, &settings.stop);
     let ran = run(&store, &cases, &run_options, &one)?;

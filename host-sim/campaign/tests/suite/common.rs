@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use wheeleg_campaign::{
-    CampaignError, Case, Cases, Options, Outcome, PlanFile, Ran, Shard, Status, Store, run,
+    CampaignError, Case, Cases, Options, Outcome, PlanFile, Ran, Status, Store, run,
 };
 use wheeleg_config::plan::{Plan, Sources, Value};
 use wheeleg_studies::analysis::{Analyser, Target};
@@ -60,13 +60,8 @@ pub(crate) fn computed(case: &Case) -> Outcome {
 
 pub(crate) fn options(threads: usize) -> Options {
     Options {
-        shard: Shard::ALL,
         threads,
-        first: None,
-        stop: Stop::default(),
-        program: None,
-        json: false,
-        save_every: wheeleg_campaign::SAVE_EVERY,
+        ..Options::whole(&Stop::default())
     }
 }
 

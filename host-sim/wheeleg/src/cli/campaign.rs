@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, Subcommand, ValueEnum};
 use wheeleg_campaign::report::Report;
 use wheeleg_campaign::{
-    CampaignError, Cases, Options, PlanFile, SAVE_EVERY, Shard, Store, Submission, isolated, merge,
+    CampaignError, Cases, Options, PlanFile, Shard, Store, Submission, isolated, merge,
     merge_partial, replay, run, simulate, status,
 };
 use wheeleg_config::plan::{KeepLogs, Plan};
@@ -240,15 +240,14 @@ fn run_command(args: &RunArgs) -> Result<ExitCode, CampaignError> {
     }
     let stop = stop_on_signals()?;
     let store = Store::create(&out, file, &stop)?;
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let whole = Options::whole(&stop);
     let options = Options {
         shard,
-        threads: args.threads.map_or(cores, |n| n as usize),
+        threads: args.threads.map_or(whole.threads, |n| n as usize),
         first: args.first,
-        stop: stop.clone(),
         program: std::env::current_exe().ok(),
         json: args.progress == Shown::Json,
-        save_every: SAVE_EVERY,
+        ..whole
     };
     let simulate = |case: &_| simulate(case, plan.limit_s, &stop);
     let begun = Instant::now();
