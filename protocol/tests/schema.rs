@@ -77,7 +77,7 @@ fn the_text_names_formats_and_units() {
         "parameter 257 proportional 1/mm I8F24 0 67108864 335544",
         "fault 32 4 SensorRange",
         "value 13 FaultLatched",
-        "timing turnaround_us 100",
+        "timing turnaround_us 120",
     ] {
         assert!(text.contains(part), "{part}");
     }

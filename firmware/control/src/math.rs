@@ -63,6 +63,17 @@ pub(crate) fn within(value: i32, bound: i32) -> i32 {
     value.max(bound.wrapping_neg()).min(bound)
 }
 
+/// `value` along `direction`: its sign is reversed where `direction` is negative. So a size gets the sign of the
+/// direction, and a signed value is positive in that direction.
+#[inline]
+pub(crate) const fn along(value: i32, direction: i32) -> i32 {
+    if direction < 0 {
+        value.saturating_neg()
+    } else {
+        value
+    }
+}
+
 /// Square root, accurate to 1/2000 of it and to one.
 ///
 /// A straight line approximates the root of a number that an even shift has brought into 1…4 × 2^30 to within 4.5 %;
@@ -112,7 +123,7 @@ pub(crate) fn cube_root(share: u32) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{cube_root, mul_shr_sat, quotient, square_root};
+    use super::{along, cube_root, mul_shr_sat, quotient, square_root};
     use proptest::prelude::*;
 
     proptest! {
@@ -147,6 +158,20 @@ mod tests {
             let limited = exact.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
             let off = if exact == limited { 0 } else { (1_i64 << (32 - shift)) - 1 };
             prop_assert!((found - limited).abs() <= off, "{found} {exact}");
+        }
+    }
+
+    #[test]
+    fn a_value_along_a_direction_has_its_sign() {
+        for (value, direction, expected) in [
+            (5, 1, 5),
+            (5, -1, -5),
+            (-5, -1, 5),
+            (-5, 1, -5),
+            (5, 0, 5),
+            (i32::MIN, -1, i32::MAX),
+        ] {
+            assert_eq!(along(value, direction), expected, "{value} {direction}");
         }
     }
 

@@ -15,7 +15,7 @@ pub const CYCLE_US: u32 = 10_000;
 /// From the end of a frame to the start of the answer to it, µs: driver switching, and the work of the board.
 /// The worst case is the SYNC, which ends 20 µs after a tick edge: the conversion of that edge (23 µs), its
 /// tick and the SYNC itself come first, then the answer must be ready in hardware.
-pub const TURNAROUND_US: u32 = 100;
+pub const TURNAROUND_US: u32 = 120;
 /// The same to the answer to [`MessageType::ParamSet`], µs: the board first recalculates everything that
 /// follows from its parameters, which takes up to a third of it.
 pub const SETTING_US: u32 = 1000;
@@ -214,8 +214,8 @@ mod tests {
         let timing = SlotTiming::DEFAULT;
         assert_eq!(timing.frame_us(MessageType::Sync), 1020);
         assert_eq!(timing.frame_us(MessageType::SlotReply), 290);
-        assert_eq!(timing.cyclic_us(), 1020 + 100 + 8 * (290 + 20));
-        assert_eq!(CYCLIC_SHARE_PERMILLE, 360);
+        assert_eq!(timing.cyclic_us(), 1020 + 120 + 8 * (290 + 20));
+        assert_eq!(CYCLIC_SHARE_PERMILLE, 362);
         assert_eq!(timing.driver_limit_us(), 319);
     }
 
@@ -254,7 +254,7 @@ mod tests {
         assert!(!timing.exchange_fits(MessageType::Identify, start - 1));
         assert!(timing.exchange_fits(MessageType::Identify, start));
         // Identify 15 bytes, Identity 40 bytes.
-        let exchange = 150 + 100 + 400 + 20;
+        let exchange = 150 + 120 + 400 + 20;
         assert_eq!(timing.exchange_us(MessageType::Identify), Some(exchange));
         assert!(timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange));
         assert!(!timing.exchange_fits(MessageType::Identify, CYCLE_US - exchange + 1));
@@ -264,7 +264,7 @@ mod tests {
             .map(|request| timing.exchange_us(request).expect("a request"));
         let longer =
             timing.frame_us(MessageType::ParamSet) - timing.frame_us(MessageType::ParamGet);
-        assert_eq!(set - get, longer + 900);
+        assert_eq!(set - get, longer + 880);
     }
 
     #[test]
@@ -282,7 +282,7 @@ mod tests {
         assert!((205..=243).contains(&apart), "{apart}");
         assert_eq!(
             timing.exchange_us(MessageType::Discover),
-            Some(150 + 100 + 8 * 420 + 20)
+            Some(150 + 120 + 8 * 420 + 20)
         );
     }
 

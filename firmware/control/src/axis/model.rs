@@ -158,8 +158,8 @@ impl AxisModel {
     /// Checks the data and computes the coefficients for a tick of `tick`.
     ///
     /// The speed law is scaled by two facts of the axis: the dead time T_d = 1.5 ticks + t_on + line, which bounds its
-    /// slope and damping, and the piston speed v_c that a choked outlet allows, which sets deceleration and top speed. The factors are
-    /// those of [`crate::tuning`].
+    /// slope and damping, and the piston speed v_c that a choked outlet allows, which sets deceleration and top speed.
+    /// The factors are those of [`crate::tuning`].
     ///
     /// Everything is computed in integers, as in the tick: every coefficient is within 0.1 % of the exact one, or a
     /// step of its format.

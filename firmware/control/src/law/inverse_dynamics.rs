@@ -5,7 +5,7 @@
 //! a_b' = max(200 mm/s², min(a_b, 0.7 F_left / m))        F_left = F_in − load   for e > 0, F_out + load otherwise
 //! v*   = v_r + curve(e, a_b')                            or the landing, on a first approach to a target that rests
 //! a*   = k(e) (v_r − v') + D (v* − v')                   within ± 7/2 a_b; half of it where patience is over and half is enough
-//! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*
+//! F*   = m a* + Fc sat(w / 10 mm/s) + d v* + ramp − load   w = v' if |v'| > 10 mm/s, otherwise v*; on a start 10 mm/s sgn v_r
 //! ```
 //!
 //! | | unit | |
@@ -15,9 +15,14 @@
 //! | T_r | s | dead time from this tick: one tick, t_on and the line |
 //! | curve, k(e), D, a_b | mm/s, 1/s, 1/s, mm/s² | speed as a function of the error and its slope, damping, deceleration: `switching_curve` |
 //! | F_in, F_out | mN | largest force that the supply can deliver, retracting and extending: available for braking |
-//! | load, Fc, d, m | mN, mN, mN s/mm, kg | as in [`crate::observer::motion`]; Fb instead of Fc while \|v\| < 3 mm/s; faded by `standstill` |
+//! | load, Fc, d, m | mN, mN, mN s/mm, kg | as in [`crate::observer::motion`]; Fb instead of Fc while \|v\| < 3 mm/s and on a start; faded by `standstill` |
 //! | sat(u) | 1 | u limited to ±1 |
 //! | ramp | mN | towards r: +5 Fb per second while \|v\| < 3 mm/s or stuck, and r rests; −41 % per period above 10 mm/s; at most F_out; unchanged in between, and while the valves are shut |
+//!
+//! **Start.** A piston that still stands where it rested (`standstill`), while the reference moves faster than 3 mm/s, is
+//! given all of its break-away friction in the direction of the reference. In proportion to the wanted speed the
+//! force would come only when the piston already lags: it takes a dead time, and at the break-away the reference of an
+//! S-curve gains 10 mm/s in 30 ms.
 //!
 //! Source: computed torque (Craig, Introduction to Robotics, ch. 10) on one axis; friction by Coulomb and viscous
 //! coefficients, with break-away friction while the piston stands (Armstrong-Hélouvry et al. 1994). The deceleration
@@ -42,11 +47,11 @@ use super::standstill::Standstill;
 use super::switching_curve::SpeedGains;
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
-use crate::math::{clip, mul_shr, mul_shr_sat, within};
+use crate::math::{along, clip, mul_shr, mul_shr_sat, within};
 use crate::observer::Observer;
 use crate::tuning::{
     ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED,
-    IMPATIENT_DIVISOR, RAMP_DECAY, REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED,
+    IMPATIENT_DIVISOR, RAMP_DECAY, REFERENCE_RESTS, SLIDING_SPEED, START_SPEED, STILL_SPEED,
 };
 
 /// Extra force on a stuck piston: it grows until the piston slips.
@@ -149,19 +154,24 @@ impl ForceDemand<'_> {
                 acceleration
             };
 
-        let full = rest.faded(if motion.speed.wrapping_abs() < STILL_SPEED {
+        // While it is not overcome, friction acts against the motion that is wanted, and it is the break-away friction:
+        // in proportion to the speed it would be fed forward too late, and the piston would start behind the reference.
+        let starts = rest.has_not_left() && reference_speed.wrapping_abs() > START_SPEED;
+        let full = rest.faded(if starts || motion.speed.wrapping_abs() < STILL_SPEED {
             model.breakaway
         } else {
             model.coulomb
         });
-        let along = if ahead.speed.wrapping_abs() > SLIDING_SPEED {
+        let direction = if starts {
+            along(FULL_FRICTION_SPEED << 16, reference_speed)
+        } else if ahead.speed.wrapping_abs() > SLIDING_SPEED {
             ahead.speed
         } else {
             wanted
         };
         // Proportional to speed up to that of full friction, 10 mm/s.
         let friction = mul_shr(
-            within(along, FULL_FRICTION_SPEED << 16),
+            within(direction, FULL_FRICTION_SPEED << 16),
             full / FULL_FRICTION_SPEED,
             16,
         )

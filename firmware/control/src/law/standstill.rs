@@ -21,6 +21,8 @@
 //! * **Landing.** On its first approach to a resting target the piston comes in as fast as friction can stop it
 //!   (`switching_curve`). The approach is over once the piston rests, or stands (slower than 3 mm/s towards the target)
 //!   or moves away within 24 bands of it. Each target more than one band from the last one allows another landing.
+//! * **Start.** A piston that has rested counts as standing there until it has moved by two bands, however fast it
+//!   yields on the spring of its friction (`inverse_dynamics`).
 //! * **Patience** counts up in each period within 24 bands of a resting target, and down in every other; it does not
 //!   count in REST. It is over after 100 periods (0.4 s). Then a heavy piston is given half the acceleration
 //!   (`inverse_dynamics`); between 132 and 260 periods the friction feed-forward fades; and from 220 on the band and
@@ -66,14 +68,14 @@
 
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
-use crate::math::{mul_shr, mul_shr_sat, square_root};
+use crate::math::{along, mul_shr, mul_shr_sat, square_root};
 use crate::observer::motion::Motion;
 use crate::tuning::{
     BAND_WIDEST, CATCH_SPEED, FADES_AFTER, FRICTION_STOPS, GENTLE_SPEED, NEAR_BANDS, NEAR_PERIODS,
     OSCILLATION_PERIODS_MAX, OSCILLATION_PERIODS_MIN, PATIENCE, PATIENCE_MOST, PAUSE_ENDS_BEYOND,
     PAUSE_SPENT, REFERENCE_RESTS, RELEASE_BEYOND_SIXTEENTHS, RELEASE_PERIODS, RELEASE_SIXTEENTHS,
-    RELEASE_WIDEST, REST_PERIODS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS, WIDENS_AFTER,
-    WIDENS_SHIFT,
+    RELEASE_WIDEST, REST_PERIODS, START_BANDS, STILL_SPEED, STOP_LEAST_SHIFT, STOP_ZONE_BANDS,
+    WIDENS_AFTER, WIDENS_SHIFT,
 };
 
 /// Periods in which the band widens by its own width.
@@ -95,16 +97,26 @@ pub(super) enum State {
     Press,
 }
 
+/// How far the approach to the present target has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+enum Arrival {
+    /// On the first approach, on which the piston may land by friction.
+    #[default]
+    First,
+    /// The piston has stood or moved away near the target: its first approach is over.
+    Over,
+    /// The piston has come to rest at the target.
+    Rested,
+}
+
 /// Rest at a target, and how long it has been attempted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Standstill {
     state: State,
     /// Raw mm.
     target: i32,
-    /// The target has changed, and the piston has not yet come to rest at the new one.
-    aimed: bool,
-    /// The piston has stood or moved away near the target: its first approach is over.
-    arrived: bool,
+    /// Begins anew with each new target.
+    arrival: Arrival,
     /// Periods near the target without coming to rest: patience is over beyond [`PATIENCE`].
     near: u16,
     /// The piston was in the band in the last period.
@@ -115,6 +127,8 @@ pub(super) struct Standstill {
     pause: u16,
     /// Periods outside the band of release.
     outside: u16,
+    /// Stroke at which the piston rested last, raw mm, until it has moved away from there.
+    rested_at: Option<i32>,
 }
 
 impl Standstill {
@@ -138,7 +152,12 @@ impl Standstill {
 
     /// Whether the piston rests at the present target.
     pub(super) const fn holds(&self) -> bool {
-        self.is_at_rest() && !self.aimed
+        self.is_at_rest() && self.has_rested()
+    }
+
+    /// Whether the piston has come to rest at the present target, and may have left it since.
+    const fn has_rested(&self) -> bool {
+        matches!(self.arrival, Arrival::Rested)
     }
 
     /// Whether the piston has been near its target without coming to rest for longer than patience allows.
@@ -153,7 +172,12 @@ impl Standstill {
 
     /// Whether the piston is on its first approach to the target, on which it may land by friction.
     pub(super) const fn may_land(&self) -> bool {
-        !self.arrived
+        matches!(self.arrival, Arrival::First)
+    }
+
+    /// Whether the piston still stands where it rested last.
+    pub(super) const fn has_not_left(&self) -> bool {
+        self.rested_at.is_some()
     }
 
     /// Takes over the reference. Returns whether it is a new target: more than one band from the last one.
@@ -163,8 +187,7 @@ impl Standstill {
             self.target = reference;
             self.near = 0;
             self.pause = 0;
-            self.aimed = true;
-            self.arrived = false;
+            self.arrival = Arrival::First;
         }
         other
     }
@@ -183,21 +206,21 @@ impl Standstill {
 
     const fn rest(&mut self) {
         self.state = State::Rest;
-        self.aimed = false;
-        self.arrived = true;
+        self.arrival = Arrival::Rested;
         self.outside = 0;
     }
 
     /// One period.
     pub(super) fn update(&mut self, model: &AxisModel, now: &Approach) {
         let reference_rests = now.reference_speed.wrapping_abs() <= REFERENCE_RESTS;
+        self.note_rest(model, now.motion.stroke);
         if self.is_at_rest() {
             if self.stays(model, now, reference_rests) {
                 return;
             }
             self.caught = 0;
             // A piston that has left its place has used up its patience; a new target gets a fresh one.
-            if !self.aimed {
+            if self.has_rested() {
                 self.near = self.near.max(PATIENCE);
             }
         }
@@ -213,12 +236,9 @@ impl Standstill {
         let error = ahead.saturating_abs();
         // A band is at most 5 mm, below 2^19; times up to 24 all of it fits.
         self.near = if error < model.band.wrapping_mul(NEAR_BANDS) {
-            let approaches = if ahead < 0 {
-                now.motion.speed.saturating_neg()
-            } else {
-                now.motion.speed
-            };
-            self.arrived |= approaches < STILL_SPEED;
+            if self.may_land() && along(now.motion.speed, ahead) < STILL_SPEED {
+                self.arrival = Arrival::Over;
+            }
             self.near.wrapping_add(1).min(patience_most())
         } else {
             self.near.saturating_sub(1)
@@ -244,6 +264,18 @@ impl Standstill {
         }
     }
 
+    /// Remembers where the piston rests, until it has moved by [`START_BANDS`].
+    fn note_rest(&mut self, model: &AxisModel, stroke: i32) {
+        // A band is at most 5 mm, below 2^19.
+        let far = model.band.wrapping_mul(START_BANDS);
+        let left = |from: i32| stroke.saturating_sub(from).saturating_abs() > far;
+        if self.is_at_rest() {
+            self.rested_at = Some(stroke);
+        } else if self.rested_at.is_some_and(left) {
+            self.rested_at = None;
+        }
+    }
+
     /// Whether a resting piston stays at rest.
     fn stays(&mut self, model: &AxisModel, now: &Approach, reference_rests: bool) -> bool {
         let band = self.band(model);
@@ -256,21 +288,20 @@ impl Standstill {
             .min(RELEASE_WIDEST.max(band.wrapping_add(beyond)));
         // The ground pushes a standing joint to and fro, so its release may be wide. A new target is a different
         // matter.
-        let release = if self.aimed {
-            release
-        } else {
+        let release = if self.has_rested() {
             release.max(model.release)
+        } else {
+            release
         };
         let away = now.reference.saturating_sub(now.measured).saturating_abs();
         if reference_rests && away <= release {
             self.outside = 0;
-            self.aimed = false;
-            self.arrived = true;
+            self.arrival = Arrival::Rested;
             return true;
         }
         self.outside = self.outside.wrapping_add(1);
         // A new target is not noise.
-        reference_rests && !self.aimed && self.outside < RELEASE_PERIODS
+        reference_rests && self.has_rested() && self.outside < RELEASE_PERIODS
     }
 
     /// Alternates between acting and waiting. Where acting alone has not brought the piston to rest for a long time,
@@ -372,8 +403,7 @@ impl Approach<'_> {
             return false;
         }
         let net = self.force.saturating_add(self.motion.load);
-        let along = if speed < 0 { net.saturating_neg() } else { net };
-        let stopping = mul_shr(model.coulomb, FRICTION_STOPS, 16).saturating_sub(along);
+        let stopping = mul_shr(model.coulomb, FRICTION_STOPS, 16).saturating_sub(along(net, speed));
         if stopping < model.coulomb >> STOP_LEAST_SHIFT {
             return false;
         }
@@ -381,11 +411,7 @@ impl Approach<'_> {
         let energy = i64::from(self.mass)
             .wrapping_mul(i64::from(speed).wrapping_mul(i64::from(speed)))
             .wrapping_shr(17);
-        let ahead = if speed < 0 {
-            error.saturating_neg()
-        } else {
-            error
-        };
+        let ahead = along(error, speed);
         let work = |distance: i32| i64::from(stopping).wrapping_mul(i64::from(distance));
         energy > work(ahead.saturating_sub(band)) && energy < work(ahead.saturating_add(band))
     }

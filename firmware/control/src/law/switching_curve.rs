@@ -54,7 +54,7 @@
 
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
-use crate::math::{cube_root, mul_shr, mul_shr_sat, quotient, square_root, within};
+use crate::math::{along, cube_root, mul_shr, mul_shr_sat, quotient, square_root, within};
 use crate::observer::motion::Inertia;
 use crate::tuning::{LANDING_FRICTION, MASS_MIN, SLOPE_LEAST};
 
@@ -110,20 +110,23 @@ impl SpeedGains {
     /// Speed towards the target, raw mm/s, and its slope over the error, 1/s × 2^8, for a deceleration of at most
     /// `brake` (mm/s²).
     pub(super) fn speed(&self, error: i32, brake: i32, top: i32) -> (i32, i32) {
-        // Half of e_l, a_b / (2 k²): from mm/s² × s² × 2^32 to raw mm.
-        let half = mul_shr_sat(brake, self.linear, 16);
+        let line_ends = self.line_ends(brake);
         let size = error.saturating_abs();
-        if size <= half.saturating_mul(2) || is_without(Part::Parabola) {
+        if size <= line_ends || is_without(Part::Parabola) {
             let line = mul_shr_sat(self.slope, error, 8);
             return (within(line, top), self.slope);
         }
-        let (speed, slope) = parabola(brake, size.saturating_sub(half));
-        let (speed, slope) = if speed >= top {
-            (top, 0)
+        let speed = parabola(brake, size.saturating_sub(line_ends >> 1));
+        if speed >= top {
+            (along(top, error), 0)
         } else {
-            (speed, slope)
-        };
-        (towards(error, speed), slope)
+            (along(speed, error), parabola_slope(brake, speed))
+        }
+    }
+
+    /// End of the straight line e_l = a_b / k², raw mm: twice `linear`, from mm/s² × s² × 2^32.
+    fn line_ends(&self, brake: i32) -> i32 {
+        mul_shr_sat(brake, self.linear, 15)
     }
 
     /// Speed towards the target on a first approach, raw mm/s: `curve`, that of [`Self::speed`] for the same error and
@@ -136,22 +139,20 @@ impl SpeedGains {
         curve: i32,
     ) -> i32 {
         let size = error.saturating_abs();
-        let line_ends = mul_shr_sat(brake, self.linear, 15);
-        if size <= model.band || size > line_ends || is_without(Part::Landing) {
+        if size <= model.band || size > self.line_ends(brake) || is_without(Part::Landing) {
             return curve;
         }
         let friction = inertia.acceleration(mul_shr(model.coulomb, LANDING_FRICTION, 16));
-        let (speed, _) = parabola(friction.min(brake >> 1), size);
-        towards(
-            error,
+        let speed = parabola(friction.min(brake >> 1), size);
+        along(
             speed.min(model.top_speed).max(curve.saturating_abs()),
+            error,
         )
     }
 }
 
-/// Speed, raw mm/s, from which this deceleration (mm/s²) stops the piston after `distance` (raw mm), and its slope over
-/// the distance, 1/s × 2^8.
-fn parabola(deceleration: i32, distance: i32) -> (i32, i32) {
+/// Speed, raw mm/s, from which this deceleration (mm/s²) stops the piston after `distance` (raw mm).
+fn parabola(deceleration: i32, distance: i32) -> i32 {
     // (32 v)² = 2 a e × 2^10; with raw e: × 2^11 / 2^16.
     let square = i64::from(deceleration)
         .wrapping_mul(distance.into())
@@ -159,17 +160,16 @@ fn parabola(deceleration: i32, distance: i32) -> (i32, i32) {
     let square = u32::try_from(square).unwrap_or(u32::MAX);
     // At most 65 536 / 32 mm/s: fits raw mm/s.
     let root = square_root(square).max(1) as i32;
-    let slope = deceleration.wrapping_shl(13).checked_div(root).unwrap_or(0);
-    (root.wrapping_shl(11), slope)
+    root.wrapping_shl(11)
 }
 
-/// A speed with the sign of the error.
-const fn towards(error: i32, speed: i32) -> i32 {
-    if error < 0 {
-        speed.wrapping_neg()
-    } else {
-        speed
-    }
+/// Slope of this parabola over the distance where its speed is `speed` (raw mm/s), a / v, 1/s × 2^8.
+fn parabola_slope(deceleration: i32, speed: i32) -> i32 {
+    // Times 2^24 in two halves: a deceleration below 2^18 times 2^13 fits, and a speed is a multiple of 2^11.
+    deceleration
+        .wrapping_shl(13)
+        .checked_div(speed.wrapping_shr(11))
+        .unwrap_or(0)
 }
 
 #[cfg(test)]

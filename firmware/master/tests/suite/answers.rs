@@ -66,7 +66,7 @@ fn a_request_is_sent_until_its_deadline_and_not_after_it() {
             command: Command::OpenAllValves { joint: 3 },
         };
         let ticket = rig.master.submit_request(request, rig.now_us).unwrap();
-        // The first opportunity to ask is 3.6 ms after the start of the cycle.
+        // The first opportunity to ask is 3.62 ms after the start of the cycle.
         rig.cycle();
         let opened = rig.node(3).requests.iter();
         let opened = opened.filter(|m| matches!(m, Message::OpenAllValves(_)));

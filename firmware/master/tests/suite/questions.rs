@@ -386,7 +386,7 @@ fn a_board_that_babbles_in_its_slot_is_named_and_one_that_is_silent_is_not_accus
             rig.cycle();
             if rubbish {
                 // The guard cuts it off at the end of its slot.
-                let end = start + 1_020 + 100 + 4 * 310 + 310;
+                let end = start + 1_020 + 120 + 4 * 310 + 310;
                 rig.master.on_bus_bytes(&[0x5A; 31], end);
             }
         }

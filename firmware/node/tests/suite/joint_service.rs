@@ -5,7 +5,7 @@ use crate::common::{ARM, decode, frame, frame_from, refusal};
 use wheeleg_node::FIRMWARE_VERSION;
 use wheeleg_node::mode::Mode;
 use wheeleg_protocol::LinkLossAction::Hold;
-use wheeleg_protocol::link::SlotTiming;
+use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::param::JointParam;
 use wheeleg_protocol::{
     Address, BoardKind, Disarm, Identify, InputBits, Message, MessageType, NackReason, ParamGet,
@@ -178,7 +178,7 @@ fn answers_start_after_the_turnaround() {
     let answer = rig
         .send(&Message::TransmitPosition(TransmitPosition {}), 77)
         .unwrap();
-    assert_eq!(answer.start_at, Micros(rig.now + 100));
+    assert_eq!(answer.start_at, Micros(rig.now + TURNAROUND_US));
     let (envelope, Message::Position(position)) = decode(&answer) else {
         panic!();
     };

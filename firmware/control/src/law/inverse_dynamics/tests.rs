@@ -83,6 +83,67 @@ fn friction_is_fed_forward_in_proportion_up_to_ten_mm_s() {
     }
 }
 
+/// From rest, all of break-away friction is fed forward as soon as the reference moves at more than 3 mm/s, in its
+/// direction; a piston that has not rested, or has left its place, gets it in proportion to the speed.
+#[test]
+fn a_start_from_rest_begins_with_all_of_the_break_away_friction() {
+    let model = model();
+    // The demand of a piston at 90 mm that stands, was moved by so much after its rest, if any, and is back.
+    let demand = |rests: bool, moved_mm: i32, wanted: i32| {
+        let mut law = Predictive::new(&model);
+        law.observer.start_at(90 << 16);
+        let see = |law: &mut Predictive, reference_speed: i32| {
+            let now = Approach {
+                reference: 90 << 16,
+                reference_speed,
+                measured: 90 << 16,
+                motion: &law.observer.motion,
+                force: 0,
+                mass: model.mass,
+            };
+            law.standstill.update(&model, &now);
+        };
+        for _ in 0..if rests { 20 } else { 0 } {
+            see(&mut law, 0);
+        }
+        assert_eq!(law.standstill.is_at_rest(), rests);
+        for mm in [0, moved_mm, 0] {
+            law.observer.motion.stroke = (90 + mm) << 16;
+            see(&mut law, wanted << 16);
+        }
+        let demand = ForceDemand {
+            reference: 90 << 16,
+            reference_speed: wanted << 16,
+            observer: &law.observer,
+            ahead: PredictedState {
+                stroke: 90 << 16,
+                speed: 0,
+            },
+            gains: &law.gains,
+        };
+        demand.force(&model, law.ramp, &law.standstill)
+    };
+    for (rests, moved_mm, wanted, starts) in [
+        (true, 0, 4, true),
+        (true, 0, -4, true),
+        (true, 0, 2, false),
+        (false, 0, 4, false),
+        (true, 1, 4, false),
+    ] {
+        let found = demand(rests, moved_mm, wanted) - demand(false, 0, wanted);
+        // Break-away friction is 15 N; in proportion, a tenth of it for each mm/s.
+        let lead = f64::from(wanted) * f64::from(model.dead_time_reference) / 2_f64.powi(32);
+        let gains = SpeedGains::new(&model, model.mass);
+        let speed = f64::from(wanted) + lead * f64::from(gains.slope) / 256.0;
+        let more = f64::from(wanted.signum()) * 15e3 - 1.5e3 * speed;
+        let expected = if starts { more } else { 0.0 };
+        assert!(
+            (f64::from(found) - expected).abs() < 100.0,
+            "{rests} {moved_mm} {wanted}: {found} {expected}"
+        );
+    }
+}
+
 /// The less force a load leaves for braking, the slower the approach, but it never stops; the acceleration is limited.
 #[test]
 fn what_a_load_leaves_for_braking_slows_the_approach() {

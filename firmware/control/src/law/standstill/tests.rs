@@ -102,6 +102,31 @@ fn rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_ta
     assert_eq!(moved.state, State::Servo);
 }
 
+/// Two bands are 0.24 mm. A piston that has left its place and is back has not come to rest.
+#[test]
+fn a_start_lasts_until_the_piston_has_moved_by_two_bands() {
+    let start = |strokes: &[i32]| {
+        let mut standstill = aimed();
+        assert!(!standstill.has_not_left());
+        states(&mut standstill, 0, 0, 10);
+        for off in strokes {
+            seen(*off, 0, |now| {
+                let now = Approach {
+                    reference_speed: 5 << 16,
+                    ..*now
+                };
+                standstill.update(&model(), &now);
+            });
+        }
+        standstill.has_not_left()
+    };
+    for side in [-1, 1] {
+        assert!(start(&[0, 23 * side]));
+        assert!(!start(&[0, 25 * side]));
+        assert!(!start(&[0, 25 * side, 0]));
+    }
+}
+
 /// The first approach to a target ends where the piston stands or turns near it, on either side, and nowhere else; a
 /// new target allows another landing.
 #[test]
