@@ -51,7 +51,7 @@ fn nominal(axis: &str, kind: Kind, motion: Move, seed: u64) -> Figures {
         .play(kind, motion)
         .expect("runs")
         .expect("no load is feasible");
-    let figures = Figures::of(motion, &played, None);
+    let figures = Figures::of(motion, &played);
     let name = case.id(kind, motion);
     assert_eq!(
         (figures.faults.as_str(), figures.stopped),
@@ -216,7 +216,7 @@ fn off_the_bench_axis_few_combinations_miss() {
             let variation = Variation::Combination(number);
             let case = Case::new(name, &sheet, variation, 1).expect("runs");
             let played = case.play(Kind::Predictive, Move::Step100).expect("runs");
-            let f = Figures::of(Move::Step100, &played.expect("feasible"), None);
+            let f = Figures::of(Move::Step100, &played.expect("feasible"));
             let holds = f.steady_error_mm.is_some_and(|mm| mm.abs() <= 0.5)
                 && f.overshoot_mm.is_some_and(|mm| mm <= 6.0)
                 && f.limit_cycle == Some(false)

@@ -4,7 +4,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
 use wheeleg_config::AxisConfig;
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_studies::axis_sim::suite::{Factors, StartUp, TestRig, designed};
+use wheeleg_studies::axis_sim::suite::{Factors, StartUp, TestRig, designed, draw_start};
 use wheeleg_studies::axis_sim::valve_resolution::{COARSE, ValveResolution};
 use wheeleg_studies::axis_sim::{Kind, Metrics};
 
@@ -103,7 +103,7 @@ pub(crate) fn played(sheet: &AxisParams, which: u64) -> Outcome {
     let wait_ms = if std::env::var_os(VENTED_VARIABLE).is_some() {
         0
     } else {
-        Factors::draw_start(&mut plant, which).expect("holds")
+        draw_start(&mut plant, which).expect("holds")
     };
     let (kind, start) = (Kind::Predictive, StartUp::Identified);
     let design = designed(sheet, &plant, kind, start, which).expect("runs");

@@ -113,11 +113,26 @@ fn a_comparison_that_is_interrupted_has_the_cases_that_were_played() {
 }
 
 #[test]
-fn a_comparison_that_is_interrupted_while_it_looks_for_bounds_has_no_case() {
-    let arguments = ["compare", "--axis", "bench-vq110u"];
-    let (summary, _folder) = interrupted("compare", &arguments, Duration::from_millis(300));
-    assert_eq!(summary["stopped"]["done"], 0);
-    assert_eq!(summary["cases"], serde_json::json!([]));
+fn a_comparison_that_was_interrupted_goes_on_to_the_results_of_a_whole_one() {
+    let arguments = ["compare", "--axis", "bench-vq110u", "--quick"];
+    let law = ["--controller", "predictive", "--move", "s-curve"];
+    let arguments = [&arguments[..], &law, &["--combinations", "300"]].concat();
+    let (stopped, folder) = interrupted("compare", &arguments, Duration::from_secs(2));
+    let out = folder.path().join("out");
+    let again = end(start(&out, &arguments, Stdio::piped));
+    assert_eq!(again.status.code(), Some(0));
+    let whole = folder.path().join("whole");
+    assert_eq!(
+        end(start(&whole, &arguments, Stdio::piped)).status.code(),
+        Some(0)
+    );
+    let all = fs::read(whole.join("summary.json")).expect("a summary");
+    assert_eq!(fs::read(out.join("summary.json")).expect("a summary"), all);
+    // What was played before the signal was not played again.
+    let done = stopped["stopped"]["done"].as_u64().expect("a number");
+    assert!(done > 0);
+    let table = |folder: &Path| fs::read(folder.join("csv/cases.csv")).expect("a table");
+    assert_eq!(table(&out), table(&whole));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! computes a shard of them into a folder of part files ([`Store`]), [`merge`] combines the parts into one
 //! table, [`report`] writes a page, and [`replay`] repeats one case in full.
 //!
-//! The [`field`] tests are such a campaign, with a page of their own.
+//! The [`field`] tests and the comparison of controllers ([`compare`]) are such campaigns, with pages of their own.
 //!
 //! There is no scheduler here. A shard is a process that anybody may start, kill and start again.
 //!
@@ -25,6 +25,7 @@ mod attempts;
 mod cases;
 mod causes;
 mod columns;
+pub mod compare;
 mod compute;
 mod draw;
 mod error;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use wheeleg_config::bench::{Air, Kind, Move, StartUp};
+use wheeleg_config::bench::{Air, Kind, Move, StartUp, Variation, Varied};
 use wheeleg_config::plan::{Plan, Resolver, Sources, Value};
 
 const HEAD: &str = "name = \"test\"\nroot = 1\n";
@@ -23,7 +23,8 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
          [factor.move]\nparameter = \"move\"\ngrid = [\"hold\", \"sine\"]\n\
          [factor.law]\nparameter = \"controller\"\nchoice = {{ values = [\"predictive\"] }}\n\
          [factor.axis]\nparameter = \"axis\"\ngrid = [\"bench-vq110u\", \"small-12x50\"]\n\
-         [factor.load]\nparameter = \"load_share\"\nuniform = {{ min = -0.1, max = 0.5 }}\n"
+         [factor.load]\nparameter = \"load_share\"\nuniform = {{ min = -0.1, max = 0.5 }}\n\
+         [factor.variation]\nparameter = \"variation\"\ngrid = [\"friction=2\", \"drawn\"]\n"
     ));
     let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
     let text = |text: &str| Value::Text(text.to_owned());
@@ -32,6 +33,7 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
         text("predictive"),
         text("small-12x50"),
         Value::Number(0.5),
+        text("friction=2"),
     ];
     let case = Resolver::new(&plan).expect("read").resolve(&values);
     let bench = case
@@ -56,6 +58,27 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
         )
     );
     assert_eq!(bench.axis, "small-12x50");
+    assert_eq!(bench.variation, Varied::Always(Variation::Friction(2.0)));
+}
+
+/// A variation is content of a case, and a case without one has the content that it had before there were any.
+#[test]
+fn a_variation_is_part_of_a_case_and_none_is_no_part() {
+    let content = |line: &str| {
+        let plan = plan(&format!("{HEAD}{BASE}{line}")).unwrap_or_else(|told| panic!("{told:#?}"));
+        let case = Resolver::new(&plan).expect("read").resolve(&[]);
+        case.expect("it can be").on_bench().expect("a cylinder")
+    };
+    let none = content("");
+    assert_eq!(none.bench.variation, Varied::Always(Variation::Nominal));
+    assert_eq!(none.bench_json.get("variation"), None);
+    assert_eq!(
+        content("variation = \"nominal\"\n").bench_json,
+        none.bench_json
+    );
+    let drawn = content("variation = \"drawn\"\n");
+    assert_eq!(drawn.bench.variation, Varied::Drawn);
+    assert_eq!(drawn.bench_json["variation"], "drawn");
 }
 
 /// Each mistake with the field, its value and what is allowed.
@@ -82,6 +105,22 @@ fn mistakes_are_told() {
         (
             format!("{HEAD}{BASE}load_share = 2.0\n"),
             "`base.load_share` = 2 is out of range: allowed -0.95 to 0.95",
+        ),
+        (
+            format!("{HEAD}{BASE}variation = \"wind=2\"\n"),
+            "`base.variation`: `wind=2` is not a variation: nominal, load=SHARE (-0.95 to 0.95)",
+        ),
+        (
+            factor("parameter = \"variation\"\ngrid = [\"friction=20\"]\n"),
+            "`factor.x` = friction=20: `friction=20` is not a variation",
+        ),
+        (
+            factor("parameter = \"variation\"\ngrid = [\"supply-change=-10\"]\n"),
+            "supply.set_pressure",
+        ),
+        (
+            factor("parameter = \"variation\"\ngrid = [2.0]\n"),
+            "its values must be names",
         ),
         (
             format!("{HEAD}[base]\naxis = \"bench\"\n"),

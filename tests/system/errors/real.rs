@@ -18,7 +18,7 @@ use wheeleg_report::plot::ensure_png;
 use wheeleg_scene::urdf;
 use wheeleg_sim::{Boards, Session, SimError};
 use wheeleg_studies::StudyError;
-use wheeleg_studies::axis_sim::suite::{Factors, TestRig};
+use wheeleg_studies::axis_sim::suite::{TestRig, draw_start};
 use wheeleg_studies::axis_sim::{Kind, Node, design, plant_check};
 use wheeleg_studies::check::vectors::check_text;
 use wheeleg_studies::identify::lab::Lab;
@@ -252,7 +252,7 @@ fn axes(all: &mut Vec<Driven>) {
     all.push(("AxisSimError::Unphysical", Box::new(exploded), words));
     let mut empty = axis();
     empty.supply.initial_pressure_pa = 9e4;
-    let without = Factors::draw_start(&mut empty, 1).expect_err("no air");
+    let without = draw_start(&mut empty, 1).expect_err("no air");
     let words = vec!["`supply.initial_pressure` (90000 Pa)"];
     all.push(("AxisSimError::Start", Box::new(without), words));
     let mut turned = plan;

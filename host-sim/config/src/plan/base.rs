@@ -1,7 +1,7 @@
 //! What every case starts from: a robot in a scenario, or a cylinder on the bench.
 
 use super::TOP;
-use crate::bench::{Air, Kind, LOAD_SHARES, Move, StartUp};
+use crate::bench::{Air, Kind, LOAD_SHARES, Move, StartUp, Variation, Varied};
 use crate::quantity::pretty;
 use crate::reader::{Entry, Reader};
 
@@ -34,6 +34,8 @@ pub struct AxisBase {
     pub air: Air,
     /// Force on the rod in addition to the axis's, as a share of the force left; positive extends.
     pub load_share: f64,
+    /// How the plant is off its data sheet, in a word.
+    pub variation: Varied,
 }
 
 /// A key of `[base]`, which a factor may set, too.
@@ -55,11 +57,13 @@ pub enum Setting {
     Air,
     /// Force on the rod, as a share of the force left.
     LoadShare,
+    /// How the plant is off its data sheet, in a word.
+    Variation,
 }
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Scenario,
         Self::Robot,
         Self::Axis,
@@ -68,6 +72,7 @@ impl Setting {
         Self::Delays,
         Self::Air,
         Self::LoadShare,
+        Self::Variation,
     ];
 
     /// Its key.
@@ -82,6 +87,7 @@ impl Setting {
             Self::Delays => "delays",
             Self::Air => "air",
             Self::LoadShare => "load_share",
+            Self::Variation => "variation",
         }
     }
 
@@ -97,11 +103,13 @@ impl Setting {
         matches!(self, Self::Scenario | Self::Robot | Self::Axis)
     }
 
-    /// The names that it may have; none of a file or a number.
+    /// The names that it may have; none of a file, a number, or words with a number in them.
     #[must_use]
     pub fn names(self) -> Vec<&'static str> {
         match self {
-            Self::Scenario | Self::Robot | Self::Axis | Self::LoadShare => Vec::new(),
+            Self::Scenario | Self::Robot | Self::Axis | Self::LoadShare | Self::Variation => {
+                Vec::new()
+            }
             Self::Move => Move::ALL.map(Move::name).to_vec(),
             Self::Controller => Kind::ALL.map(Kind::name).to_vec(),
             Self::Delays => StartUp::ALL.map(StartUp::name).to_vec(),
@@ -127,6 +135,7 @@ impl Base {
                 (Setting::Delays, base.delays.name().to_owned()),
                 (Setting::Air, base.air.name().to_owned()),
                 (Setting::LoadShare, pretty(base.load_share)),
+                (Setting::Variation, base.variation.to_string()),
             ],
         }
     }
@@ -229,6 +238,18 @@ fn axis(r: &mut Reader, entry: &Entry) -> Option<AxisBase> {
             share
         }
     };
+    let variation = match entry.get("variation") {
+        None => Some(Varied::Always(Variation::Nominal)),
+        Some((span, _)) => {
+            let word = r.text(entry, "variation")?;
+            let variation = word.parse();
+            if let Err(unknown) = &variation {
+                let message = format!("`base.variation`: {unknown}");
+                r.problem(Some(span), message, "no variation", None);
+            }
+            variation.ok()
+        }
+    };
     Some(AxisBase {
         axis: file?,
         motion: motion?,
@@ -236,6 +257,7 @@ fn axis(r: &mut Reader, entry: &Entry) -> Option<AxisBase> {
         delays: delays?,
         air: air?,
         load_share: load_share?,
+        variation: variation?,
     })
 }
 

@@ -61,7 +61,7 @@ fn is_of_base(r: &mut Reader, plan: &Plan, factor: &Factor) -> bool {
     let (base, allowed) = match on_bench {
         true => (
             "a cylinder on the bench (`base.axis`)",
-            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`",
+            "allowed are `axis.…`, `plant.…`, and `axis`, `move`, `controller`, `delays`, `air`, `load_share`, `variation`",
         ),
         false => (
             "a robot in a scenario (`base.scenario`)",

@@ -11,7 +11,9 @@ use super::base::{AxisBase, Base, Setting, ensure_load_share};
 use super::factor::{Factor, Part, Sets};
 use super::field::{Template, set};
 use super::value::Value;
-use crate::bench::{Air, Bench, Deviation, Kind, Move, StartUp};
+use crate::bench::{
+    Air, Bench, Deviation, Kind, Move, StartUp, UnknownVariation, Variation, Varied,
+};
 use crate::error::{ConfigError, Problem};
 use crate::overlay;
 use crate::params::ParameterInfo;
@@ -286,6 +288,13 @@ impl<'a> Resolver<'a> {
             _ => base.load_share,
         };
         ensure_load_share(load_share).map_err(|told| not_possible("load_share", told, None))?;
+        let variation = match chosen(Setting::Variation) {
+            Some(word) => varied(&word.to_string())?,
+            None => base.variation,
+        };
+        if let Varied::Always(variation) = variation {
+            variation.ensure_possible(&sheet)?;
+        }
         let bench = Bench {
             axis: sheet.name.clone(),
             motion: named(factors, Setting::Move, base.motion, Move::of_name)?,
@@ -295,10 +304,10 @@ impl<'a> Resolver<'a> {
             sheet: sheet.axis.clone(),
             plant: plant.axis.clone(),
             deviations: Deviation::all(&sheet.parameters, &plant.parameters),
+            variation,
             load_share,
         };
-        Ok(OnBench {
-            bench_json: json!({
+        let mut bench_json = json!({
                 "name": sheet.name,
                 "axis": parameters_json(&sheet.parameters),
                 "plant": parameters_json(&plant.parameters),
@@ -307,9 +316,12 @@ impl<'a> Resolver<'a> {
                 "delays": bench.delays.name(),
                 "air": bench.air.name(),
                 "load_share": load_share,
-            }),
-            bench,
-        })
+        });
+        // Cases that have none keep the identities that they had before there were any.
+        if bench.variation != Varied::Always(Variation::Nominal) {
+            bench_json["variation"] = json!(bench.variation.to_string());
+        }
+        Ok(OnBench { bench, bench_json })
     }
 
     fn known(&self, kept: Kept, name: &str) -> Result<&Template, ConfigError> {
@@ -398,6 +410,12 @@ fn named<T>(
             help.map(|word| format!("did you mean \"{word}\"?")),
         )
     })
+}
+
+/// The variation of a word.
+fn varied(word: &str) -> Result<Varied, ConfigError> {
+    let unknown = |e: UnknownVariation| not_possible("variation", e.to_string(), None);
+    word.parse().map_err(unknown)
 }
 
 fn not_possible(key: &str, told: String, help: Option<String>) -> ConfigError {

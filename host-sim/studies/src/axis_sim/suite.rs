@@ -1,4 +1,4 @@
-//! The experiments of the comparison: moves, factors, combinations, delays.
+//! The experiments of the comparison: moves, start-up, delays.
 //!
 //! Every experiment is a function of an axis's data sheet, a controller and a seed. The controller's gains
 //! come only from the data sheet; a factor changes only the plant. [`identify`] may find the valves' delays
@@ -6,163 +6,48 @@
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64Mcg;
-use serde::Serialize;
-pub use wheeleg_config::bench::StartUp;
+pub use wheeleg_config::bench::{Factors, StartUp, force_left_n, weaker_force_n};
 use wheeleg_plant::axis::AxisParams;
-use wheeleg_plant::sensors::AdcNoise;
 
 pub use super::error::AxisSimError;
 use super::{AxisSim, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
 use super::{design, design_with, identify};
 
-/// Deviations from the data sheet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Factors {
-    /// Force on the rod as a share of the force left at the actual supply on the
-    /// weaker side, −0.8…0.8; positive extends.
-    pub load_share: f64,
-    /// Moving mass \[kg\]; `None` leaves the sheet's.
-    pub mass_kg: Option<f64>,
-    /// Supply pressure \[Pa gauge\]; `None` leaves the sheet's.
-    pub supply_pa: Option<f64>,
-    /// Factor on all friction forces.
-    pub friction: f64,
-    /// Factor on the valves' switching times.
-    pub valve_delay: f64,
-    /// Spread between the valves: fill A and vent B switch slower by this share,
-    /// vent A and fill B faster.
-    pub valve_spread: f64,
-    /// Factor on the converter's noise.
-    pub noise: f64,
-}
-
-impl Factors {
-    /// Nothing differs.
-    pub const NONE: Self = Self {
-        load_share: 0.0,
-        mass_kg: None,
-        supply_pa: None,
-        friction: 1.0,
-        valve_delay: 1.0,
-        valve_spread: 0.0,
-        noise: 1.0,
+/// Draws the unknowns of a board at power-up by a number: both chamber pressures between the atmosphere
+/// and the supply, such that with the load the piston stands within half of its friction. Returns the
+/// tick of the law's period in which the first move falls, 0…3.
+///
+/// # Errors
+/// [`AxisSimError::Start`] if there are no such pressures.
+pub fn draw_start(plant: &mut AxisParams, number: u64) -> Result<u64, AxisSimError> {
+    let mut rng = Pcg64Mcg::seed_from_u64(number ^ 0x57A2_7000);
+    let (low, high) = (
+        plant.gas.ambient_pressure_pa,
+        plant.supply.initial_pressure_pa,
+    );
+    let load_n = plant.load_n;
+    let cylinder = &mut plant.cylinder;
+    let circle = |d_m: f64| std::f64::consts::FRAC_PI_4 * d_m * d_m;
+    let (bore, rod) = (circle(cylinder.bore_m), circle(cylinder.rod_m));
+    let none = AxisSimError::Start {
+        ambient_pa: low,
+        supply_pa: high,
+        load_n,
     };
-
-    /// One combination of the random suite: load ±0.8, mass 2/3 to 16/3 of the
-    /// sheet's, supply from 2 bar below to 1 bar above the sheet's, friction and
-    /// valve delay 0.5…2; mass, friction and delay uniform in their logarithm.
-    #[must_use]
-    pub fn random(sheet: &AxisParams, seed: u64) -> Self {
-        let gauge = sheet.supply.set_pressure_pa - sheet.gas.ambient_pressure_pa;
-        let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let mut unit = || rng.random_range(0.0..1.0_f64);
-        Self {
-            load_share: 0.8 * (2.0 * unit() - 1.0),
-            mass_kg: Some(sheet.moving_mass_kg * 2.0 / 3.0 * 8.0_f64.powf(unit())),
-            supply_pa: Some(gauge + 1e5 * (3.0 * unit() - 2.0)),
-            friction: 2.0_f64.powf(2.0 * unit() - 1.0),
-            valve_delay: 2.0_f64.powf(2.0 * unit() - 1.0),
-            ..Self::NONE
+    if low >= high {
+        return Err(none);
+    }
+    for _ in 0..1000 {
+        let a_pa = rng.random_range(low..high);
+        let net_n = 0.5 * cylinder.friction.coulomb_n * rng.random_range(-1.0..1.0);
+        let b_pa = (a_pa * bore - low * rod + load_n - net_n) / (bore - rod);
+        if (low..=high).contains(&b_pa) {
+            cylinder.initial_pressure_a_pa = a_pa;
+            cylinder.initial_pressure_b_pa = b_pa;
+            return Ok(rng.random_range(0..4));
         }
     }
-
-    /// The plant with these factors.
-    #[must_use]
-    pub fn plant(&self, sheet: &AxisParams) -> AxisParams {
-        let mut p = sheet.clone();
-        if let Some(mass) = self.mass_kg {
-            p.moving_mass_kg = mass;
-        }
-        if let Some(gauge) = self.supply_pa {
-            let absolute = gauge + p.gas.ambient_pressure_pa;
-            p.supply.set_pressure_pa = absolute;
-            p.supply.initial_pressure_pa = absolute;
-            p.supply.source_pressure_pa = p.supply.source_pressure_pa.max(absolute + 1e5);
-        }
-        let f = &mut p.cylinder.friction;
-        f.coulomb_n *= self.friction;
-        f.static_n *= self.friction;
-        f.viscous_n_s_m *= self.friction;
-        for (spread, sign) in p
-            .cylinder
-            .timing_spread
-            .iter_mut()
-            .zip([1.0, -1.0, -1.0, 1.0])
-        {
-            *spread *= self.valve_delay * (1.0 + sign * self.valve_spread);
-        }
-        match &mut p.adc.noise {
-            AdcNoise::Uniform {
-                half_width_lsb: width,
-            }
-            | AdcNoise::Gaussian { sigma_lsb: width } => {
-                *width *= self.noise;
-            }
-            AdcNoise::None => {}
-        }
-        p.load_n += self.load_share * force_left_n(&p);
-        p
-    }
-
-    /// Draws the unknowns of a board at power-up by a number: both chamber pressures between the atmosphere
-    /// and the supply, such that with the load the piston stands within half of its friction. Returns the
-    /// tick of the law's period in which the first move falls, 0…3.
-    ///
-    /// # Errors
-    /// [`AxisSimError::Start`] if there are no such pressures.
-    pub fn draw_start(plant: &mut AxisParams, number: u64) -> Result<u64, AxisSimError> {
-        let mut rng = Pcg64Mcg::seed_from_u64(number ^ 0x57A2_7000);
-        let (low, high) = (
-            plant.gas.ambient_pressure_pa,
-            plant.supply.initial_pressure_pa,
-        );
-        let load_n = plant.load_n;
-        let cylinder = &mut plant.cylinder;
-        let circle = |d_m: f64| std::f64::consts::FRAC_PI_4 * d_m * d_m;
-        let (bore, rod) = (circle(cylinder.bore_m), circle(cylinder.rod_m));
-        let none = AxisSimError::Start {
-            ambient_pa: low,
-            supply_pa: high,
-            load_n,
-        };
-        if low >= high {
-            return Err(none);
-        }
-        for _ in 0..1000 {
-            let a_pa = rng.random_range(low..high);
-            let net_n = 0.5 * cylinder.friction.coulomb_n * rng.random_range(-1.0..1.0);
-            let b_pa = (a_pa * bore - low * rod + load_n - net_n) / (bore - rod);
-            if (low..=high).contains(&b_pa) {
-                cylinder.initial_pressure_a_pa = a_pa;
-                cylinder.initial_pressure_b_pa = b_pa;
-                return Ok(rng.random_range(0..4));
-            }
-        }
-        Err(none)
-    }
-
-    /// Force left over the load: 1.25 means a quarter more than the load needs.
-    #[must_use]
-    pub fn static_margin(&self, sheet: &AxisParams) -> f64 {
-        let p = self.plant(sheet);
-        force_left_n(&p) / p.load_n.abs().max(1e-9)
-    }
-}
-
-/// Force at the supply of a plant on the weaker side, less break-away friction under that pressure \[N\].
-#[must_use]
-pub fn force_left_n(p: &AxisParams) -> f64 {
-    let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
-    weaker_force_n(p) - p.cylinder.friction.under_pressure(gauge).static_n
-}
-
-/// Force at the supply of a plant on the weaker side \[N\].
-#[must_use]
-pub fn weaker_force_n(p: &AxisParams) -> f64 {
-    let c = &p.cylinder;
-    let area = std::f64::consts::FRAC_PI_4 * (c.bore_m * c.bore_m - c.rod_m * c.rod_m);
-    let gauge = p.supply.set_pressure_pa - p.gas.ambient_pressure_pa;
-    gauge * area
+    Err(none)
 }
 
 /// The design of a controller that knows the sheet of its plant and, after [`StartUp::Identified`], the

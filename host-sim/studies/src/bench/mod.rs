@@ -5,12 +5,13 @@ mod files;
 mod targets;
 
 use serde::Serialize;
-use wheeleg_config::bench::{Air, Bench, Deviation};
+use wheeleg_config::bench::{Air, Bench, Deviation, StartUp};
 
 pub use files::{BenchFault, BenchSummary, write};
-pub use targets::{targets, unmeasured};
+pub use targets::{FOUND_DELAY, targets, unmeasured};
 
-use crate::axis_sim::suite::{AxisSimError, Factors, designed, force_left_n};
+use crate::axis_sim::suite::{AxisSimError, draw_start, force_left_n};
+use crate::axis_sim::{design, design_with, identify};
 use crate::compare::{Played, play_from_power_up};
 
 /// A case that was played.
@@ -20,6 +21,8 @@ pub struct PlayedBench {
     pub played: Played,
     /// Force left over the load at rest; 1.25 means a quarter more than the load needs. At most [`NO_LOAD`].
     pub margin: f64,
+    /// Opening delay of the valves that the board searched for and found, s.
+    pub found_delay_s: Option<f64>,
     /// Time from power-up to the end, s, without the search for the valves' delays.
     pub simulated_s: f64,
 }
@@ -27,23 +30,33 @@ pub struct PlayedBench {
 /// Margin of a cylinder without a load.
 pub const NO_LOAD: f64 = 1e3;
 
-/// Plays a case. The seed makes the noise of the converter, and the air where that is unknown.
+/// Plays a case. The seed makes the noise of the converter, the air where that is unknown, and the random
+/// combination where the variation is drawn.
 ///
 /// # Errors
 /// [`AxisSimError`] if plant or board refuse their data, or the plant leaves the range of its model.
 pub fn play(bench: &Bench, seed: u64) -> Result<PlayedBench, AxisSimError> {
-    let mut plant = bench.plant.clone();
+    let factors = bench.variation.of_seed(seed).factors(&bench.sheet);
+    let mut plant = factors.plant(&bench.plant);
     let left_n = force_left_n(&plant);
     plant.load_n += bench.load_share * left_n;
     let wait_ms = match bench.air {
         Air::File => 0,
-        Air::Unknown => Factors::draw_start(&mut plant, seed)?,
+        Air::Unknown => draw_start(&mut plant, seed)?,
     };
-    let design = designed(&bench.sheet, &plant, bench.controller, bench.delays, seed)?;
+    let found = match bench.delays {
+        StartUp::Sheet => None,
+        StartUp::Identified => identify(&plant, &bench.sheet, seed)?,
+    };
+    let design = match bench.delays {
+        StartUp::Sheet => design(&bench.sheet, bench.controller),
+        StartUp::Identified => design_with(&bench.sheet, found, bench.controller),
+    };
     let plants = [&bench.sheet, &plant];
     let played = play_from_power_up(bench.motion, plants, &design, seed, wait_ms)?;
     Ok(PlayedBench {
         margin: (left_n / plant.load_n.abs().max(1e-9)).min(NO_LOAD),
+        found_delay_s: found.map(|delays| delays.t_on_s),
         simulated_s: (played.ticks + wait_ms) as f64 * 1e-3,
         played,
     })
@@ -65,6 +78,8 @@ pub struct About {
     pub air: &'static str,
     /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
     pub load_share: f64,
+    /// Variation of the plant, as `wheeleg compare` names it; `nominal` without one.
+    pub variation: String,
     /// Where the plant is not as the data sheet says.
     pub deviations: Vec<Deviation>,
     /// Seed, a whole number as text: JSON numbers are exact only up to 2^53.
@@ -75,6 +90,9 @@ impl About {
     /// Of a case.
     #[must_use]
     pub fn of(bench: &Bench, seed: u64) -> Self {
+        let variation = bench.variation.of_seed(seed);
+        let mut deviations = bench.deviations.clone();
+        deviations.extend(variation.deviations(&bench.sheet));
         Self {
             axis: bench.axis.clone(),
             controller: bench.controller.name(),
@@ -82,7 +100,8 @@ impl About {
             delays: bench.delays.name(),
             air: bench.air.name(),
             load_share: bench.load_share,
-            deviations: bench.deviations.clone(),
+            variation: variation.to_string(),
+            deviations,
             seed: seed.to_string(),
         }
     }

@@ -39,7 +39,7 @@ struct Quantity {
 const NONE: f64 = f64::NEG_INFINITY;
 
 /// Those of the moves themselves; the worse of the measured moves counts.
-const QUANTITIES: [Quantity; 15] = [
+const QUANTITIES: [Quantity; 21] = [
     Quantity {
         id: "rest-error",
         meaning: "error at rest, reference − stroke (mean of the last 0.2 s)",
@@ -83,11 +83,39 @@ const QUANTITIES: [Quantity; 15] = [
         value: |f| f.settle_s,
     },
     Quantity {
+        id: "settling-back",
+        meaning: "the same of the step back, which retracts",
+        unit: "s",
+        limits: Limits::Never,
+        value: |f| f.settle_back_s,
+    },
+    Quantity {
+        id: "settling-out",
+        meaning: "the same of the step out, which extends",
+        unit: "s",
+        limits: Limits::Never,
+        value: |f| f.settle_out_s,
+    },
+    Quantity {
+        id: "start",
+        meaning: "time to the first millimetre",
+        unit: "s",
+        limits: Limits::Never,
+        value: |f| f.start_delay_s,
+    },
+    Quantity {
         id: "rise",
         meaning: "time from 10 to 90 % of the move",
         unit: "s",
         limits: Limits::Never,
         value: |f| f.rise_s,
+    },
+    Quantity {
+        id: "peak-speed",
+        meaning: "largest speed",
+        unit: "mm/s",
+        limits: Limits::Never,
+        value: |f| f.peak_speed_mm_s,
     },
     Quantity {
         id: "rms",
@@ -132,6 +160,13 @@ const QUANTITIES: [Quantity; 15] = [
         value: |f| f.recovery_s,
     },
     Quantity {
+        id: "contact-error",
+        meaning: "largest error from 0.5 s after the return of the load",
+        unit: "mm",
+        limits: Limits::Never,
+        value: |f| f.contact_error_mm,
+    },
+    Quantity {
         id: "first-overshoot",
         meaning: "overshoot of the first move after power-up",
         unit: "mm",
@@ -145,7 +180,47 @@ const QUANTITIES: [Quantity; 15] = [
         limits: Limits::Never,
         value: |f| f.first_settle_s,
     },
+    Quantity {
+        id: "first-rest-error",
+        meaning: "error at rest of the first move (mean of its last 0.2 s)",
+        unit: "mm",
+        limits: Limits::Never,
+        value: |f| f.first_steady_error_mm,
+    },
 ];
+
+impl Figures {
+    /// The figures whose quantities have these values, and what the supervision reported.
+    #[must_use]
+    pub fn from_quantities(value: impl Fn(&str) -> Option<f64>, faults: String) -> Self {
+        let reversals = value("reversals").map(|turns| turns as u32);
+        Self {
+            steady_error_mm: value("rest-error"),
+            overshoot_mm: value("overshoot"),
+            rise_s: value("rise"),
+            settle_s: value("settling"),
+            settle_back_s: value("settling-back"),
+            settle_out_s: value("settling-out"),
+            rms_mm: value("rms"),
+            worst_mm: value("worst"),
+            start_delay_s: value("start"),
+            peak_speed_mm_s: value("peak-speed"),
+            switches_per_s: value("edges"),
+            rest_switches: value("rest-edges").map(|edges| edges as u64),
+            air_nl: value("air"),
+            recovery_s: value("recovery"),
+            contact_error_mm: value("contact-error"),
+            reversals,
+            limit_cycle: reversals.map(|turns| turns >= LIMIT_CYCLE),
+            ratio_to_bound: None,
+            first_overshoot_mm: value("first-overshoot"),
+            first_settle_s: value("first-settling"),
+            first_steady_error_mm: value("first-rest-error"),
+            faults,
+            stopped: value("stopped").map(|stopped| stopped > 0.0),
+        }
+    }
+}
 
 fn of_figures(motion: Move, figures: &Figures) -> impl Iterator<Item = Target> {
     let own = QUANTITIES.iter();
@@ -162,30 +237,42 @@ fn of_figures(motion: Move, figures: &Figures) -> impl Iterator<Item = Target> {
     })
 }
 
+/// The opening delay that a board searched for and found.
+pub const FOUND_DELAY: &str = "found-delay";
+
 /// Those of the cylinder, whatever it does.
-fn of_cylinder(margin: Option<f64>, resolution: Option<f64>) -> [Target; 2] {
+fn of_cylinder(margin: Option<f64>, resolution: Option<f64>, found_ms: Option<f64>) -> [Target; 3] {
     [
         (
             "margin",
             "force left on the rod side, divided by the load at rest (1000: no load)",
             margin,
+            "1",
         ),
         (
             "valve-resolution",
             "smallest step of force over the range that friction holds, by the data sheet (above 0.5: coarse valves)",
             resolution,
+            "1",
+        ),
+        (
+            FOUND_DELAY,
+            "opening delay of the valves that the board searched for and found",
+            found_ms,
+            "ms",
         ),
     ]
-    .map(|(id, meaning, value)| Target::new(id, meaning, value, "1", None, None).info())
+    .map(|(id, meaning, value, unit)| Target::new(id, meaning, value, unit, None, None).info())
 }
 
 /// Targets of a case that was played.
 #[must_use]
 pub fn targets(bench: &Bench, case: &PlayedBench) -> Vec<Target> {
-    let figures = Figures::of(bench.motion, &case.played, None);
+    let figures = Figures::of(bench.motion, &case.played);
     let resolution = ValveResolution::of(&bench.sheet).ratio;
+    let found_ms = case.found_delay_s.map(|s| s * 1e3);
     of_figures(bench.motion, &figures)
-        .chain(of_cylinder(Some(case.margin), resolution))
+        .chain(of_cylinder(Some(case.margin), resolution, found_ms))
         .collect()
 }
 
@@ -197,7 +284,7 @@ pub fn unmeasured(motion: Move) -> Vec<Target> {
             value: None,
             ..target
         })
-        .chain(of_cylinder(None, None))
+        .chain(of_cylinder(None, None, None))
         .collect()
 }
 

@@ -9,9 +9,9 @@ use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
 
 use super::moves::{CONTACT_S, Move, Played, RECOVERY_S, loaded, play_from_power_up};
-use super::variation::{UnknownVariation, Variation};
-use crate::axis_sim::suite::{AxisSimError, Factors, StartUp};
+use crate::axis_sim::suite::{AxisSimError, StartUp, draw_start};
 use crate::axis_sim::{Delays, Kind, Metrics, Trace, design, design_with, identify};
+use wheeleg_config::bench::{UnknownVariation, Variation};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
 pub const MARGIN: f64 = 1.25;
@@ -126,7 +126,7 @@ impl Case {
         let (noise_seed, wait_ms) = match variation {
             Variation::Drawn(number) => (
                 seed.wrapping_mul(0x9E37_79B9).wrapping_add(number),
-                Factors::draw_start(&mut plant, number)?,
+                draw_start(&mut plant, number)?,
             ),
             _ => (seed, 0),
         };
@@ -199,38 +199,11 @@ impl Case {
         played: Option<&Played>,
         bound_s: Option<[f64; 2]>,
     ) -> Row {
-        let plant = loaded(motion, &self.plant, &self.sheet);
-        let factors = self.variation.factors(&self.sheet);
-        let gauge_pa = plant.supply.set_pressure_pa - plant.gas.ambient_pressure_pa;
-        let t_on_s = self
-            .delays
-            .map_or(self.sheet.cylinder.fill_valve.t_on_s, |d| d.t_on_s);
-        let case = CaseFacts {
-            id: self.id(kind, motion).to_string(),
-            axis: self.axis.clone(),
-            controller: kind,
-            motion,
-            variation: self.variation,
-            seed: self.seed,
-            load_n: plant.load_n,
-            mass_kg: plant.moving_mass_kg,
-            supply_bar_g: gauge_pa * 1e-5,
-            friction: factors.friction,
-            valve_delay: factors.valve_delay,
-            valve_spread: factors.valve_spread,
-            noise: factors.noise,
-            static_margin: self.margin.min(1e3),
-            feasible: self.is_feasible(),
-            delays: match self.variation.start_up() {
-                StartUp::Sheet => "sheet",
-                StartUp::Identified if self.delays.is_some() => "identified",
-                StartUp::Identified => "not found",
-            },
-            valve_t_on_ms: t_on_s * 1e3,
-        };
+        let found_ms = self.delays.map(|delays| delays.t_on_s * 1e3);
+        let figures = played.map(|played| Figures::of(motion, played).over(bound_s));
         Row {
-            case,
-            figures: played.map_or_else(Figures::default, |p| Figures::of(motion, p, bound_s)),
+            case: CaseFacts::of(&self.id(kind, motion), &self.sheet, found_ms),
+            figures: figures.unwrap_or_default(),
         }
     }
 }
@@ -286,12 +259,47 @@ pub struct CaseFacts {
     pub noise: f64,
     /// Force left over the load, at most 1000 for no load.
     pub static_margin: f64,
-    /// Margin at least [`MARGIN`]; other cases are listed, not played.
+    /// Margin at least [`MARGIN`]; other cases are listed without figures.
     pub feasible: bool,
     /// Source of the board's valve delays.
     pub delays: &'static str,
     /// Opening delay that the board uses \[ms\].
     pub valve_t_on_ms: f64,
+}
+
+impl CaseFacts {
+    /// Of a case on an axis with this sheet, whose board has found this opening delay \[ms\], if it searched for one.
+    #[must_use]
+    pub fn of(id: &CaseId, sheet: &AxisParams, found_ms: Option<f64>) -> Self {
+        let variation = id.variation;
+        let factors = variation.factors(sheet);
+        let plant = loaded(id.motion, &factors.plant(sheet), sheet);
+        let gauge_pa = plant.supply.set_pressure_pa - plant.gas.ambient_pressure_pa;
+        let margin = factors.static_margin(sheet);
+        Self {
+            id: id.to_string(),
+            axis: id.axis.clone(),
+            controller: id.kind,
+            motion: id.motion,
+            variation,
+            seed: id.seed,
+            load_n: plant.load_n,
+            mass_kg: plant.moving_mass_kg,
+            supply_bar_g: gauge_pa * 1e-5,
+            friction: factors.friction,
+            valve_delay: factors.valve_delay,
+            valve_spread: factors.valve_spread,
+            noise: factors.noise,
+            static_margin: margin.min(1e3),
+            feasible: margin >= feasible_margin(),
+            delays: match variation.start_up() {
+                StartUp::Sheet => "sheet",
+                StartUp::Identified if found_ms.is_some() => "identified",
+                StartUp::Identified => "not found",
+            },
+            valve_t_on_ms: found_ms.unwrap_or(sheet.cylinder.fill_valve.t_on_s * 1e3),
+        }
+    }
 }
 
 /// Figures of a case: the worse of its measured moves. Figures that a move does not have are absent.
@@ -305,6 +313,10 @@ pub struct Figures {
     pub rise_s: Option<f64>,
     /// Until within ±1 mm for good \[s\]; absent if it never is.
     pub settle_s: Option<f64>,
+    /// The same of the step back, which retracts \[s\]; steps back and out alone have it.
+    pub settle_back_s: Option<f64>,
+    /// The same of the step out, which extends \[s\].
+    pub settle_out_s: Option<f64>,
     /// Root mean square of the error \[mm\].
     pub rms_mm: Option<f64>,
     /// Largest error \[mm\].
@@ -350,7 +362,7 @@ fn worst(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
 impl Figures {
     /// Computes the figures of a played case.
     #[must_use]
-    pub fn of(motion: Move, played: &Played, bound_s: Option<[f64; 2]>) -> Self {
+    pub fn of(motion: Move, played: &Played) -> Self {
         let all: Vec<Metrics> = played.measured.iter().map(Metrics::of).collect();
         let of = |f: &dyn Fn(&Metrics) -> f64| worst(all.iter().map(|m| Some(f(m))));
         let steady = all.iter().map(|m| m.steady_error_mm);
@@ -364,6 +376,8 @@ impl Figures {
             overshoot_mm: of(&|m| m.overshoot_mm),
             rise_s: worst(all.iter().map(|m| m.rise_s)),
             settle_s: worst(all.iter().map(|m| m.settle_s)),
+            settle_back_s: all.first().and_then(|m| m.settle_s),
+            settle_out_s: all.last().and_then(|m| m.settle_s),
             rms_mm: of(&|m| m.rms_mm),
             worst_mm: of(&|m| m.worst_mm),
             start_delay_s: worst(all.iter().map(|m| m.start_delay_s)),
@@ -375,13 +389,7 @@ impl Figures {
             contact_error_mm: contact_error(&played.measured[0]),
             reversals,
             limit_cycle: Some(all.iter().any(Metrics::limit_cycle)),
-            ratio_to_bound: bound_s.and_then(|bound| {
-                worst(
-                    all.iter()
-                        .zip(bound)
-                        .map(|(m, b)| m.settle_s.map(|s| s / b)),
-                )
-            }),
+            ratio_to_bound: None,
             first_overshoot_mm: first.as_ref().map(|m| m.overshoot_mm),
             first_settle_s: first.as_ref().and_then(|m| m.settle_s),
             first_steady_error_mm: first.as_ref().map(|m| m.steady_error_mm),
@@ -389,6 +397,22 @@ impl Figures {
             stopped: Some(traces().any(|t| !t.drove)),
         };
         figures.only_of(motion)
+    }
+
+    /// With the settling times over the fastest possible ones, where those are known.
+    #[must_use]
+    pub fn over(self, bound_s: Option<[f64; 2]>) -> Self {
+        let over = |settle_s: Option<f64>, fastest_s: f64| settle_s.map(|s| s / fastest_s);
+        let ratio_to_bound = bound_s.and_then(|[back_s, out_s]| {
+            worst([
+                over(self.settle_back_s, back_s),
+                over(self.settle_out_s, out_s),
+            ])
+        });
+        Self {
+            ratio_to_bound,
+            ..self
+        }
     }
 
     /// Whether a move has a figure.
@@ -399,6 +423,8 @@ impl Figures {
             overshoot_mm: Some(0.0),
             rise_s: Some(0.0),
             settle_s: Some(0.0),
+            settle_back_s: Some(0.0),
+            settle_out_s: Some(0.0),
             rms_mm: Some(0.0),
             worst_mm: Some(0.0),
             start_delay_s: Some(0.0),
@@ -424,12 +450,15 @@ impl Figures {
     fn only_of(self, motion: Move) -> Self {
         let is_step = matches!(motion, Move::FirstStep | Move::Step20 | Move::Step100)
             || motion.loses_contact();
+        let there_and_back = matches!(motion, Move::Step20 | Move::Step100);
         let learnt = motion != Move::FirstStep;
         let arrives = !matches!(motion, Move::Sine | Move::Hold);
         Self {
             overshoot_mm: self.overshoot_mm.filter(|_| arrives),
             rise_s: self.rise_s.filter(|_| is_step),
             settle_s: self.settle_s.filter(|_| is_step),
+            settle_back_s: self.settle_back_s.filter(|_| there_and_back),
+            settle_out_s: self.settle_out_s.filter(|_| there_and_back),
             start_delay_s: self.start_delay_s.filter(|_| is_step),
             rest_switches: self.rest_switches.filter(|_| motion == Move::Hold),
             recovery_s: self.recovery_s.filter(|_| motion.loses_contact()),
@@ -473,6 +502,7 @@ fn contact_error(trace: &Trace) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wheeleg_config::AxisConfig;
 
     #[test]
     fn a_case_comes_back_from_its_name() {
@@ -496,5 +526,44 @@ mod tests {
     fn a_worst_without_all_values_is_none() {
         assert_eq!(worst([Some(1.0), Some(3.0)]), Some(3.0));
         assert_eq!(worst([Some(1.0), None]), None);
+    }
+
+    /// Every accepted word can be played on every built-in axis, or is refused in terms of its file; a step
+    /// beyond is not a variation.
+    #[test]
+    fn both_ends_of_every_variation_are_played_or_refused_with_the_field_of_the_file() {
+        let (mut played, mut refused) = (0, 0);
+        for (axis, ..) in wheeleg_config::axis::AXES {
+            let axis = AxisConfig::load(axis).expect("built in");
+            for (name, [low, high]) in Variation::ranges() {
+                for (end, beyond) in [(low, low - 0.01), (high, high + 0.01)] {
+                    let word = format!("{name}={beyond}");
+                    let error = word.parse::<Variation>().expect_err(&word).to_string();
+                    assert!(error.contains(&format!("({low} to {high})")), "{error}");
+                    let variation: Variation = format!("{name}={end}").parse().expect("allowed");
+                    if let Err(error) = variation.ensure_possible(&axis) {
+                        let told = wheeleg_config::plain_text(&error);
+                        let path = &variation.changes(&axis.axis)[0].path;
+                        for part in [&format!("`{name}={end}`"), path, "allowed"] {
+                            assert!(told.contains(part), "{part}: {told}");
+                        }
+                        refused += 1;
+                        continue;
+                    }
+                    let case = Case::new(&axis.name, &axis.axis, variation, 1);
+                    let case = case.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
+                    for motion in [Move::Step100, Move::SCurve] {
+                        let done = case.play(Kind::Predictive, motion);
+                        done.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
+                        played += 1;
+                    }
+                }
+            }
+        }
+        println!("{played} played, {refused} refused");
+        assert!(
+            played > 40 && refused > 4,
+            "{played} played, {refused} refused"
+        );
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use wheeleg_config::builtin::text_of;
 use wheeleg_report::stats;
 
-use super::{Comparison, Options, Row, Variation};
+use super::{Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
 
@@ -122,17 +122,12 @@ impl Row {
     }
 }
 
-/// Reads from its `summary.json` which combinations another version kept; `None` without such a comparison.
+/// Reads from its `summary.json` which of these many combinations from `root` on another version kept.
 ///
 /// # Errors
 /// [`StudyError`] if the file cannot be read, is not a summary of a comparison or has none of the
-/// combinations to be played.
-pub(super) fn read(options: &Options) -> Result<Option<Before>, StudyError> {
-    let against = options.against.as_deref();
-    against.map(|path| read_from(path, options)).transpose()
-}
-
-fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
+/// combinations.
+pub fn read_before(path: &Path, root: u64, combinations: u64) -> Result<Before, StudyError> {
     let help = "give the summary.json that `wheeleg compare --root N` of the other version wrote";
     let named = |what: String| StudyError::refused(format!("`{}` {what}", path.display()), help);
     let text = text_of(path).map_err(|e| named(format!("cannot be read: {e}")))?;
@@ -141,7 +136,6 @@ fn read_from(path: &Path, options: &Options) -> Result<Before, StudyError> {
     if !read.schema.starts_with("wheeleg.compare/") {
         return Err(named(format!("is a `{}`, not a comparison", read.schema)));
     }
-    let (root, combinations) = (options.root, options.combinations);
     let drawn = |row: &ReadCase| match row.variation.parse() {
         Ok(Variation::Drawn(number)) => number.wrapping_sub(root) < combinations,
         _ => false,
@@ -180,27 +174,17 @@ fn quantile(values: &[Option<f64>], share: f64) -> Quantile {
     }
 }
 
-impl Comparison {
-    /// Statistics of the random combinations, by axis and controller; empty if none was played.
+impl Judged {
+    /// Of these combinations of a controller on an axis, and of those of another version; none without any.
     #[must_use]
-    pub fn judged(&self) -> Vec<Judged> {
-        let axes = self.axes.iter().map(|axis| axis.config.name.as_str());
-        axes.flat_map(|axis| {
-            let kinds = self.options.kinds.iter();
-            kinds.filter_map(move |kind| self.judge(axis, *kind))
-        })
-        .collect()
-    }
-
-    fn judge(&self, axis: &str, kind: Kind) -> Option<Judged> {
-        let rows: Vec<&Row> = self.combined(axis, kind).collect();
+    pub fn of(axis: &str, kind: Kind, rows: &[&Row], before: Option<&Before>) -> Option<Self> {
         let count = rows.len() as u64;
         let missed = rows.iter().filter(|r| !r.keeps()).count() as u64;
         let of = |value: fn(&Row) -> Option<f64>, shares: [f64; 2]| {
             let values: Vec<Option<f64>> = rows.iter().map(|r| value(r)).collect();
             shares.map(|share| quantile(&values, share))
         };
-        (count > 0).then(|| Judged {
+        (count > 0).then(|| Self {
             axis: axis.to_owned(),
             controller: kind,
             combinations: count,
@@ -210,7 +194,7 @@ impl Comparison {
             overshoot_mm: of(|r| r.figures.overshoot_mm, [0.99, 0.999]),
             settle_s: of(|r| r.figures.settle_s, [0.5, 0.99]),
             first_overshoot_mm: of(|r| r.figures.first_overshoot_mm, [0.5, 0.99]),
-            paired: self.before.as_ref().map(|before| paired(&rows, before)),
+            paired: before.map(|before| paired(rows, before)),
         })
     }
 }

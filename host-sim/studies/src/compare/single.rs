@@ -180,6 +180,21 @@ pub(crate) fn trace_figure(id: &str, title: &str, trace: &Trace) -> Figure {
     }
 }
 
+/// A panel of lines over time; `y` is its range, or that of the lines.
+#[must_use]
+pub fn panel(
+    title: &str,
+    unit: &str,
+    end_s: f64,
+    series: Vec<Series>,
+    y: Option<(f64, f64)>,
+    limits: &[f64],
+) -> Panel {
+    let y = (unit, y.unwrap_or_else(|| range(&series)));
+    let content = Content::lines(y, series).limited(limits);
+    Panel::new(title, (-0.05, end_s), 230, content)
+}
+
 /// Range of all points with a small margin.
 pub(crate) fn range(series: &[Series]) -> (f64, f64) {
     let values = || series.iter().flat_map(|s| &s.points).map(|p| p.1);

@@ -246,8 +246,8 @@ impl Tuned {
             let pair = [before?, after?];
             Some(Test {
                 motion,
-                before: Figures::of(motion, &pair[0], None),
-                after: Figures::of(motion, &pair[1], None),
+                before: Figures::of(motion, &pair[0]),
+                after: Figures::of(motion, &pair[1]),
                 played: pair,
             })
         });

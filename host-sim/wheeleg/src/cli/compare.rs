@@ -7,16 +7,22 @@ use std::process::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::{Drawing, end, place, settings, whole};
+use super::exit::FAILED;
+use super::{Drawing, end, place, settings, tell_error, whole};
+use wheeleg_campaign::CampaignError;
+use wheeleg_campaign::compare::{self, Comparison, Options};
 use wheeleg_config::axis::AXES;
 use wheeleg_report::number::p_equals;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::{Kind, ValveResolution};
-use wheeleg_studies::compare::{self, CaseId, Comparison, Move, Options};
+use wheeleg_studies::compare::{CaseId, Move, judging_root, play};
 use wheeleg_studies::study::Finished;
 
 /// Number of false alarms that are listed; the report has all of them.
 const ALARMS_LISTED: usize = 5;
+
+/// Largest seed of a case: exact in tables of floats, too.
+const SEED_MOST: u64 = 1 << f64::MANTISSA_DIGITS;
 
 /// Arguments of `wheeleg compare`.
 #[derive(Debug, Args)]
@@ -36,14 +42,14 @@ pub(super) struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
     seeds: u64,
     /// First seed.
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX - 1000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, SEED_MOST - 1000))]
     seed: u64,
     /// Random combinations of factors per axis [default: 200; 20 with --quick].
     #[arg(long, value_name = "N", value_parser = whole(0_u64, 10_000))]
     combinations: Option<u64>,
     /// Number of the first random combination. Fix it to compare two versions [default: from a hash of the
     /// sources of firmware/control, so that no law is tuned to it].
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0_u64, u64::MAX))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0_u64, SEED_MOST - 10_000))]
     root: Option<u64>,
     /// `summary.json` of another version, run with the same --root; counts the random
     /// combinations in which this version is better or worse.
@@ -55,8 +61,8 @@ pub(super) struct CompareArgs {
     /// Number of threads [default: as many as the machine has].
     #[arg(long, value_name = "N", value_parser = whole(1_u16, 1024))]
     threads: Option<u16>,
-    /// Folder for report, figures and tables. Results of an earlier run in it move to its subfolder
-    /// `previous`.
+    /// Folder for report, figures and tables, and in its subfolder `campaign` the cases, which are not repeated for
+    /// the same options. Results of an earlier run in it move to its subfolder `previous`.
     #[arg(long, value_name = "DIR", default_value = "runs/compare")]
     out: PathBuf,
     /// Run only one case, by its id in the tables:
@@ -162,13 +168,23 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         combinations: args
             .combinations
             .unwrap_or(if args.quick { 20 } else { 200 }),
-        root: args.root.unwrap_or_else(compare::judging_root),
+        root: args.root.unwrap_or_else(judging_root),
         against: args.against.clone(),
         quick: args.quick,
         threads: args.threads.map_or(0, usize::from),
+        program: std::env::current_exe().ok(),
     };
     let settings = settings(&args.out, args.drawing.png)?;
-    let finished = compare::compare(&options, &settings)?;
+    let finished = match compare::compare(&options, &settings) {
+        Ok(finished) => finished,
+        Err(CampaignError::Study(error)) => return Err(*error),
+        Err(CampaignError::Config(error)) => return Err((*error).into()),
+        Err(error) => {
+            tell_error(error);
+            // As of any other study, not as of a campaign that a scheduler restarts.
+            return Ok(ExitCode::from(FAILED));
+        }
+    };
     end(
         finished,
         args.json,
@@ -243,7 +259,7 @@ fn combinations(comparison: &Comparison) -> String {
 
 fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
     let settings = settings(&args.out, args.drawing.png)?;
-    let single = compare::play(id, axes)?;
+    let single = play(id, axes)?;
     let finished = single.write(&settings)?;
     let text = |finished: &Finished<Vec<PathBuf>>| {
         let mut out = finished.summary.clone();

@@ -1,6 +1,12 @@
 //! What is played on a bench axis: by which controller, which move, and what its board is told.
 
+mod factors;
+mod variation;
+
 use wheeleg_plant::axis::AxisParams;
+
+pub use factors::{Factors, force_left_n, weaker_force_n};
+pub use variation::{UnknownVariation, Variation, Varied};
 
 use crate::params::ParameterInfo;
 
@@ -148,23 +154,34 @@ impl Deviation {
         });
         let of = |(info, own): (&ParameterInfo, &ParameterInfo)| -> Vec<Self> {
             let to_sheet = info.factor_from(&own.unit);
-            let values = info.value.iter().zip(&own.value).enumerate();
-            let other = values.filter(|(_, (sheet, plant))| **sheet != **plant * to_sheet);
-            let many = info.value.len() > 1;
-            other
-                .map(|(place, (sheet, plant))| Self {
-                    name: match many {
-                        true => format!("{}[{place}]", info.path),
-                        false => info.path.clone(),
-                    },
-                    unit: info.unit.clone(),
-                    sheet: *sheet,
-                    plant: plant * to_sheet,
-                    ratio: (*sheet != 0.0).then(|| plant * to_sheet / sheet),
-                })
-                .collect()
+            let plant = own.value.iter().map(|value| value * to_sheet);
+            Self::of(
+                &info.path,
+                &info.unit,
+                info.value.iter().copied().zip(plant),
+            )
         };
         pairs.flat_map(of).collect()
+    }
+
+    /// Of a parameter, from the pairs of its values of sheet and plant.
+    fn of(path: &str, unit: &str, values: impl ExactSizeIterator<Item = (f64, f64)>) -> Vec<Self> {
+        let many = values.len() > 1;
+        let other = values
+            .enumerate()
+            .filter(|(_, (sheet, plant))| sheet != plant);
+        other
+            .map(|(place, (sheet, plant))| Self {
+                name: match many {
+                    true => format!("{path}[{place}]"),
+                    false => path.to_owned(),
+                },
+                unit: unit.to_owned(),
+                sheet,
+                plant,
+                ratio: (sheet != 0.0).then(|| plant / sheet),
+            })
+            .collect()
     }
 }
 
@@ -177,8 +194,10 @@ pub struct Bench {
     pub sheet: AxisParams,
     /// The plant.
     pub plant: AxisParams,
-    /// Where the plant is not as the data sheet says.
+    /// Where the plant is not as the data sheet says, without the variation.
     pub deviations: Vec<Deviation>,
+    /// Further deviations of the plant.
+    pub variation: Varied,
     /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
     pub load_share: f64,
     /// The move.

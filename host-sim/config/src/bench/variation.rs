@@ -4,11 +4,11 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
-use wheeleg_config::axis::Change;
-use wheeleg_config::{AxisConfig, ConfigError, MASSES_KG};
 use wheeleg_plant::axis::AxisParams;
 
-use crate::axis_sim::suite::{Factors, StartUp};
+use super::{Deviation, Factors, StartUp};
+use crate::axis::Change;
+use crate::{AxisConfig, ConfigError};
 
 /// One factor, or a seeded combination of five.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,9 +17,9 @@ pub enum Variation {
     Nominal,
     /// Force on the rod, share of the force left on the weaker side.
     Load(f64),
-    /// Moving mass \[kg\].
+    /// Factor on the moving mass.
     Mass(f64),
-    /// Supply \[bar gauge\].
+    /// Change of the supply \[bar\].
     Supply(f64),
     /// Factor on friction.
     Friction(f64),
@@ -49,8 +49,8 @@ type Numbered = (&'static str, &'static str, [f64; 2], fn(f64) -> Variation);
 /// Every variation by a number.
 const NUMBERED: [Numbered; 7] = [
     ("load", "SHARE", [-0.95, 0.95], Variation::Load),
-    ("mass", "KG", MASSES_KG, Variation::Mass),
-    ("supply", "BAR gauge", [1.0, 16.0], Variation::Supply),
+    ("mass-factor", "FACTOR", [0.1, 10.0], Variation::Mass),
+    ("supply-change", "BAR", [-10.0, 10.0], Variation::Supply),
     ("friction", "FACTOR", [0.1, 10.0], Variation::Friction),
     ("delay", "FACTOR", [0.1, 10.0], Variation::Delay),
     ("spread", "SHARE", [0.0, 0.8], Variation::Spread),
@@ -66,22 +66,18 @@ fn known() -> String {
 }
 
 impl Variation {
-    /// The factors one at a time: load ±40 and ±80 %, mass ×2/3, 2 and 16/3, supply
+    /// The factors one at a time: load ±40 and ±80 %, mass ×0.667, 2 and 5.333, supply
     /// −2, −1 and +1 bar, friction and delay ×0.5 and 2, valves 20 % apart, noise ×0
-    /// and 4. On the bench axis: 1, 3 and 8 kg; 4, 5 and 7 bar.
+    /// and 4. On the bench axis: 1, 3 and 8 kg; 4, 5 and 7 bar gauge.
     #[must_use]
-    pub fn one_at_a_time(sheet: &AxisParams, quick: bool) -> Vec<Self> {
-        let tidy = |x: f64| (x * 1e3).round() * 1e-3;
-        let mass = |factor: f64| Self::Mass(tidy(sheet.moving_mass_kg * factor));
-        let gauge_pa = sheet.supply.set_pressure_pa - sheet.gas.ambient_pressure_pa;
-        let supply = |change: f64| Self::Supply(tidy(gauge_pa * 1e-5 + change));
+    pub fn one_at_a_time(quick: bool) -> Vec<Self> {
         let mut list = vec![
             Self::Load(-0.8),
             Self::Load(0.8),
-            mass(2.0 / 3.0),
-            mass(16.0 / 3.0),
-            supply(-2.0),
-            supply(1.0),
+            Self::Mass(0.667),
+            Self::Mass(5.333),
+            Self::Supply(-2.0),
+            Self::Supply(1.0),
             Self::Friction(0.5),
             Self::Friction(2.0),
             Self::Delay(0.5),
@@ -93,12 +89,19 @@ impl Variation {
             list.extend([
                 Self::Load(-0.4),
                 Self::Load(0.4),
-                mass(2.0),
-                supply(-1.0),
+                Self::Mass(2.0),
+                Self::Supply(-1.0),
                 Self::Noise(0.0),
             ]);
         }
         list
+    }
+
+    /// Names of the variations by a number, each with the smallest and the largest one that any axis allows.
+    pub fn ranges() -> impl Iterator<Item = (&'static str, [f64; 2])> {
+        NUMBERED
+            .into_iter()
+            .map(|(name, _, range, _)| (name, range))
     }
 
     /// The factors for an axis.
@@ -108,14 +111,17 @@ impl Variation {
         match *self {
             Self::Nominal => base,
             Self::Load(load_share) => Factors { load_share, ..base },
-            Self::Mass(kg) => Factors {
-                mass_kg: Some(kg),
+            Self::Mass(factor) => Factors {
+                mass_kg: Some(sheet.moving_mass_kg * factor),
                 ..base
             },
-            Self::Supply(bar) => Factors {
-                supply_pa: Some(bar * 1e5),
-                ..base
-            },
+            Self::Supply(bar) => {
+                let gauge_pa = sheet.supply.set_pressure_pa - sheet.gas.ambient_pressure_pa;
+                Factors {
+                    supply_pa: Some(gauge_pa + bar * 1e5),
+                    ..base
+                }
+            }
             Self::Friction(friction) => Factors { friction, ..base },
             Self::Delay(valve_delay) => Factors {
                 valve_delay,
@@ -133,11 +139,35 @@ impl Variation {
     /// The corresponding fields of an axis file, with their values, if they differ from the sheet's.
     #[must_use]
     pub fn changes(&self, sheet: &AxisParams) -> Vec<Change> {
+        let change = |(path, _, values, unit): (&str, _, Vec<f64>, &str)| Change {
+            path: path.to_owned(),
+            values,
+            unit: unit.to_owned(),
+            source: format!("`{self}`"),
+        };
+        self.changed(sheet).map(change).collect()
+    }
+
+    /// The same as deviations of the plant from the sheet.
+    #[must_use]
+    pub fn deviations(&self, sheet: &AxisParams) -> Vec<Deviation> {
+        let of = |(path, own, values, unit): (&str, Vec<f64>, Vec<f64>, &str)| {
+            Deviation::of(path, unit, own.into_iter().zip(values))
+        };
+        self.changed(sheet).flat_map(of).collect()
+    }
+
+    /// Fields that differ: path, values of the sheet and of the plant, unit.
+    fn changed(
+        &self,
+        sheet: &AxisParams,
+    ) -> impl Iterator<Item = (&'static str, Vec<f64>, Vec<f64>, &'static str)> {
         let plant = self.factors(sheet).plant(sheet);
         let fields = |p: &AxisParams| {
             let (supply, friction) = (&p.supply, &p.cylinder.friction);
             // No bench board reads the contact, so one that would never close is no reason for a refusal.
             let contact_pa = |pa: f64| pa.min(supply.set_pressure_pa);
+            let timing_spread = p.cylinder.timing_spread.to_vec();
             [
                 ("moving.mass", vec![p.moving_mass_kg], "kg"),
                 ("moving.load", vec![p.load_n], "N"),
@@ -160,22 +190,12 @@ impl Variation {
                 ("friction.coulomb", vec![friction.coulomb_n], "N"),
                 ("friction.static", vec![friction.static_n], "N"),
                 ("friction.viscous", vec![friction.viscous_n_s_m], "N s/m"),
-                (
-                    "cylinder.timing_spread",
-                    p.cylinder.timing_spread.to_vec(),
-                    "1",
-                ),
+                ("cylinder.timing_spread", timing_spread, "1"),
             ]
         };
         let both = fields(sheet).into_iter().zip(fields(&plant));
-        let changed = both.filter(|((_, own, _), (_, values, _))| own != values);
-        let change = |(_, (path, values, unit)): (_, (&str, Vec<f64>, &str))| Change {
-            path: path.to_owned(),
-            values,
-            unit: unit.to_owned(),
-            source: format!("`{self}`"),
-        };
-        changed.map(change).collect()
+        let both = both.map(|((path, own, unit), (_, values, _))| (path, own, values, unit));
+        both.filter(|(_, own, values, _)| own != values)
     }
 
     /// Refuses an impossible axis, as its file would be refused with these values in it.
@@ -183,7 +203,7 @@ impl Variation {
     /// # Errors
     /// [`ConfigError`] with the fields of the file, their values and the allowed ones.
     pub fn ensure_possible(&self, axis: &AxisConfig) -> Result<(), ConfigError> {
-        let what = format!("the axis {} cannot be compared with `{self}`", axis.name);
+        let what = format!("the axis {} cannot be played with `{self}`", axis.name);
         match self.changes(&axis.axis) {
             changes if changes.is_empty() => Ok(()),
             changes => axis.with(&what, &changes).map(drop),
@@ -213,8 +233,8 @@ impl fmt::Display for Variation {
         match self {
             Self::Nominal => f.write_str("nominal"),
             Self::Load(x) => write!(f, "load={x}"),
-            Self::Mass(x) => write!(f, "mass={x}"),
-            Self::Supply(x) => write!(f, "supply={x}"),
+            Self::Mass(x) => write!(f, "mass-factor={x}"),
+            Self::Supply(x) => write!(f, "supply-change={x}"),
             Self::Friction(x) => write!(f, "friction={x}"),
             Self::Delay(x) => write!(f, "delay={x}"),
             Self::Spread(x) => write!(f, "spread={x}"),
@@ -250,16 +270,56 @@ impl FromStr for Variation {
     }
 }
 
+/// The variation of a case of a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Varied {
+    /// This one, in every case.
+    Always(Variation),
+    /// A random combination, whose number is the seed of the case.
+    Drawn,
+}
+
+impl Varied {
+    /// The words of a plan for it.
+    pub const DRAWN: &str = "drawn";
+
+    /// The variation of a case with this seed.
+    #[must_use]
+    pub const fn of_seed(self, seed: u64) -> Variation {
+        match self {
+            Self::Always(variation) => variation,
+            Self::Drawn => Variation::Drawn(seed),
+        }
+    }
+}
+
+impl fmt::Display for Varied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Always(variation) => variation.fmt(f),
+            Self::Drawn => f.write_str(Self::DRAWN),
+        }
+    }
+}
+
+impl FromStr for Varied {
+    type Err = UnknownVariation;
+
+    fn from_str(word: &str) -> Result<Self, UnknownVariation> {
+        match word {
+            Self::DRAWN => Ok(Self::Drawn),
+            word => word.parse().map(Self::Always),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axis_sim::Kind;
-    use crate::compare::{Case, Move};
 
     #[test]
     fn every_variation_comes_back_from_its_word() {
-        let sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
-        let mut list = Variation::one_at_a_time(&sheet, false);
+        let mut list = Variation::one_at_a_time(false);
         list.extend([
             Variation::Nominal,
             Variation::Combination(17),
@@ -267,73 +327,41 @@ mod tests {
         ]);
         for variation in list {
             assert_eq!(variation.to_string().parse(), Ok(variation));
+            let varied = Varied::Always(variation);
+            assert_eq!(varied.to_string().parse(), Ok(varied));
         }
+        assert_eq!("drawn".parse(), Ok(Varied::Drawn));
+        assert_eq!(Varied::Drawn.of_seed(17), Variation::Drawn(17));
         for wrong in [
             "",
             "load",
             "load=1.2",
             "load=x",
-            "mass=nan",
+            "mass-factor=nan",
             "wind=1",
             "combination=-1",
+            "drawn",
         ] {
             assert!(wrong.parse::<Variation>().is_err(), "{wrong}");
         }
     }
 
-    /// Every accepted word can be played on every built-in axis, or is refused in terms of its file; a step
-    /// beyond is not a variation.
-    #[test]
-    fn both_ends_of_every_variation_are_played_or_refused_with_the_field_of_the_file() {
-        let (mut played, mut refused) = (0, 0);
-        for (axis, ..) in wheeleg_config::axis::AXES {
-            let axis = AxisConfig::load(axis).expect("built in");
-            for (name, _, [low, high], made) in NUMBERED {
-                for (end, beyond) in [(low, low - 0.01), (high, high + 0.01)] {
-                    let word = format!("{name}={beyond}");
-                    let error = word.parse::<Variation>().expect_err(&word).to_string();
-                    assert!(error.contains(&format!("({low} to {high})")), "{error}");
-                    let variation: Variation = format!("{name}={end}").parse().expect("allowed");
-                    assert_eq!(variation, made(end));
-                    if let Err(error) = variation.ensure_possible(&axis) {
-                        let told = wheeleg_config::plain_text(&error);
-                        let path = &variation.changes(&axis.axis)[0].path;
-                        for part in [&format!("`{name}={end}`"), path, "allowed"] {
-                            assert!(told.contains(part), "{part}: {told}");
-                        }
-                        refused += 1;
-                        continue;
-                    }
-                    let case = Case::new(&axis.name, &axis.axis, variation, 1);
-                    let case = case.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
-                    for motion in [Move::Step100, Move::SCurve] {
-                        let done = case.play(Kind::Predictive, motion);
-                        done.unwrap_or_else(|e| panic!("{} {variation}: {e}", axis.name));
-                        played += 1;
-                    }
-                }
-            }
-        }
-        println!("{played} played, {refused} refused");
-        assert!(
-            played > 40 && refused > 4,
-            "{played} played, {refused} refused"
-        );
-    }
-
     #[test]
     fn the_bench_axis_gets_the_masses_and_pressures_of_its_bars() {
         let sheet = AxisConfig::load("bench-vq110u").expect("built in").axis;
-        let list = Variation::one_at_a_time(&sheet, false);
-        for expected in [
-            Variation::Mass(1.0),
-            Variation::Mass(3.0),
-            Variation::Mass(8.0),
-            Variation::Supply(4.0),
-            Variation::Supply(5.0),
-            Variation::Supply(7.0),
-        ] {
-            assert!(list.contains(&expected), "{expected}");
+        let list = Variation::one_at_a_time(false);
+        let all: Vec<Factors> = list.iter().map(|v| v.factors(&sheet)).collect();
+        let near =
+            |value: Option<f64>, wanted: f64| value.is_some_and(|v| (v - wanted).abs() < 1e-3);
+        for kg in [1.0, 3.0, 8.0] {
+            assert!(all.iter().any(|f| near(f.mass_kg, kg)), "{kg}");
+        }
+        for bar in [4.0, 5.0, 7.0] {
+            assert!(
+                all.iter()
+                    .any(|f| near(f.supply_pa.map(|pa| pa * 1e-5), bar)),
+                "{bar}"
+            );
         }
     }
 }

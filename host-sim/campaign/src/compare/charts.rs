@@ -3,15 +3,16 @@
 use wheeleg_report::number::listed;
 use wheeleg_report::plot::Colour;
 
-use super::single::range;
-use super::{ComparedAxis, Comparison, Move, Row, Variation};
-use crate::axis_sim::Kind;
+use super::{ComparedAxis, Comparison};
 use wheeleg_report::plot::{Bars, Column, Content, Figure, Panel, Series, colour, line};
+use wheeleg_studies::axis_sim::Kind;
+use wheeleg_studies::axis_sim::suite::LEAD_S;
+use wheeleg_studies::compare::{CONTACT_S, Move, Row, Sizes, panel};
 
 type Points = Vec<(f64, f64)>;
 
 /// One colour per controller.
-pub(crate) fn colour_of(kind: Kind) -> Colour {
+fn colour_of(kind: Kind) -> Colour {
     match kind {
         Kind::OnOff => colour::RAW,
         Kind::PwmP => colour::AXES[4],
@@ -39,39 +40,6 @@ pub(super) fn figures(comparison: &Comparison) -> Vec<Figure> {
 }
 
 impl Comparison {
-    /// Rows of an axis, controller and move as on the sheet.
-    pub(super) fn nominal<'a>(
-        &'a self,
-        axis: &'a str,
-        kind: Kind,
-        motion: Move,
-    ) -> impl Iterator<Item = &'a Row> {
-        self.rows.iter().filter(move |r| {
-            let c = &r.case;
-            c.axis == axis
-                && c.controller == kind
-                && c.motion == motion
-                && c.variation == Variation::Nominal
-        })
-    }
-
-    /// Rows of random combinations of an axis and controller that are feasible, of the move that is judged.
-    pub(super) fn combined<'a>(
-        &'a self,
-        axis: &'a str,
-        kind: Kind,
-    ) -> impl Iterator<Item = &'a Row> {
-        let judged = self.options.judged_move();
-        self.rows.iter().filter(move |r| {
-            let c = &r.case;
-            c.axis == axis
-                && c.controller == kind
-                && Some(c.motion) == judged
-                && c.feasible
-                && matches!(c.variation, Variation::Combination(_) | Variation::Drawn(_))
-        })
-    }
-
     /// The overlay of every controller for a move, as points of `value(reference,
     /// stroke)` over time.
     fn overlay(&self, axis: &str, motion: Move, value: fn(f64, f64) -> f64) -> Vec<Series> {
@@ -95,20 +63,6 @@ impl Comparison {
             o.points.iter().map(|[t, r, _]| (*t, *r)).collect()
         })
     }
-}
-
-/// A panel of lines over time; `y` is its range, or that of the lines.
-pub(crate) fn panel(
-    title: &str,
-    unit: &str,
-    end_s: f64,
-    series: Vec<Series>,
-    y: Option<(f64, f64)>,
-    limits: &[f64],
-) -> Panel {
-    let y = (unit, y.unwrap_or_else(|| range(&series)));
-    let content = Content::lines(y, series).limited(limits);
-    Panel::new(title, (-0.05, end_s), 230, content)
 }
 
 /// End of the panels of a step \[s\], the range shown about its target \[mm\], and its last part, in which a
@@ -321,13 +275,11 @@ fn contact(comparison: &Comparison, axis: &ComparedAxis) -> Option<Figure> {
         if !series.is_empty() {
             let mut p = panel(title, "[mm]", 1.5, series, None, &[]);
             // From the start of the motion, like the overlays.
-            p.marks = super::CONTACT_S
-                .map(|t| t - crate::axis_sim::suite::LEAD_S)
-                .to_vec();
+            p.marks = CONTACT_S.map(|t| t - LEAD_S).to_vec();
             panels.push(p);
         }
     }
-    let load_n = super::Sizes::of(&axis.config.axis).contact_n;
+    let load_n = Sizes::of(&axis.config.axis).contact_n;
     (!panels.is_empty()).then(|| Figure {
         id: format!("contact-{name}"),
         title: format!("Contact on {name}"),

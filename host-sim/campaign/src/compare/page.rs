@@ -2,13 +2,14 @@
 
 use serde::Serialize;
 
-use super::case::MARGIN;
-use super::judged::{ERROR_MM, Judged, Quantile, judging_root};
-use super::{Comparison, Move, Row, Variation};
-use crate::StudyError;
-use crate::axis_sim::Kind;
+use super::Comparison;
 use wheeleg_report::number::{DASH, counted, fixed, listed, or_dash, p_value, signed};
 use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
+use wheeleg_studies::StudyError;
+use wheeleg_studies::axis_sim::Kind;
+use wheeleg_studies::compare::{
+    ERROR_MM, Judged, MARGIN, Move, Quantile, Row, Variation, judging_root,
+};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -554,8 +555,8 @@ fn factors(comparison: &Comparison, axis: &str) -> Vec<Factor> {
 fn with_unit(variation: Variation) -> String {
     match variation {
         Variation::Load(x) => format!("load {} %", signed(100.0 * x, 0)),
-        Variation::Mass(x) => format!("mass {x} kg"),
-        Variation::Supply(x) => format!("supply {x} bar"),
+        Variation::Mass(x) => format!("mass × {x}"),
+        Variation::Supply(x) => format!("supply {} bar", signed(x, 0)),
         Variation::Friction(x) => format!("friction × {x}"),
         Variation::Delay(x) => format!("valve delay × {x}"),
         Variation::Spread(x) => format!("valves ± {:.0} %", 100.0 * x),
