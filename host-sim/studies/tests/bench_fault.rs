@@ -1,7 +1,7 @@
 //! A replayed case on the bench in which the supervision latches a fault.
 
 use wheeleg_config::AxisConfig;
-use wheeleg_config::bench::{Air, Bench, Kind, Move, StartUp};
+use wheeleg_config::bench::{Air, Bench, Kind, Move, StartUp, Variation, Varied};
 use wheeleg_studies::bench::{play, write};
 use wheeleg_studies::study::Settings;
 
@@ -18,6 +18,7 @@ fn a_fault_is_told_with_its_time_meaning_and_remedy() {
         sheet,
         plant,
         deviations: Vec::new(),
+        variation: Varied::Always(Variation::Nominal),
         load_share: 0.0,
         motion: Move::FirstStep,
         controller: Kind::Predictive,

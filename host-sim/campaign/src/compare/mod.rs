@@ -14,12 +14,11 @@ mod results;
 use std::path::{Path, PathBuf};
 
 use wheeleg_config::AxisConfig;
-use wheeleg_plant::axis::Axis;
 use wheeleg_report::results::CSV;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::Kind;
 use wheeleg_studies::compare::{
-    Before, Cases as Form, Judged, Move, Row, Variation, axis_error, load, read_before,
+    Before, Cases as Form, Judged, Move, Row, Variation, ensure_playable, load, read_before,
 };
 use wheeleg_studies::study::schema::json;
 use wheeleg_studies::study::{Finished, Job, Progress, STACK, Settings, Stopped};
@@ -257,11 +256,7 @@ fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
     let variations: Vec<Variation> = one_at_a_time.chain(drawn).collect();
     for config in &configs {
         for variation in &variations {
-            let plant = variation.factors(&config.axis).plant(&config.axis);
-            if let Err(e) = Axis::new(&plant) {
-                variation.ensure_possible(config)?;
-                return Err(axis_error(&config.name, &e.into()));
-            }
+            ensure_playable(config, *variation)?;
         }
     }
     Ok(configs)

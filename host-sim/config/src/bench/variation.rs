@@ -166,7 +166,8 @@ impl Variation {
         let fields = |p: &AxisParams| {
             let (supply, friction) = (&p.supply, &p.cylinder.friction);
             // No bench board reads the contact, so one that would never close is no reason for a refusal.
-            let contact_pa = |pa: f64| pa.min(supply.set_pressure_pa);
+            let on_pa = supply.switch.on_pa.min(0.99 * supply.set_pressure_pa);
+            let off_pa = supply.switch.off_pa.min(0.98 * supply.set_pressure_pa);
             let timing_spread = p.cylinder.timing_spread.to_vec();
             [
                 ("moving.mass", vec![p.moving_mass_kg], "kg"),
@@ -177,16 +178,8 @@ impl Variation {
                     vec![supply.source_pressure_pa],
                     "Pa",
                 ),
-                (
-                    "supply.switch_on",
-                    vec![contact_pa(supply.switch.on_pa)],
-                    "Pa",
-                ),
-                (
-                    "supply.switch_off",
-                    vec![contact_pa(supply.switch.off_pa)],
-                    "Pa",
-                ),
+                ("supply.switch_on", vec![on_pa], "Pa"),
+                ("supply.switch_off", vec![off_pa], "Pa"),
                 ("friction.coulomb", vec![friction.coulomb_n], "N"),
                 ("friction.static", vec![friction.static_n], "N"),
                 ("friction.viscous", vec![friction.viscous_n_s_m], "N s/m"),

@@ -5,6 +5,7 @@
 //! derives from the sheet. Cases are independent, and each can be played alone by its name. The comparison itself
 //! is a campaign of them.
 
+mod bounds;
 mod case;
 mod judged;
 mod moves;
@@ -13,6 +14,7 @@ mod single;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+pub use bounds::fastest_steps;
 pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
 pub use judged::{
     Before, ERROR_MM, Judged, OVERSHOOT_MM, Paired, Quantile, judging_root, read_before,
@@ -28,6 +30,7 @@ use crate::axis_sim::suite::{AxisSimError, TestRig};
 use crate::axis_sim::{Kind, design};
 use crate::study;
 use wheeleg_config::AxisConfig;
+use wheeleg_plant::axis::Axis;
 
 /// Contents of `summary.json`.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -65,4 +68,17 @@ pub fn load(name: &str, kinds: &[Kind]) -> Result<AxisConfig, StudyError> {
             .map_err(|e| axis_error(name, &e))?;
     }
     Ok(config)
+}
+
+/// Refuses a variation that this axis's plant cannot have, as its file would be refused with it.
+///
+/// # Errors
+/// [`StudyError`] with the fields of the file, or with what the plant refuses.
+pub fn ensure_playable(config: &AxisConfig, variation: Variation) -> Result<(), StudyError> {
+    let plant = variation.factors(&config.axis).plant(&config.axis);
+    let Err(e) = Axis::new(&plant) else {
+        return Ok(());
+    };
+    variation.ensure_possible(config)?;
+    Err(axis_error(&config.name, &e.into()))
 }
