@@ -10,7 +10,7 @@ use crate::step_back::is_no_step_back;
 use wheeleg_config::AxisConfig;
 use wheeleg_report::stats::{bounded_quantile, failure_bound};
 use wheeleg_studies::axis_sim::Kind;
-use wheeleg_studies::compare::{Case, Move, Row, Variation, judging_root};
+use wheeleg_studies::compare::{Case, Move, Row, Variation, fault_names, judging_root};
 
 /// Combinations of the bench axis; the other axes get two fifths of it.
 const COMBINATIONS_VARIABLE: &str = "WHEELEG_COMBINATIONS";
@@ -69,7 +69,11 @@ fn few_combinations_miss_on_the_four_axes() {
             let f = &row.figures;
             println!(
                 "{}: error {:?} mm, overshoot {:?} mm, limit cycle {:?}, {}",
-                row.case.id, f.steady_error_mm, f.overshoot_mm, f.limit_cycle, f.faults
+                row.case.id,
+                f.steady_error_mm,
+                f.overshoot_mm,
+                f.limit_cycle,
+                fault_names(f.faults)
             );
         }
         let misses = missed.len() as u64;

@@ -169,6 +169,43 @@ fn any_number_of_threads_writes_the_same_bytes() {
     assert!(!page.contains("1 axes") && !page.contains("≤ –"));
 }
 
+/// Cases are kept for the same options alone: with another root the old results move away as a whole, and nothing of them
+/// is in the new ones.
+#[test]
+fn cases_of_other_options_are_not_mixed_with_new_ones() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let options = |root| Options {
+        kinds: vec![Kind::PwmP],
+        moves: Some(vec![Move::FirstStep]),
+        seeds: 1,
+        root,
+        ..small(2)
+    };
+    let out = folder.path().join("out");
+    let summary = |folder: &Path| fs::read(folder.join("summary.json")).expect("written");
+    let settings = Settings::new(&out);
+    compare::compare(&options(1), &settings).expect("written");
+    let first = summary(&out);
+    // A part of the first is not written again.
+    let part = out.join("campaign/sheet/parts/000000.parquet");
+    let written = |path: &Path| {
+        fs::metadata(path)
+            .and_then(|m| m.modified())
+            .expect("a part")
+    };
+    let before = written(&part);
+    compare::compare(&options(1), &settings).expect("written");
+    assert_eq!((written(&part), summary(&out)), (before, first));
+    compare::compare(&options(50), &settings).expect("written");
+    let fresh = folder.path().join("fresh");
+    compare::compare(&options(50), &Settings::new(&fresh)).expect("written");
+    assert_eq!(summary(&out), summary(&fresh));
+    let moved = files(&out).into_keys().any(|name| {
+        name.starts_with("previous") && name.ends_with("campaign/combinations/plan.json")
+    });
+    assert!(moved);
+}
+
 /// A version against itself: every combination has its pair, and none turns. Against one that kept what this one misses,
 /// and the other way round, each is counted on its side.
 #[test]

@@ -180,9 +180,17 @@ fn tables_in_each_others_place_are_told_in_few_words() {
 #[test]
 fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
     let place = Place::new();
-    let id = "bench-vq110u/pwm-p/step-100/drawn=7/1";
+    let id = "bench-vq110u/pwm-p/step-100/drawn=7/0";
     let case = format!("{{\"id\":\"{id}\",\"variation\":\"drawn=7\"}}");
-    let summary = |cases: &str| format!("{{\"schema\":\"wheeleg.compare/1\",\"cases\":[{cases}]}}");
+    let of_schema = |schema: u32, cases: &str| {
+        format!("{{\"schema\":\"wheeleg.compare/{schema}\",\"cases\":[{cases}]}}")
+    };
+    let summary = |cases: &str| of_schema(3, cases);
+    // Its combinations of these numbers had other noise.
+    place.write(
+        "old.json",
+        &of_schema(2, &case.replace("drawn=7", "drawn=8")),
+    );
     place.write("other.json", &summary(&case));
     place.write("none.json", &summary(""));
     place.write("list.json", "[]");
@@ -204,6 +212,10 @@ fn a_comparison_with_other_combinations_is_refused_before_it_is_played() {
     let none = "none of the 3 random combinations from --root 8 on";
     against("other.json", &["other.json", none]);
     against("none.json", &["none.json", none]);
+    against(
+        "old.json",
+        &["old.json", "`wheeleg.compare/2`", "`wheeleg.compare/3`"],
+    );
     against("list.json", &["list.json", "`schema` and `cases`"]);
     against("/dev/zero", &["/dev/zero", "more than 64 MiB"]);
 }

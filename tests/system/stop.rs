@@ -1,7 +1,7 @@
 //! Studies stopped by a signal write their results so far and say so; two of them never share a folder.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -113,12 +113,28 @@ fn a_comparison_that_is_interrupted_has_the_cases_that_were_played() {
 }
 
 #[test]
+fn a_comparison_that_is_interrupted_while_it_looks_for_bounds_has_no_case() {
+    let arguments = ["compare", "--axis", "bench-vq110u"];
+    let (summary, _folder) = interrupted("compare", &arguments, Duration::from_millis(300));
+    assert_eq!(summary["stopped"]["done"], 0);
+    assert_eq!(summary["cases"], serde_json::json!([]));
+}
+
+#[test]
 fn a_comparison_that_was_interrupted_goes_on_to_the_results_of_a_whole_one() {
     let arguments = ["compare", "--axis", "bench-vq110u", "--quick"];
     let law = ["--controller", "predictive", "--move", "s-curve"];
-    let arguments = [&arguments[..], &law, &["--combinations", "300"]].concat();
+    let arguments = [&arguments[..], &law, &["--combinations", "600"]].concat();
     let (stopped, folder) = interrupted("compare", &arguments, Duration::from_secs(2));
     let out = folder.path().join("out");
+    // Its first two campaigns were done.
+    let parts =
+        ["sheet", "factors"].map(|name| out.join(format!("campaign/{name}/parts/000000.parquet")));
+    let written = || {
+        let of = |part: &PathBuf| fs::metadata(part).and_then(|m| m.modified());
+        parts.each_ref().map(|part| of(part).expect("a part"))
+    };
+    let before = written();
     let again = end(start(&out, &arguments, Stdio::piped));
     assert_eq!(again.status.code(), Some(0));
     let whole = folder.path().join("whole");
@@ -128,9 +144,9 @@ fn a_comparison_that_was_interrupted_goes_on_to_the_results_of_a_whole_one() {
     );
     let all = fs::read(whole.join("summary.json")).expect("a summary");
     assert_eq!(fs::read(out.join("summary.json")).expect("a summary"), all);
-    // What was played before the signal was not played again.
     let done = stopped["stopped"]["done"].as_u64().expect("a number");
-    assert!(done > 0);
+    assert!(done > 13);
+    assert_eq!(written(), before, "what was done was not done again");
     let table = |folder: &Path| fs::read(folder.join("csv/cases.csv")).expect("a table");
     assert_eq!(table(&out), table(&whole));
 }

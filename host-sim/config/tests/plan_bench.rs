@@ -61,6 +61,51 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
     assert_eq!(bench.variation, Varied::Always(Variation::Friction(2.0)));
 }
 
+/// A variation changes the plant that the factors have made, and its deviations are those of the plant that is played.
+#[test]
+fn a_variation_comes_after_the_factors_of_the_plant() {
+    let plan = plan(&format!(
+        "{HEAD}{BASE}variation = \"mass-factor=2\"\n\
+         [factor.mass]\nparameter = \"plant.moving.mass\"\ngrid = [3.0]\nunit = \"kg\"\n\
+         [factor.bore]\nparameter = \"plant.cylinder.bore\"\ngrid = [21.0]\nunit = \"mm\"\n"
+    ));
+    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
+    let values = [Value::Number(3.0), Value::Number(21.0)];
+    let case = Resolver::new(&plan).expect("read").resolve(&values);
+    let bench = case
+        .expect("it can be")
+        .on_bench()
+        .expect("a cylinder")
+        .bench;
+    assert_eq!(bench.varied(1).moving_mass_kg.to_bits(), 6.0_f64.to_bits());
+    let told = bench.deviations(1);
+    let told: Vec<_> = told
+        .iter()
+        .map(|d| (d.name.as_str(), d.sheet, d.plant))
+        .collect();
+    assert_eq!(
+        told,
+        [("cylinder.bore", 20.0, 21.0), ("moving.mass", 1.5, 6.0)]
+    );
+}
+
+/// With less supply the reservoir begins with less, too; the contact, which nobody changed, is not told.
+#[test]
+fn deviations_of_a_variation_are_those_of_the_plant() {
+    let plan = plan(&format!("{HEAD}{BASE}variation = \"supply-change=-2\"\n"));
+    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
+    let case = Resolver::new(&plan).expect("read").resolve(&[]);
+    let bench = case
+        .expect("it can be")
+        .on_bench()
+        .expect("a cylinder")
+        .bench;
+    let told = bench.deviations(1);
+    let names: Vec<&str> = told.iter().map(|d| d.name.as_str()).collect();
+    assert_eq!(names, ["supply.set_pressure", "supply.initial_pressure"]);
+    assert!(told.iter().all(|d| (d.sheet - d.plant - 2e5).abs() < 1e-6));
+}
+
 /// A variation is content of a case, and a case without one has the content that it had before there were any.
 #[test]
 fn a_variation_is_part_of_a_case_and_none_is_no_part() {

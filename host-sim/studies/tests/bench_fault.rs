@@ -17,7 +17,7 @@ fn a_fault_is_told_with_its_time_meaning_and_remedy() {
         axis: "bench-vq110u".to_owned(),
         sheet,
         plant,
-        deviations: Vec::new(),
+        without_variation: Vec::new(),
         variation: Varied::Always(Variation::Nominal),
         load_share: 0.0,
         motion: Move::FirstStep,

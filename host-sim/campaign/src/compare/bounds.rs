@@ -18,12 +18,14 @@ pub(super) fn all(
         .as_ref()
         .is_none_or(|m| m.iter().any(|m| matches!(m, Move::Step20 | Move::Step100)));
     let none = vec![[None; 2]; configs.len()];
-    if !wanted || progress.is_stopped() {
+    if !wanted {
         return Ok(none);
     }
     let runs = if options.quick { 480 } else { 1500 };
     let found = progress.all("bounds", configs, |config| {
         fastest_steps(&config.axis, runs, progress).map_err(|e| axis_error(&config.name, &e))
     });
-    Ok(Ended::kept(found)?.unwrap_or(none))
+    let found = Ended::kept(found)?;
+    // A search that was broken off has found no bound.
+    Ok(found.filter(|_| !progress.is_stopped()).unwrap_or(none))
 }

@@ -13,7 +13,7 @@ mod results;
 
 use std::path::{Path, PathBuf};
 
-use wheeleg_config::AxisConfig;
+use wheeleg_config::{AxisConfig, plain_text};
 use wheeleg_report::results::CSV;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::Kind;
@@ -21,7 +21,7 @@ use wheeleg_studies::compare::{
     Before, Cases as Form, Judged, Move, Row, Variation, ensure_playable, load, read_before,
 };
 use wheeleg_studies::study::schema::json;
-use wheeleg_studies::study::{Finished, Job, Progress, STACK, Settings, Stopped};
+use wheeleg_studies::study::{Finished, Job, STACK, Settings, Stopped};
 
 pub use overlays::Overlay;
 
@@ -76,6 +76,21 @@ pub struct ComparedAxis {
     pub bound_s: [Option<[f64; 2]>; 2],
 }
 
+/// A single factor that one of the axes cannot have, and which is therefore played on none.
+#[derive(Debug, Clone)]
+pub struct LeftOut {
+    /// The factor.
+    pub variation: Variation,
+    /// Why.
+    pub why: String,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "left out: `{}`: {}", self.variation, self.why)
+    }
+}
+
 /// The whole comparison.
 #[derive(Debug, Clone)]
 pub struct Comparison {
@@ -85,6 +100,8 @@ pub struct Comparison {
     pub axes: Vec<ComparedAxis>,
     /// One row per case.
     pub rows: Vec<Row>,
+    /// Single factors that were not played.
+    pub left_out: Vec<LeftOut>,
     /// Of the first seed, as on the sheet.
     pub overlays: Vec<Overlay>,
     /// Results of another version in the random combinations.
@@ -151,10 +168,11 @@ pub fn compare(
     settings: &Settings,
 ) -> Result<Finished<Comparison>, CampaignError> {
     let configs = configs(options)?;
+    let (variations, left_out) = one_at_a_time(options, &configs);
     let before = options.against.as_deref();
     let before = before.map(|path| read_before(path, options.root, options.combinations));
     let before = before.transpose()?;
-    let plans = plans::all(options)?;
+    let plans = plans::all(options, &variations)?;
     let mut campaigns = Vec::new();
     for plan in &plans {
         let cases = Cases::new(plan)?;
@@ -175,6 +193,18 @@ pub fn compare(
     let reads: Vec<&Path> = axes.chain(options.against.as_deref()).collect();
     let job = Job::begin_with("compare", settings, &reads, also)?;
 
+    for one in &left_out {
+        job.progress.tell(&one.to_string());
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .stack_size(STACK)
+        .build()
+        .map_err(|e| {
+            StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
+        })?;
+    let bound_s = pool.install(|| bounds::all(options, &configs, &job.progress))?;
+
     let mut results = results::Results::default();
     let (mut done, mut of) = (0, 0);
     for (cases, file) in campaigns {
@@ -194,47 +224,31 @@ pub fn compare(
             let told = format!("set aside: {}: {why}", path.display());
             job.progress.tell(&told);
         }
-        done += ran.found + ran.computed;
+        let rows = store.rows()?;
+        done += rows.len() as u64;
         of += ran.of;
-        results.add(options, &configs, cases.columns(), &store.rows()?);
+        results.add(options, &configs, cases.columns(), &rows);
     }
-    let stopped = job.progress.stopped(done, of, "cases");
     let unplayed = results.unplayed(done);
-    let comparison = finished(options, configs, before, stopped, results, &job.progress)?;
-    Ok(comparison.write(job, unplayed))
-}
-
-/// The comparison of these results, with bounds and overlays.
-fn finished(
-    options: &Options,
-    configs: Vec<AxisConfig>,
-    before: Option<Before>,
-    stopped: Option<Stopped>,
-    results: results::Results,
-    progress: &Progress,
-) -> Result<Comparison, CampaignError> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .stack_size(STACK)
-        .build()
-        .map_err(|e| {
-            StudyError::refused(format!("cannot start threads: {e}"), "try --threads 1")
-        })?;
-    let found = pool.install(|| bounds::all(options, &configs, progress))?;
-    let overlays = pool.install(|| overlays::all(options, &configs, progress))?;
-    let axes = configs.into_iter().zip(found);
+    let wanted = overlays::wanted(options, &configs);
+    let overlays = pool.install(|| overlays::all(options, &wanted, &job.progress))?;
+    let stopped = job.progress.stopped(done, of, "cases");
+    let curves = [overlays.len() as u64, wanted.len() as u64];
+    let stopped = stopped.or_else(|| job.progress.stopped(curves[0], curves[1], "curves"));
+    let axes = configs.into_iter().zip(bound_s);
     let axes: Vec<ComparedAxis> = axes
         .map(|(config, bound_s)| ComparedAxis { config, bound_s })
         .collect();
-    let rows = results.rows(&axes);
-    Ok(Comparison {
+    let comparison = Comparison {
         options: options.clone(),
+        rows: results.rows(&axes),
         axes,
-        rows,
-        overlays,
+        left_out,
+        overlays: overlays.into_iter().flatten().collect(),
         before,
         stopped,
-    })
+    };
+    Ok(comparison.write(job, unplayed))
 }
 
 /// Reads the axes of a comparison.
@@ -251,15 +265,30 @@ fn configs(options: &Options) -> Result<Vec<AxisConfig>, StudyError> {
         configs.push(config);
     }
     // Before the first case: an impossible one would cost all the others.
-    let drawn = (0..options.combinations).map(|k| Variation::Drawn(options.root.wrapping_add(k)));
-    let one_at_a_time = Variation::one_at_a_time(options.quick).into_iter();
-    let variations: Vec<Variation> = one_at_a_time.chain(drawn).collect();
     for config in &configs {
-        for variation in &variations {
-            ensure_playable(config, *variation)?;
+        for number in 0..options.combinations {
+            ensure_playable(config, Variation::Drawn(options.root + number))?;
         }
     }
     Ok(configs)
+}
+
+/// The single factors that all axes can have, and the others.
+fn one_at_a_time(options: &Options, configs: &[AxisConfig]) -> (Vec<Variation>, Vec<LeftOut>) {
+    let (mut possible, mut left_out) = (Vec::new(), Vec::new());
+    for variation in Variation::one_at_a_time(options.quick) {
+        let mut refusals = configs
+            .iter()
+            .map(|config| variation.ensure_possible(config));
+        match refusals.find_map(Result::err) {
+            None => possible.push(variation),
+            Some(refused) => left_out.push(LeftOut {
+                variation,
+                why: plain_text(&refused),
+            }),
+        }
+    }
+    (possible, left_out)
 }
 
 impl Comparison {

@@ -21,30 +21,46 @@ pub struct Overlay {
     pub points: Vec<[f64; 3]>,
 }
 
-/// The curves of the first seed as on the sheet: its cases played again, because a row holds no curve. None of those
-/// that left the plant's model, and none once the comparison is stopped.
-pub(super) fn all(
-    options: &Options,
-    configs: &[AxisConfig],
-    progress: &Progress,
-) -> Result<Vec<Overlay>, StudyError> {
+/// A curve of the page: of the first seed, as on the sheet.
+pub(super) struct Wanted<'a> {
+    config: &'a AxisConfig,
+    kind: Kind,
+    motion: Move,
+}
+
+/// The curves of a comparison.
+pub(super) fn wanted<'a>(options: &Options, configs: &'a [AxisConfig]) -> Vec<Wanted<'a>> {
     let moves = plans::moves(options, &Move::LEARNT);
-    let mut all: Vec<(&AxisConfig, Kind, Move)> = Vec::new();
+    let mut all = Vec::new();
     for config in configs {
         for kind in &options.kinds {
-            all.extend(moves.iter().map(|motion| (config, *kind, *motion)));
+            all.extend(moves.iter().map(|motion| Wanted {
+                config,
+                kind: *kind,
+                motion: *motion,
+            }));
         }
     }
-    progress.begin("curves", all.len() as u64);
-    let curve = |&(config, kind, motion): &(&AxisConfig, Kind, Move)| {
+    all
+}
+
+/// The curves, from their cases played again, because a row holds none; `None` of a case that cannot be played. Fewer
+/// once the comparison is stopped.
+pub(super) fn all(
+    options: &Options,
+    wanted: &[Wanted<'_>],
+    progress: &Progress,
+) -> Result<Vec<Option<Overlay>>, StudyError> {
+    progress.begin("curves", wanted.len() as u64);
+    let curve = |wanted: &Wanted<'_>| {
+        let (config, kind, motion) = (wanted.config, wanted.kind, wanted.motion);
         let case = Case::new(&config.name, &config.axis, Variation::Nominal, options.seed);
         let played = case.and_then(|case| case.play(kind, motion));
         progress.step();
         let played = played.ok().flatten();
         Ok::<_, StudyError>(played.map(|played| Overlay::of(&config.name, kind, motion, &played)))
     };
-    let drawn = progress.map(&all, curve)?;
-    Ok(drawn.into_iter().flatten().flatten().collect())
+    Ok(progress.map(wanted, curve)?.into_iter().flatten().collect())
 }
 
 impl Overlay {

@@ -8,7 +8,7 @@ use wheeleg_report::{Picture, page, pictures, plot::Figure, stats};
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::Kind;
 use wheeleg_studies::compare::{
-    ERROR_MM, Judged, MARGIN, Move, Quantile, Row, Variation, judging_root,
+    ERROR_MM, Judged, MARGIN, Move, Quantile, Row, Variation, fault_names, judging_root,
 };
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -150,6 +150,7 @@ struct Page<'a> {
     played: usize,
     alarms: Vec<Alarm<'a>>,
     beyond_force: Vec<BeyondForce<'a>>,
+    left_out: Vec<String>,
     margin: f64,
     seed: u64,
     last_seed: u64,
@@ -173,7 +174,7 @@ struct Axis<'a> {
 #[derive(Serialize)]
 struct Alarm<'a> {
     id: &'a str,
-    faults: &'a str,
+    faults: String,
 }
 
 #[derive(Serialize)]
@@ -333,7 +334,7 @@ pub(super) fn render(
     });
     let alarms = comparison.false_alarms().map(|r| Alarm {
         id: &r.case.id,
-        faults: &r.figures.faults,
+        faults: fault_names(r.figures.faults),
     });
     let beyond_force = comparison.beyond_force().into_iter();
     let beyond_force = beyond_force.map(|(axis, variation, margin)| BeyondForce {
@@ -356,6 +357,11 @@ pub(super) fn render(
         played,
         alarms: alarms.collect(),
         beyond_force: beyond_force.collect(),
+        left_out: comparison
+            .left_out
+            .iter()
+            .map(ToString::to_string)
+            .collect(),
         margin: MARGIN,
         seed: options.seed,
         last_seed: options.seed + options.seeds - 1,

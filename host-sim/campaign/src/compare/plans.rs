@@ -30,8 +30,11 @@ struct Part {
 
 /// The plans with cases in them: as on the sheet for all seeds, one factor at a time, and random combinations, whose
 /// seeds are their numbers.
-pub(super) fn all(options: &Options) -> Result<Vec<Plan>, ConfigError> {
-    let one_at_a_time = Variation::one_at_a_time(options.quick).into_iter();
+pub(super) fn all(
+    options: &Options,
+    one_at_a_time: &[Variation],
+) -> Result<Vec<Plan>, ConfigError> {
+    let one_at_a_time = one_at_a_time.iter().copied();
     let parts = [
         Part {
             name: "sheet",
@@ -58,7 +61,9 @@ pub(super) fn all(options: &Options) -> Result<Vec<Plan>, ConfigError> {
             air: Air::Unknown,
         },
     ];
-    let parts = parts.iter().filter(|part| part.seeds[1] > 0);
+    let parts = parts
+        .iter()
+        .filter(|part| part.seeds[1] > 0 && !part.variations.is_empty());
     parts.map(|part| plan(options, part)).collect()
 }
 

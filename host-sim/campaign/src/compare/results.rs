@@ -28,8 +28,30 @@ pub(super) struct Results {
 struct Unplayed {
     /// Its name.
     id: String,
+    status: Status,
     /// When and how it ended.
     error: String,
+}
+
+impl Unplayed {
+    fn of(id: String, row: &CampaignRow) -> Self {
+        Self {
+            id,
+            status: row.status,
+            error: row.error.clone().unwrap_or_default(),
+        }
+    }
+
+    const fn help(&self) -> &'static str {
+        match self.status {
+            Status::Ok | Status::Error | Status::Limit => {
+                "change the axis file so that its variations can be simulated"
+            }
+            Status::Panic | Status::Crashed => {
+                "report this with the axis file: the program must not fail on any"
+            }
+        }
+    }
 }
 
 /// The case of a row of a campaign: the place of its axis among the requested ones, and its name.
@@ -74,22 +96,16 @@ impl Results {
     ) {
         for row in rows {
             let Some((axis, id)) = case_of(options, configs, columns, row) else {
-                self.unplayed.push(Unplayed {
-                    id: row.case.to_string(),
-                    error: "its factors are those of no comparison".to_owned(),
-                });
+                self.unplayed.push(Unplayed::of(row.case.to_string(), row));
                 continue;
             };
             let value = |quantity: &str| row.figure(columns, quantity).value;
             let case = CaseFacts::of(&id, &configs[axis].axis, value(FOUND_DELAY));
             let figures = match (case.feasible, row.status) {
                 (false, _) => Figures::default(),
-                (true, Status::Ok) => {
-                    Figures::from_quantities(value, row.error.clone().unwrap_or_default())
-                }
+                (true, Status::Ok) => Figures::from_quantities(value),
                 (true, _) => {
-                    let (id, error) = (case.id, row.error.clone().unwrap_or_default());
-                    self.unplayed.push(Unplayed { id, error });
+                    self.unplayed.push(Unplayed::of(case.id, row));
                     continue;
                 }
             };
@@ -107,7 +123,7 @@ impl Results {
                 first.id,
                 first.error
             ),
-            "change the axis file so that its variations can be simulated",
+            first.help(),
         ))
     }
 
@@ -185,11 +201,23 @@ mod tests {
     use wheeleg_studies::study::Stop;
 
     /// Every case of a comparison's plans has the facts and figures, to the bit, of the same case played alone by its
-    /// name. (The supervision's words are the campaign's own, and nothing is compared with a bound.)
+    /// name; nothing is compared with a bound.
     #[test]
     fn a_row_of_a_campaign_is_the_case_of_its_name() {
+        // 130 N of 143 N of force left: most of its cases are beyond the force available.
+        let folder = tempfile::tempdir().expect("a folder");
+        let bench = AxisConfig::load("bench-vq110u").expect("built in").source;
+        let text = bench
+            .text
+            .replace("load = { value = 0.0", "load = { value = 130.0");
+        let heavy = folder.path().join("heavy.toml");
+        std::fs::write(&heavy, text.replace("bench-vq110u", "heavy")).expect("written");
         let options = Options {
-            axes: vec!["bench-vq110u".to_owned(), "small-12x50".to_owned()],
+            axes: vec![
+                "bench-vq110u".to_owned(),
+                "small-12x50".to_owned(),
+                heavy.to_string_lossy().into_owned(),
+            ],
             kinds: vec![Kind::PwmP, Kind::Predictive],
             moves: None,
             seeds: 2,
@@ -201,10 +229,10 @@ mod tests {
             threads: 1,
             program: None,
         };
-        let load = |name: &String| AxisConfig::load(name).expect("built in");
+        let load = |name: &String| AxisConfig::load(name).expect("read");
         let configs: Vec<AxisConfig> = options.axes.iter().map(load).collect();
         let mut played = [0; 2];
-        for plan in plans::all(&options).expect("sound") {
+        for plan in plans::all(&options, &Variation::one_at_a_time(true)).expect("sound") {
             let cases = Cases::new(&plan).expect("sound");
             // One case in a few, of every plan.
             for index in (0..plan.cases()).step_by(5) {
@@ -215,21 +243,17 @@ mod tests {
                     case_of(&options, &configs, cases.columns(), &row).expect("a case");
                 let mut results = Results::default();
                 results.add(&options, &configs, cases.columns(), &[row]);
-                let [mut own] = <[Row; 1]>::try_from(results.rows).expect("one row");
+                let [own] = <[Row; 1]>::try_from(results.rows).expect("one row");
                 let sheet = &configs[axis].axis;
                 let alone = Case::new(&id.axis, sheet, id.variation, id.seed).expect("played");
                 let traces = alone.play(id.kind, id.motion).expect("played");
                 let expected = alone.row(id.kind, id.motion, traces.as_ref(), None);
-                own.figures.faults.clone_from(&expected.figures.faults);
                 assert_eq!(own, expected);
                 played[usize::from(traces.is_some())] += 1;
             }
         }
         let [beyond_force, played] = played;
-        assert!(
-            played > 20 && beyond_force < played,
-            "{played}, {beyond_force}"
-        );
+        assert!(played > 20 && beyond_force > 5, "{played}, {beyond_force}");
     }
 
     #[test]
@@ -248,7 +272,7 @@ mod tests {
             program: None,
         };
         let configs = [AxisConfig::load("bench-vq110u").expect("built in")];
-        let plans = plans::all(&options).expect("sound");
+        let plans = plans::all(&options, &Variation::one_at_a_time(true)).expect("sound");
         let cases = Cases::new(&plans[0]).expect("sound");
         let ended = |index, status, error: &str| {
             let outcome = Outcome::without(status, error.to_owned());

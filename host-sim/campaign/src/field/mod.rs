@@ -315,9 +315,8 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
         let told = format!("set aside: {}: {why}", path.display());
         job.progress.tell(&told);
     }
-    let (done, of) = (ran.found + ran.computed, ran.of);
-    let stopped = job.progress.stopped(done, of, "runs");
     let rows = store.rows()?;
+    let stopped = job.progress.stopped(rows.len() as u64, ran.of, "runs");
     let mut all = Vec::new();
     for scenario in &options.scenarios {
         // The one factor is the scenario.

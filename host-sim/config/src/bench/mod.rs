@@ -135,7 +135,7 @@ pub const LOAD_SHARES: [f64; 2] = [-0.95, 0.95];
 pub struct Deviation {
     /// Path in the axis file; of a list, with the place of the element.
     pub name: String,
-    /// Unit of both values, that of the data sheet.
+    /// Unit of both values: that of the data sheet, or where a variation changed them that of the SI.
     pub unit: String,
     /// What the data sheet states.
     pub sheet: f64,
@@ -194,8 +194,8 @@ pub struct Bench {
     pub sheet: AxisParams,
     /// The plant.
     pub plant: AxisParams,
-    /// Where the plant is not as the data sheet says, without the variation.
-    pub deviations: Vec<Deviation>,
+    /// Where that is not as the data sheet says.
+    pub without_variation: Vec<Deviation>,
     /// Further deviations of the plant.
     pub variation: Varied,
     /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
@@ -208,4 +208,31 @@ pub struct Bench {
     pub delays: StartUp,
     /// Air at power-up.
     pub air: Air,
+}
+
+impl Bench {
+    /// The plant of the case with this seed: with its variation, and without `load_share`.
+    #[must_use]
+    pub fn varied(&self, seed: u64) -> AxisParams {
+        self.variation
+            .of_seed(seed)
+            .factors(&self.plant)
+            .plant(&self.plant)
+    }
+
+    /// Where this plant is not as the data sheet says.
+    #[must_use]
+    pub fn deviations(&self, seed: u64) -> Vec<Deviation> {
+        let mut all = self.without_variation.clone();
+        if self.variation == Varied::Always(Variation::Nominal) {
+            return all;
+        }
+        for field in variation::differing(&self.sheet, &self.varied(seed)) {
+            let pairs = field.sheet.into_iter().zip(field.plant);
+            let own = Deviation::of(field.path, field.unit, pairs);
+            all.retain(|known| own.iter().all(|own| own.name != known.name));
+            all.extend(own);
+        }
+        all
+    }
 }

@@ -5,8 +5,9 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 use wheeleg_plant::axis::AxisParams;
+use wheeleg_plant::sensors::AdcNoise;
 
-use super::{Deviation, Factors, StartUp};
+use super::{Factors, StartUp};
 use crate::axis::Change;
 use crate::{AxisConfig, ConfigError};
 
@@ -62,7 +63,9 @@ fn known() -> String {
     let numbered =
         NUMBERED.map(|(name, what, [low, high], _)| format!("{name}={what} ({low} to {high})"));
     let names = numbered.join(", ");
-    format!("nominal, {names}, combination=NUMBER, drawn=NUMBER")
+    format!(
+        "nominal, {names}, combination=NUMBER, drawn=NUMBER; in a plan drawn, too, without a number"
+    )
 }
 
 impl Variation {
@@ -139,56 +142,27 @@ impl Variation {
     /// The corresponding fields of an axis file, with their values, if they differ from the sheet's.
     #[must_use]
     pub fn changes(&self, sheet: &AxisParams) -> Vec<Change> {
-        let change = |(path, _, values, unit): (&str, _, Vec<f64>, &str)| Change {
-            path: path.to_owned(),
+        let plant = self.factors(sheet).plant(sheet);
+        let differing = differing(sheet, &plant).into_iter();
+        // No bench board reads the contact, so one that would never close is no reason for a refusal.
+        let contact = |path: &str, own_pa: f64, share: f64| {
+            let pa = own_pa.min(share * plant.supply.set_pressure_pa);
+            (pa != own_pa).then(|| (path.to_owned(), vec![pa], "Pa"))
+        };
+        let switch = &sheet.supply.switch;
+        let contacts = [
+            contact("supply.switch_on", switch.on_pa, 0.99),
+            contact("supply.switch_off", switch.off_pa, 0.98),
+        ];
+        let fields = differing.map(|field| (field.path.to_owned(), field.plant, field.unit));
+        let fields = fields.chain(contacts.into_iter().flatten());
+        let change = |(path, values, unit): (String, Vec<f64>, &str)| Change {
+            path,
             values,
             unit: unit.to_owned(),
             source: format!("`{self}`"),
         };
-        self.changed(sheet).map(change).collect()
-    }
-
-    /// The same as deviations of the plant from the sheet.
-    #[must_use]
-    pub fn deviations(&self, sheet: &AxisParams) -> Vec<Deviation> {
-        let of = |(path, own, values, unit): (&str, Vec<f64>, Vec<f64>, &str)| {
-            Deviation::of(path, unit, own.into_iter().zip(values))
-        };
-        self.changed(sheet).flat_map(of).collect()
-    }
-
-    /// Fields that differ: path, values of the sheet and of the plant, unit.
-    fn changed(
-        &self,
-        sheet: &AxisParams,
-    ) -> impl Iterator<Item = (&'static str, Vec<f64>, Vec<f64>, &'static str)> {
-        let plant = self.factors(sheet).plant(sheet);
-        let fields = |p: &AxisParams| {
-            let (supply, friction) = (&p.supply, &p.cylinder.friction);
-            // No bench board reads the contact, so one that would never close is no reason for a refusal.
-            let on_pa = supply.switch.on_pa.min(0.99 * supply.set_pressure_pa);
-            let off_pa = supply.switch.off_pa.min(0.98 * supply.set_pressure_pa);
-            let timing_spread = p.cylinder.timing_spread.to_vec();
-            [
-                ("moving.mass", vec![p.moving_mass_kg], "kg"),
-                ("moving.load", vec![p.load_n], "N"),
-                ("supply.set_pressure", vec![supply.set_pressure_pa], "Pa"),
-                (
-                    "supply.source_pressure",
-                    vec![supply.source_pressure_pa],
-                    "Pa",
-                ),
-                ("supply.switch_on", vec![on_pa], "Pa"),
-                ("supply.switch_off", vec![off_pa], "Pa"),
-                ("friction.coulomb", vec![friction.coulomb_n], "N"),
-                ("friction.static", vec![friction.static_n], "N"),
-                ("friction.viscous", vec![friction.viscous_n_s_m], "N s/m"),
-                ("cylinder.timing_spread", timing_spread, "1"),
-            ]
-        };
-        let both = fields(sheet).into_iter().zip(fields(&plant));
-        let both = both.map(|((path, own, unit), (_, values, _))| (path, own, values, unit));
-        both.filter(|(_, own, values, _)| own != values)
+        fields.map(change).collect()
     }
 
     /// Refuses an impossible axis, as its file would be refused with these values in it.
@@ -263,6 +237,58 @@ impl FromStr for Variation {
     }
 }
 
+/// A field of an axis file that a variation may change, with the values of sheet and plant.
+pub(super) struct Field {
+    pub(super) path: &'static str,
+    pub(super) sheet: Vec<f64>,
+    pub(super) plant: Vec<f64>,
+    pub(super) unit: &'static str,
+}
+
+/// Those fields in which a plant differs from its sheet.
+pub(super) fn differing(sheet: &AxisParams, plant: &AxisParams) -> Vec<Field> {
+    let fields = |p: &AxisParams| {
+        let (supply, friction) = (&p.supply, &p.cylinder.friction);
+        let noise = match p.adc.noise {
+            AdcNoise::None => 0.0,
+            AdcNoise::Uniform { half_width_lsb } => half_width_lsb,
+            AdcNoise::Gaussian { sigma_lsb } => sigma_lsb,
+        };
+        [
+            ("moving.mass", vec![p.moving_mass_kg], "kg"),
+            ("moving.load", vec![p.load_n], "N"),
+            ("supply.set_pressure", vec![supply.set_pressure_pa], "Pa"),
+            (
+                "supply.initial_pressure",
+                vec![supply.initial_pressure_pa],
+                "Pa",
+            ),
+            (
+                "supply.source_pressure",
+                vec![supply.source_pressure_pa],
+                "Pa",
+            ),
+            ("friction.coulomb", vec![friction.coulomb_n], "N"),
+            ("friction.static", vec![friction.static_n], "N"),
+            ("friction.viscous", vec![friction.viscous_n_s_m], "N s/m"),
+            (
+                "cylinder.timing_spread",
+                p.cylinder.timing_spread.to_vec(),
+                "1",
+            ),
+            ("sensor.adc.noise", vec![noise], "LSB"),
+        ]
+    };
+    let both = fields(sheet).into_iter().zip(fields(plant));
+    let both = both.map(|((path, sheet, unit), (_, plant, _))| Field {
+        path,
+        sheet,
+        plant,
+        unit,
+    });
+    both.filter(|field| field.sheet != field.plant).collect()
+}
+
 /// The variation of a case of a plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Varied {
@@ -273,7 +299,7 @@ pub enum Varied {
 }
 
 impl Varied {
-    /// The words of a plan for it.
+    /// The word of a plan for a random combination.
     pub const DRAWN: &str = "drawn";
 
     /// The variation of a case with this seed.

@@ -129,7 +129,7 @@ pub const MOST_BLOCKS: u64 = 1_000_000;
 /// Most samples, replicates and cases of a plan: indices stay exact in tables of floats, too.
 const MOST: u64 = MOST_IN_BLOCK * MOST_BLOCKS;
 /// Largest first seed, for the same reason.
-const SEED_MOST: u64 = 1 << f64::MANTISSA_DIGITS;
+pub const SEED_MOST: u64 = 1 << f64::MANTISSA_DIGITS;
 
 impl Plan {
     /// A plan by built-in name, or from a TOML file.

@@ -293,7 +293,7 @@ impl<'a> Resolver<'a> {
             None => base.variation,
         };
         if let Varied::Always(variation) = variation {
-            variation.ensure_possible(&sheet)?;
+            variation.ensure_possible(&plant)?;
         }
         let bench = Bench {
             axis: sheet.name.clone(),
@@ -303,7 +303,7 @@ impl<'a> Resolver<'a> {
             air: named(factors, Setting::Air, base.air, Air::of_name)?,
             sheet: sheet.axis.clone(),
             plant: plant.axis.clone(),
-            deviations: Deviation::all(&sheet.parameters, &plant.parameters),
+            without_variation: Deviation::all(&sheet.parameters, &plant.parameters),
             variation,
             load_share,
         };

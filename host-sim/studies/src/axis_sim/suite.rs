@@ -11,7 +11,7 @@ use wheeleg_plant::axis::AxisParams;
 
 pub use super::error::AxisSimError;
 use super::{AxisSim, Design, Firmware, Kind, LoadEvent, Motion, Node, Trace};
-use super::{design, design_with, identify};
+use super::{Delays, design, design_with, identify};
 
 /// Draws the unknowns of a board at power-up by a number: both chamber pressures between the atmosphere
 /// and the supply, such that with the load the piston stands within half of its friction. Returns the
@@ -62,10 +62,42 @@ pub fn designed(
     start: StartUp,
     seed: u64,
 ) -> Result<Design, AxisSimError> {
-    Ok(match start {
+    Ok(designed_with(
+        sheet,
+        searched(sheet, plant, start, seed)?,
+        kind,
+        start,
+    ))
+}
+
+/// The valves' delays that a board has found at start-up; none if it did not search for them, or found none.
+///
+/// # Errors
+/// [`AxisSimError`].
+pub fn searched(
+    sheet: &AxisParams,
+    plant: &AxisParams,
+    start: StartUp,
+    seed: u64,
+) -> Result<Option<Delays>, AxisSimError> {
+    match start {
+        StartUp::Sheet => Ok(None),
+        StartUp::Identified => identify(plant, sheet, seed),
+    }
+}
+
+/// The design of a controller whose board has [`searched`] for the valves' delays.
+#[must_use]
+pub fn designed_with(
+    sheet: &AxisParams,
+    found: Option<Delays>,
+    kind: Kind,
+    start: StartUp,
+) -> Design {
+    match start {
         StartUp::Sheet => design(sheet, kind),
-        StartUp::Identified => design_with(sheet, identify(plant, sheet, seed)?, kind),
-    })
+        StartUp::Identified => design_with(sheet, found, kind),
+    }
 }
 
 /// A supervised board on its plant, moved from place to place.

@@ -5,13 +5,12 @@ mod files;
 mod targets;
 
 use serde::Serialize;
-use wheeleg_config::bench::{Air, Bench, Deviation, StartUp};
+use wheeleg_config::bench::{Air, Bench, Deviation};
 
 pub use files::{BenchFault, BenchSummary, write};
 pub use targets::{FOUND_DELAY, targets, unmeasured};
 
-use crate::axis_sim::suite::{AxisSimError, draw_start, force_left_n};
-use crate::axis_sim::{design, design_with, identify};
+use crate::axis_sim::suite::{AxisSimError, designed_with, draw_start, force_left_n, searched};
 use crate::compare::{Played, play_from_power_up};
 
 /// A case that was played.
@@ -36,22 +35,15 @@ pub const NO_LOAD: f64 = 1e3;
 /// # Errors
 /// [`AxisSimError`] if plant or board refuse their data, or the plant leaves the range of its model.
 pub fn play(bench: &Bench, seed: u64) -> Result<PlayedBench, AxisSimError> {
-    let factors = bench.variation.of_seed(seed).factors(&bench.sheet);
-    let mut plant = factors.plant(&bench.plant);
+    let mut plant = bench.varied(seed);
     let left_n = force_left_n(&plant);
     plant.load_n += bench.load_share * left_n;
     let wait_ms = match bench.air {
         Air::File => 0,
         Air::Unknown => draw_start(&mut plant, seed)?,
     };
-    let found = match bench.delays {
-        StartUp::Sheet => None,
-        StartUp::Identified => identify(&plant, &bench.sheet, seed)?,
-    };
-    let design = match bench.delays {
-        StartUp::Sheet => design(&bench.sheet, bench.controller),
-        StartUp::Identified => design_with(&bench.sheet, found, bench.controller),
-    };
+    let found = searched(&bench.sheet, &plant, bench.delays, seed)?;
+    let design = designed_with(&bench.sheet, found, bench.controller, bench.delays);
     let plants = [&bench.sheet, &plant];
     let played = play_from_power_up(bench.motion, plants, &design, seed, wait_ms)?;
     Ok(PlayedBench {
@@ -78,7 +70,8 @@ pub struct About {
     pub air: &'static str,
     /// Force on the rod in addition to the plant's, as a share of the force left; positive extends.
     pub load_share: f64,
-    /// Variation of the plant, as `wheeleg compare` names it; `nominal` without one.
+    /// Variation of the plant, in a word of a plan; `drawn=NUMBER` of a random combination of factors, whose air is told by
+    /// `air`.
     pub variation: String,
     /// Where the plant is not as the data sheet says.
     pub deviations: Vec<Deviation>,
@@ -90,9 +83,6 @@ impl About {
     /// Of a case.
     #[must_use]
     pub fn of(bench: &Bench, seed: u64) -> Self {
-        let variation = bench.variation.of_seed(seed);
-        let mut deviations = bench.deviations.clone();
-        deviations.extend(variation.deviations(&bench.sheet));
         Self {
             axis: bench.axis.clone(),
             controller: bench.controller.name(),
@@ -100,8 +90,8 @@ impl About {
             delays: bench.delays.name(),
             air: bench.air.name(),
             load_share: bench.load_share,
-            variation: variation.to_string(),
-            deviations,
+            variation: bench.variation.of_seed(seed).to_string(),
+            deviations: bench.deviations(seed),
             seed: seed.to_string(),
         }
     }

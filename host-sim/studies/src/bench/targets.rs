@@ -1,6 +1,7 @@
 //! What a case on the bench is judged by, and what it is described by.
 
 use wheeleg_config::bench::{Bench, Move};
+use wheeleg_protocol::{Fault, FaultBits};
 
 use super::PlayedBench;
 use crate::analysis::Target;
@@ -39,7 +40,7 @@ struct Quantity {
 const NONE: f64 = f64::NEG_INFINITY;
 
 /// Those of the moves themselves; the worse of the measured moves counts.
-const QUANTITIES: [Quantity; 21] = [
+const QUANTITIES: [Quantity; 22] = [
     Quantity {
         id: "rest-error",
         meaning: "error at rest, reference − stroke (mean of the last 0.2 s)",
@@ -73,7 +74,14 @@ const QUANTITIES: [Quantity; 21] = [
         meaning: "faults that the board latched",
         unit: "1",
         limits: Limits::Always([NONE, 0.0]),
-        value: |f| Some(f.faults.split_whitespace().count() as f64),
+        value: |f| Some(f.faults.iter().count() as f64),
+    },
+    Quantity {
+        id: "fault-bits",
+        meaning: "the same as a number: the sum of 2^bit, with the bits of the bus protocol's table of faults",
+        unit: "1",
+        limits: Limits::Never,
+        value: |f| Some(f64::from(f.faults.raw())),
     },
     Quantity {
         id: "settling",
@@ -190,10 +198,14 @@ const QUANTITIES: [Quantity; 21] = [
 ];
 
 impl Figures {
-    /// The figures whose quantities have these values, and what the supervision reported.
+    /// The figures whose quantities have these values.
     #[must_use]
-    pub fn from_quantities(value: impl Fn(&str) -> Option<f64>, faults: String) -> Self {
+    pub fn from_quantities(value: impl Fn(&str) -> Option<f64>) -> Self {
         let reversals = value("reversals").map(|turns| turns as u32);
+        let bits = value("fault-bits").unwrap_or_default() as u16;
+        let faults = Fault::ALL
+            .iter()
+            .filter(|fault| fault.mask().raw() & bits != 0);
         Self {
             steady_error_mm: value("rest-error"),
             overshoot_mm: value("overshoot"),
@@ -216,7 +228,7 @@ impl Figures {
             first_overshoot_mm: value("first-overshoot"),
             first_settle_s: value("first-settling"),
             first_steady_error_mm: value("first-rest-error"),
-            faults,
+            faults: faults.fold(FaultBits::NONE, |set, fault| set.with(*fault)),
             stopped: value("stopped").map(|stopped| stopped > 0.0),
         }
     }

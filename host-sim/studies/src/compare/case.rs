@@ -4,13 +4,13 @@ use std::fmt;
 use std::str::FromStr;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use wheeleg_plant::axis::AxisParams;
 use wheeleg_protocol::FaultBits;
 
 use super::moves::{CONTACT_S, Move, Played, RECOVERY_S, loaded, play_from_power_up};
-use crate::axis_sim::suite::{AxisSimError, StartUp, draw_start};
-use crate::axis_sim::{Delays, Kind, Metrics, Trace, design, design_with, identify};
+use crate::axis_sim::suite::{AxisSimError, StartUp, designed_with, draw_start, searched};
+use crate::axis_sim::{Delays, Kind, Metrics, Trace};
 use wheeleg_config::bench::{UnknownVariation, Variation};
 
 /// Smallest static margin of a feasible case: a quarter more force than the load.
@@ -29,7 +29,7 @@ pub struct CaseId {
     pub motion: Move,
     /// Deviations from the sheet.
     pub variation: Variation,
-    /// Seed of the ADC noise.
+    /// Seed of the ADC noise; 0 of a random combination, whose number is its seed.
     pub seed: u64,
 }
 
@@ -130,11 +130,9 @@ impl Case {
             ),
             _ => (seed, 0),
         };
-        let delays = match variation.start_up() {
-            StartUp::Identified if margin >= feasible_margin() => {
-                identify(&plant, sheet, noise_seed)?
-            }
-            _ => None,
+        let delays = match margin >= feasible_margin() {
+            true => searched(sheet, &plant, variation.start_up(), noise_seed)?,
+            false => None,
         };
         Ok(Self {
             axis: axis.to_owned(),
@@ -181,10 +179,7 @@ impl Case {
         if !self.is_feasible() {
             return Ok(None);
         }
-        let design = match self.variation.start_up() {
-            StartUp::Sheet => design(&self.sheet, kind),
-            StartUp::Identified => design_with(&self.sheet, self.delays, kind),
-        };
+        let design = designed_with(&self.sheet, self.delays, kind, self.variation.start_up());
         let plants = [&self.sheet, &self.plant];
         play_from_power_up(motion, plants, &design, self.noise_seed, self.wait_ms).map(Some)
     }
@@ -239,7 +234,7 @@ pub struct CaseFacts {
     /// Deviations from the sheet.
     #[schemars(with = "String")]
     pub variation: Variation,
-    /// Seed.
+    /// Seed of the noise; 0 of a random combination, whose number is its seed.
     #[serde(serialize_with = "crate::study::schema::seed_text")]
     #[schemars(with = "String")]
     pub seed: u64,
@@ -269,6 +264,7 @@ pub struct CaseFacts {
 
 impl CaseFacts {
     /// Of a case on an axis with this sheet, whose board has found this opening delay \[ms\], if it searched for one.
+    /// What it found without the force to move counts for nothing.
     #[must_use]
     pub fn of(id: &CaseId, sheet: &AxisParams, found_ms: Option<f64>) -> Self {
         let variation = id.variation;
@@ -276,6 +272,8 @@ impl CaseFacts {
         let plant = loaded(id.motion, &factors.plant(sheet), sheet);
         let gauge_pa = plant.supply.set_pressure_pa - plant.gas.ambient_pressure_pa;
         let margin = factors.static_margin(sheet);
+        let feasible = margin >= feasible_margin();
+        let found_ms = found_ms.filter(|_| feasible);
         Self {
             id: id.to_string(),
             axis: id.axis.clone(),
@@ -291,7 +289,7 @@ impl CaseFacts {
             valve_spread: factors.valve_spread,
             noise: factors.noise,
             static_margin: margin.min(1e3),
-            feasible: margin >= feasible_margin(),
+            feasible,
             delays: match variation.start_up() {
                 StartUp::Sheet => "sheet",
                 StartUp::Identified if found_ms.is_some() => "identified",
@@ -348,9 +346,22 @@ pub struct Figures {
     /// Mean error at the end of the first move \[mm\].
     pub first_steady_error_mm: Option<f64>,
     /// Faults that the board's supervision latched, by name; empty if none.
-    pub faults: String,
+    #[serde(serialize_with = "names_of_faults")]
+    #[schemars(with = "String")]
+    pub faults: FaultBits,
     /// The supervision stopped the board in the case.
     pub stopped: Option<bool>,
+}
+
+/// The names of a set of faults, one space between two.
+#[must_use]
+pub fn fault_names(faults: FaultBits) -> String {
+    let names: Vec<&str> = faults.iter().map(|fault| fault.name()).collect();
+    names.join(" ")
+}
+
+fn names_of_faults<S: Serializer>(faults: &FaultBits, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&fault_names(*faults))
 }
 
 /// The larger; `None` if any is.
@@ -369,7 +380,6 @@ impl Figures {
         let first = played.first.as_ref().map(Metrics::of);
         let traces = || played.first.iter().chain(&played.measured);
         let faults = traces().fold(FaultBits::NONE, |bits, t| bits.union(t.faults));
-        let fault_names: Vec<&str> = faults.iter().map(|f| f.name()).collect();
         let reversals = all.iter().map(|m| m.reversals).max();
         let figures = Self {
             steady_error_mm: steady.reduce(|a, b| if b.abs() > a.abs() { b } else { a }),
@@ -393,7 +403,7 @@ impl Figures {
             first_overshoot_mm: first.as_ref().map(|m| m.overshoot_mm),
             first_settle_s: first.as_ref().and_then(|m| m.settle_s),
             first_steady_error_mm: first.as_ref().map(|m| m.steady_error_mm),
-            faults: fault_names.join(" "),
+            faults,
             stopped: Some(traces().any(|t| !t.drove)),
         };
         figures.only_of(motion)
@@ -440,7 +450,7 @@ impl Figures {
             first_overshoot_mm: Some(0.0),
             first_settle_s: Some(0.0),
             first_steady_error_mm: Some(0.0),
-            faults: String::new(),
+            faults: FaultBits::NONE,
             stopped: Some(false),
         };
         figure(&all.only_of(motion)).is_some()

@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 use wheeleg_config::builtin::text_of;
 use wheeleg_report::stats;
 
-use super::{Row, Variation};
+use super::{Cases, Row, Variation};
 use crate::StudyError;
 use crate::axis_sim::Kind;
+use crate::study::Summary;
 
 /// Largest error at rest \[mm\] of a combination that is not a miss.
 pub const ERROR_MM: f64 = 0.5;
@@ -133,8 +134,10 @@ pub fn read_before(path: &Path, root: u64, combinations: u64) -> Result<Before, 
     let text = text_of(path).map_err(|e| named(format!("cannot be read: {e}")))?;
     let read: ReadCases = serde_json::from_str(&text)
         .map_err(|e| named(format!("is not a summary of a comparison: {e}")))?;
-    if !read.schema.starts_with("wheeleg.compare/") {
-        return Err(named(format!("is a `{}`, not a comparison", read.schema)));
+    // Combinations of another form have other noise.
+    let own = <Cases<'_> as Summary>::SCHEMA;
+    if read.schema != own {
+        return Err(named(format!("is a `{}`, not a `{own}`", read.schema)));
     }
     let drawn = |row: &ReadCase| match row.variation.parse() {
         Ok(Variation::Drawn(number)) => number.wrapping_sub(root) < combinations,

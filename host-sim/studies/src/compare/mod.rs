@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use bounds::fastest_steps;
-pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row};
+pub use case::{BadCaseId, Case, CaseFacts, CaseId, Figures, MARGIN, Row, fault_names};
 pub use judged::{
     Before, ERROR_MM, Judged, OVERSHOOT_MM, Paired, Quantile, judging_root, read_before,
 };
@@ -44,7 +44,7 @@ pub struct Cases<'a> {
 }
 
 impl study::Summary for Cases<'_> {
-    const SCHEMA: &'static str = "wheeleg.compare/2";
+    const SCHEMA: &'static str = "wheeleg.compare/3";
 }
 
 /// An axis that cannot be compared: names the file, field, value and range.

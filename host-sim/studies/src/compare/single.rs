@@ -196,7 +196,7 @@ pub fn panel(
 }
 
 /// Range of all points with a small margin.
-pub(crate) fn range(series: &[Series]) -> (f64, f64) {
+fn range(series: &[Series]) -> (f64, f64) {
     let values = || series.iter().flat_map(|s| &s.points).map(|p| p.1);
     let (low, high) = (
         values().fold(f64::INFINITY, f64::min),

@@ -12,17 +12,15 @@ use super::{Drawing, end, place, settings, tell_error, whole};
 use wheeleg_campaign::CampaignError;
 use wheeleg_campaign::compare::{self, Comparison, Options};
 use wheeleg_config::axis::AXES;
+use wheeleg_config::plan::SEED_MOST;
 use wheeleg_report::number::p_equals;
 use wheeleg_studies::StudyError;
 use wheeleg_studies::axis_sim::{Kind, ValveResolution};
-use wheeleg_studies::compare::{CaseId, Move, judging_root, play};
+use wheeleg_studies::compare::{CaseId, Move, fault_names, judging_root, play};
 use wheeleg_studies::study::Finished;
 
 /// Number of false alarms that are listed; the report has all of them.
 const ALARMS_LISTED: usize = 5;
-
-/// Largest seed of a case: exact in tables of floats, too.
-const SEED_MOST: u64 = 1 << f64::MANTISSA_DIGITS;
 
 /// Arguments of `wheeleg compare`.
 #[derive(Debug, Args)]
@@ -213,7 +211,12 @@ fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
     let mut told = String::new();
     let shown = if all { usize::MAX } else { ALARMS_LISTED };
     for row in alarms.clone().take(shown) {
-        let _ = writeln!(told, "  {}: {}", row.case.id, row.figures.faults);
+        let _ = writeln!(
+            told,
+            "  {}: {}",
+            row.case.id,
+            fault_names(row.figures.faults)
+        );
     }
     let alarms = alarms.count();
     if let Some(more) = alarms.checked_sub(shown).filter(|more| *more > 0) {
