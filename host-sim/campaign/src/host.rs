@@ -74,7 +74,18 @@ fn is_there(process: i32) -> Option<bool> {
     use rustix::process::{Pid, test_kill_process};
     let process = Pid::from_raw(process).filter(|_| process > 0)?;
     // A process of another user may not be signalled, but it is alive.
-    Some(test_kill_process(process) != Err(Errno::SRCH))
+    Some(test_kill_process(process) != Err(Errno::SRCH) && !is_dead(process.as_raw_nonzero().get()))
+}
+
+/// Whether a process has ended and only its parent has not asked for its exit code yet.
+#[cfg(unix)]
+fn is_dead(process: i32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The state follows the name of the program, which may hold anything.
+    let state = stat
+        .rsplit_once(") ")
+        .and_then(|(_, rest)| rest.chars().next());
+    matches!(state, Some('Z' | 'X'))
 }
 
 #[cfg(not(unix))]
@@ -98,8 +109,15 @@ mod tests {
         }
         if let Some(scope) = scope() {
             let mut child = std::process::Command::new("true").spawn().expect("started");
+            let own = of(&scope, child.id());
+            // Ended, and nobody has asked for its exit code.
+            let begun = std::time::Instant::now();
+            while lives(&own) == Some(true) && begun.elapsed().as_secs() < 60 {
+                std::thread::yield_now();
+            }
+            assert_eq!(lives(&own), Some(false));
             child.wait().expect("ended");
-            assert_eq!(lives(&of(&scope, child.id())), Some(false));
+            assert_eq!(lives(&own), Some(false));
             assert_eq!(lives(&of(&scope, std::process::id())), Some(true));
         }
     }

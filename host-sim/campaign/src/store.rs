@@ -55,7 +55,7 @@ pub struct PlanFile {
 
 /// What to do about a plan file that cannot be read. The parts have the hash of their plan, so they are found
 /// again.
-const DAMAGED: &str = "if it is the damaged file of a campaign, remove it and run the campaign's own plan with \
+const DAMAGED: &str = "if it is the damaged file of a campaign, remove it and give the command that made it again, or run its plan with \
      --out into this folder: the cases that have a row are found again; otherwise give another folder";
 
 /// Work per block, s, if the plan does not set the block size.

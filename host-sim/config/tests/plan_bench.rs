@@ -157,7 +157,7 @@ fn mistakes_are_told() {
         ),
         (
             factor("parameter = \"variation\"\ngrid = [\"friction=20\"]\n"),
-            "`factor.x` = friction=20: `friction=20` is not a variation",
+            "`factor.x` = friction=20: `friction=20` is out of range: `friction` is allowed from 0.1 to 10",
         ),
         (
             factor("parameter = \"variation\"\ngrid = [\"supply-change=-10\"]\n"),

@@ -288,9 +288,16 @@ fn texts(all: &mut Vec<Reason>) {
     case("BadCaseId::Variation", "a/predictive/step-100/hot/1", words);
     let words = vec!["`-1`", "18446744073709551615"];
     case("BadCaseId::Seed", "a/predictive/step-100/nominal/-1", words);
-    let unknown: UnknownVariation = "hot".parse::<Variation>().expect_err("no variation");
-    let error: Box<dyn Error> = Box::new(unknown);
-    all.push(("UnknownVariation", error, vec!["`hot`", "nominal"]));
+    let variations = [
+        ("UnknownVariation::Name", "hot", "nominal"),
+        ("UnknownVariation::Meant", "mass=3", "mass-factor"),
+        ("UnknownVariation::Range", "noise=101", "from 0 to 100"),
+        ("UnknownVariation::Spelling", "noise=04", "`noise=4`"),
+    ];
+    for (name, word, told) in variations {
+        let unknown: UnknownVariation = word.parse::<Variation>().expect_err("no variation");
+        all.push((name, Box::new(unknown), vec![word, told]));
+    }
 }
 
 /// Name of a variant, without its type.

@@ -106,6 +106,8 @@ pub struct Comparison {
     pub overlays: Vec<Overlay>,
     /// Results of another version in the random combinations.
     pub before: Option<Before>,
+    /// Cases that were there from an earlier run.
+    pub found: u64,
     /// Why it stopped before all cases were played.
     pub stopped: Option<Stopped>,
 }
@@ -206,7 +208,7 @@ pub fn compare(
     let bound_s = pool.install(|| bounds::all(options, &configs, &job.progress))?;
 
     let mut results = results::Results::default();
-    let (mut done, mut of) = (0, 0);
+    let (mut found, mut done, mut of) = (0, 0, 0);
     for (cases, file) in campaigns {
         let store = Store::create(&folder.join(&cases.plan().name), file, &settings.stop)?;
         let whole = RunOptions::whole(&settings.stop);
@@ -224,6 +226,7 @@ pub fn compare(
             let told = format!("set aside: {}: {why}", path.display());
             job.progress.tell(&told);
         }
+        found += ran.found;
         let rows = store.rows()?;
         done += rows.len() as u64;
         of += ran.of;
@@ -246,6 +249,7 @@ pub fn compare(
         left_out,
         overlays: overlays.into_iter().flatten().collect(),
         before,
+        found,
         stopped,
     };
     Ok(comparison.write(job, unplayed))

@@ -114,7 +114,7 @@ impl Comparison {
 const COLUMNS: [&str; 19] = [
     "error 100 mm [mm]",
     "error 20 mm [mm]",
-    "overshoot [mm]",
+    "overshoot 100 mm [mm]",
     "rise [s]",
     "settled, median [s]",
     "settled, worst [s]",
@@ -265,7 +265,7 @@ fn cell(row: Option<&Row>, motion: Move) -> Cell {
     };
     let f = &row.figures;
     if !row.case.feasible {
-        return cell("beyond_force", "info");
+        return cell("beyond the force", "info");
     }
     let cycle = f.limit_cycle == Some(true) || f.stopped == Some(true);
     let note = match (f.stopped, f.limit_cycle) {
@@ -400,7 +400,8 @@ impl Standing {
             standing.combinations += one.combinations;
         }
         for axis in &comparison.axes {
-            let mut rows = comparison.nominal(&axis.config.name, kind, Move::Step100);
+            let rows = comparison.nominal(&axis.config.name, kind, Move::Step100);
+            let mut rows = rows.filter(|row| row.case.feasible);
             let Some(first) = rows.next() else {
                 continue;
             };

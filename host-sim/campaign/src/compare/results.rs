@@ -245,7 +245,14 @@ mod tests {
                 results.add(&options, &configs, cases.columns(), &[row]);
                 let [own] = <[Row; 1]>::try_from(results.rows).expect("one row");
                 let sheet = &configs[axis].axis;
-                let alone = Case::new(&id.axis, sheet, id.variation, id.seed).expect("played");
+                let Ok(alone) = Case::new(&id.axis, sheet, id.variation, id.seed) else {
+                    // No air in the chambers holds such a load.
+                    assert_eq!(
+                        (own.case.feasible, own.figures),
+                        (false, Figures::default())
+                    );
+                    continue;
+                };
                 let traces = alone.play(id.kind, id.motion).expect("played");
                 let expected = alone.row(id.kind, id.motion, traces.as_ref(), None);
                 assert_eq!(own, expected);

@@ -37,10 +37,40 @@ pub enum Variation {
 }
 
 /// A word that is not a variation.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is not a variation: {known}", known = known())]
-pub struct UnknownVariation {
-    word: String,
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UnknownVariation {
+    /// No variation has its name, but this one's begins with it.
+    #[error("`{word}` is not a variation: did you mean `{meant}`?")]
+    Meant {
+        /// The word.
+        word: String,
+        /// The name.
+        meant: &'static str,
+    },
+    /// No variation has its name.
+    #[error("`{word}` is not a variation: {known}", known = known())]
+    Name {
+        /// The word.
+        word: String,
+    },
+    /// Its number is none, or out of range.
+    #[error("`{word}` is out of range: `{name}` is allowed from {} to {}", range[0], range[1])]
+    Range {
+        /// The word.
+        word: String,
+        /// Its name.
+        name: &'static str,
+        /// Smallest and largest number.
+        range: [f64; 2],
+    },
+    /// Its number is written in another way.
+    #[error("`{word}` is written `{own}`")]
+    Spelling {
+        /// The word.
+        word: String,
+        /// The way it is written.
+        own: String,
+    },
 }
 
 /// A variation by a number: its name, the meaning of the number, its smallest and largest value, and its
@@ -216,25 +246,45 @@ impl FromStr for Variation {
     type Err = UnknownVariation;
 
     fn from_str(word: &str) -> Result<Self, UnknownVariation> {
-        let unknown = || UnknownVariation {
-            word: word.to_owned(),
-        };
-        if word == "nominal" {
-            return Ok(Self::Nominal);
+        let variation = read(word)?;
+        // One word for one variation: two would be two cells of a grid.
+        let own = variation.to_string();
+        if own == word {
+            return Ok(variation);
         }
-        let (name, value) = word.split_once('=').ok_or_else(unknown)?;
-        if name == "combination" {
-            return value.parse().map(Self::Combination).map_err(|_| unknown());
-        }
-        if name == "drawn" {
-            return value.parse().map(Self::Drawn).map_err(|_| unknown());
-        }
-        let number: f64 = value.parse().map_err(|_| unknown())?;
-        let mut known = NUMBERED.into_iter();
-        let (.., [low, high], made) = known.find(|known| known.0 == name).ok_or_else(unknown)?;
-        let number = Some(number).filter(|number| (low..=high).contains(number));
-        number.map(made).ok_or_else(unknown)
+        let word = word.to_owned();
+        Err(UnknownVariation::Spelling { word, own })
     }
+}
+
+fn read(word: &str) -> Result<Variation, UnknownVariation> {
+    let own = || word.to_owned();
+    let unknown = || UnknownVariation::Name { word: own() };
+    if word == "nominal" {
+        return Ok(Variation::Nominal);
+    }
+    let (name, value) = word.split_once('=').ok_or_else(unknown)?;
+    let number = || value.parse().map_err(|_| unknown());
+    match name {
+        "combination" => return number().map(Variation::Combination),
+        "drawn" => return number().map(Variation::Drawn),
+        _ => {}
+    }
+    let Some((name, _, range, made)) = NUMBERED.into_iter().find(|known| known.0 == name) else {
+        let begins = |known: &&Numbered| known.0.split('-').next() == Some(name);
+        return Err(match NUMBERED.iter().find(begins) {
+            Some((meant, ..)) => UnknownVariation::Meant { word: own(), meant },
+            None => unknown(),
+        });
+    };
+    let number = value.parse().ok();
+    let number = number.filter(|number| (range[0]..=range[1]).contains(number));
+    let out = || UnknownVariation::Range {
+        word: own(),
+        name,
+        range,
+    };
+    number.map(made).ok_or_else(out)
 }
 
 /// A field of an axis file that a variation may change, with the values of sheet and plant.
@@ -351,6 +401,22 @@ mod tests {
         }
         assert_eq!("drawn".parse(), Ok(Varied::Drawn));
         assert_eq!(Varied::Drawn.of_seed(17), Variation::Drawn(17));
+        for (word, told) in [
+            (
+                "friction=20",
+                "`friction=20` is out of range: `friction` is allowed from 0.1 to 10",
+            ),
+            ("mass=3", "did you mean `mass-factor`?"),
+            ("supply=4", "did you mean `supply-change`?"),
+            ("friction=2.0", "`friction=2.0` is written `friction=2`"),
+            (
+                "wind=1",
+                "`wind=1` is not a variation: nominal, load=SHARE (-0.95 to 0.95)",
+            ),
+        ] {
+            let error = word.parse::<Variation>().expect_err(word).to_string();
+            assert!(error.contains(told), "{error}");
+        }
         for wrong in [
             "",
             "load",

@@ -285,6 +285,22 @@ fn read(r: &mut Reader, sources: &Sources) -> Option<Plan> {
         factors: factors?,
         sources: sources.clone(),
     };
+    if let Some(first) = plan.first_seed
+        && first + (plan.replicates - 1) > SEED_MOST
+    {
+        r.problem(
+            top.get("first_seed").map(|(key, _)| key),
+            format!(
+                "`first_seed` = {first} and {} replicates lead to seeds beyond {SEED_MOST}",
+                plan.replicates
+            ),
+            "too large",
+            Some(format!(
+                "with these replicates it is allowed up to {}",
+                SEED_MOST - (plan.replicates - 1)
+            )),
+        );
+    }
     let cells = plan.factors.iter().map(Factor::grid_len);
     let numbers = cells.chain([plan.samples, plan.replicates]);
     let cases = numbers.fold(1_u128, |n, m| n.saturating_mul(u128::from(m)));

@@ -34,7 +34,7 @@ pub struct CaseId {
 }
 
 /// A text that is not a case.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BadCaseId {
     /// Not five parts.
     #[error(
@@ -549,7 +549,7 @@ mod tests {
                 for (end, beyond) in [(low, low - 0.01), (high, high + 0.01)] {
                     let word = format!("{name}={beyond}");
                     let error = word.parse::<Variation>().expect_err(&word).to_string();
-                    assert!(error.contains(&format!("({low} to {high})")), "{error}");
+                    assert!(error.contains(&format!("from {low} to {high}")), "{error}");
                     let variation: Variation = format!("{name}={end}").parse().expect("allowed");
                     if let Err(error) = variation.ensure_possible(&axis) {
                         let told = wheeleg_config::plain_text(&error);

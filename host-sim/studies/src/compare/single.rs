@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::case::{Case, CaseId, Row};
+use super::case::{Case, CaseId, MARGIN, Row};
 use super::moves::Played;
 use super::{Cases, axis_error, load};
 use crate::StudyError;
@@ -74,6 +74,11 @@ impl Single {
         let summary = json(&all, None);
         job.keep(job.save(SUMMARY, &summary));
         let Some(played) = &self.played else {
+            let told = format!(
+                "`{}` is beyond the force available ({:.2} times the load, needed {MARGIN}): it has no figures",
+                self.row.case.id, self.row.case.static_margin
+            );
+            job.progress.tell(&told);
             return Ok(job.end(Vec::new(), summary, None));
         };
         job.keep(job.subfolder(CSV));

@@ -36,9 +36,9 @@ pub(super) struct CompareArgs {
     /// step-100 and s-curve with changed factors].
     #[arg(long = "move", value_name = "MOVE", value_parser = motion())]
     moves: Vec<Move>,
-    /// Number of seeds for the cases with the data-sheet values.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole(1_u64, 1000))]
-    seeds: u64,
+    /// Number of seeds for the cases with the data-sheet values [default: 3; 1 with --quick].
+    #[arg(long, value_name = "N", value_parser = whole(1_u64, 1000))]
+    seeds: Option<u64>,
     /// First seed.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = whole(0_u64, SEED_MOST - 1000))]
     seed: u64,
@@ -53,16 +53,17 @@ pub(super) struct CompareArgs {
     /// combinations in which this version is better or worse.
     #[arg(long, value_name = "FILE", requires = "root")]
     against: Option<PathBuf>,
-    /// One seed, fewer factors and combinations, a coarser bound.
+    /// Fewer factors, a coarser bound, and unless they are given one seed and fewer combinations.
     #[arg(long)]
     quick: bool,
     /// Number of threads [default: as many as the machine has].
     #[arg(long, value_name = "N", value_parser = whole(1_u16, 1024))]
     threads: Option<u16>,
     /// Folder for report, figures and tables, and in its subfolder `campaign` the cases, which are not repeated for
-    /// the same options. Results of an earlier run in it move to its subfolder `previous`.
-    #[arg(long, value_name = "DIR", default_value = "runs/compare")]
-    out: PathBuf,
+    /// the same options. Results of an earlier run in it move to its subfolder `previous` [default: runs/compare;
+    /// with --case runs/case].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Run only one case, by its id in the tables:
     /// AXIS/CONTROLLER/MOVE/VARIATION/SEED.
     #[arg(long, value_name = "ID", conflicts_with_all = ["controllers", "moves", "seeds", "seed", "combinations", "root", "against", "quick"])]
@@ -161,7 +162,7 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         axes,
         kinds: chosen(&args.controllers, &Kind::ALL),
         moves: (!args.moves.is_empty()).then(|| chosen(&args.moves, &[])),
-        seeds: if args.quick { 1 } else { args.seeds },
+        seeds: args.seeds.unwrap_or(if args.quick { 1 } else { 3 }),
         seed: args.seed,
         combinations: args
             .combinations
@@ -172,7 +173,8 @@ pub(super) fn command(args: &CompareArgs) -> Result<ExitCode, StudyError> {
         threads: args.threads.map_or(0, usize::from),
         program: std::env::current_exe().ok(),
     };
-    let settings = settings(&args.out, args.drawing.png)?;
+    let out = args.out.clone().unwrap_or_else(|| "runs/compare".into());
+    let settings = settings(&out, args.drawing.png)?;
     let finished = match compare::compare(&options, &settings) {
         Ok(finished) => finished,
         Err(CampaignError::Study(error)) => return Err(*error),
@@ -223,9 +225,13 @@ fn text(comparison: &Comparison, report: &Path, all: bool) -> String {
         let _ = writeln!(told, "  and {more} more: with --verbose, and in the report");
     }
     let beyond_force = comparison.beyond_force().len();
+    let found = match comparison.found {
+        0 => String::new(),
+        found => format!(" ({found} found from before)"),
+    };
     let _ = write!(
         out,
-        "cases       {}, false alarms {alarms}, beyond the force available {beyond_force}\n{told}{}",
+        "cases       {}{found}, false alarms {alarms}, beyond the force available {beyond_force}\n{told}{}",
         comparison.rows.len(),
         place(report, 12)
     );
@@ -261,7 +267,8 @@ fn combinations(comparison: &Comparison) -> String {
 }
 
 fn case(id: &CaseId, axes: &[String], args: &CompareArgs) -> Result<ExitCode, StudyError> {
-    let settings = settings(&args.out, args.drawing.png)?;
+    let out = args.out.clone().unwrap_or_else(|| "runs/case".into());
+    let settings = settings(&out, args.drawing.png)?;
     let single = play(id, axes)?;
     let finished = single.write(&settings)?;
     let text = |finished: &Finished<Vec<PathBuf>>| {
