@@ -333,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_spoilt_slot_names_its_board_unless_others_are_spoilt_too() {
-        let slot_end = |slot: u64| 1020 + 100 + slot * 310 + 310;
+        let slot_end = |slot: u64| 1020 + 120 + slot * 310 + 310;
         let mut line = Line::default();
         let mut garbled = [7; REPLY_BYTES];
         [garbled[0], garbled[REPLY_BYTES - 1]] = [0; 2];
@@ -364,7 +364,7 @@ mod tests {
 
     #[test]
     fn two_boards_in_a_row_that_are_not_heard_have_spoilt_the_slot_of_the_second_together() {
-        let slot_end = |slot: u64| 1020 + 100 + slot * 310 + 310;
+        let slot_end = |slot: u64| 1020 + 120 + slot * 310 + 310;
         let spoilt = |silent: [usize; 2]| {
             let mut line = Line::default();
             for _ in 0..SPOILT_CYCLES {
@@ -401,7 +401,7 @@ mod tests {
         let spoils = |bytes: &[u8]| {
             let mut line = Line::default();
             for _ in 0..SPOILT_CYCLES {
-                line.stretch(bytes, 1020 + 100 + 3 * 310);
+                line.stretch(bytes, 1020 + 120 + 3 * 310);
                 line.end_cycle(|index| index != 2, |_| {});
             }
             line.spoilt(2).is_some()

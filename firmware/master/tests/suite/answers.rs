@@ -56,7 +56,7 @@ fn disarming_ends_with_the_last_board_that_answers_or_does_not() {
 
 #[test]
 fn a_request_is_sent_until_its_deadline_and_not_after_it() {
-    for (deadline_us, sent) in [(3_600, true), (3_599, false)] {
+    for (deadline_us, sent) in [(3_620, true), (3_619, false)] {
         let mut rig = TestRig::new(MasterConfig::default());
         rig.run(60);
         let request = Request {

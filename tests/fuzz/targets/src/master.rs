@@ -12,9 +12,10 @@ use wheeleg_master::layer0::STALL_CYCLES;
 use wheeleg_master::layer1::foot::FootShape;
 use wheeleg_master::layer1::params::{GaitParams, STROKE_MM};
 use wheeleg_master::layer1::walk::{WalkOrder, WalkPattern};
+use wheeleg_protocol::link::{SlotTiming, TURNAROUND_US};
 use wheeleg_protocol::{
-    Address, FaultBits, InputBits, Message, NODES, SCHEMA_HASH, SlotReply, Sync, SyncFlags,
-    SyncSlots,
+    Address, FaultBits, InputBits, Message, MessageType, NODES, SCHEMA_HASH, SlotReply, Sync,
+    SyncFlags, SyncSlots,
 };
 use wheeleg_units::{PositionMm, VelocityMmS};
 
@@ -498,7 +499,8 @@ impl Play {
     }
 
     fn replies(&mut self, sync: &Sync, start: u64) {
-        let mut at = start + 1_020;
+        let mut at =
+            start + u64::from(SlotTiming::DEFAULT.frame_us(MessageType::Sync) + TURNAROUND_US);
         for bytes in core::mem::take(&mut self.late) {
             self.hear(&bytes, at);
         }
@@ -523,7 +525,7 @@ impl Play {
             .bad_line
             .take()
             .map_or(Line::Whole, |(_, _, line)| line);
-        let mut at = start + 3_600;
+        let mut at = start + u64::from(SlotTiming::DEFAULT.cyclic_us());
         let mut requests = 0;
         while let Some(bytes) = self.rig.master.next_acyclic(at) {
             requests += 1;

@@ -7,6 +7,7 @@ use wheeleg_master::dispatcher::Ticket;
 use wheeleg_master::event::Event;
 use wheeleg_master::telemetry::Record;
 use wheeleg_master::{Master, MasterConfig};
+use wheeleg_protocol::link::SlotTiming;
 use wheeleg_protocol::{
     Ack, Address, BoardKind, Decoder, DisarmReason, Envelope, FaultBits, FaultCode, FaultRecord,
     Identity, InputBits, LimitBits, LinkRecord, LogRecords, MAX_ENCODED, Message, Nack, NackReason,
@@ -316,7 +317,7 @@ impl TestRig {
             t += 310;
             self.master.on_bus_bytes(&emit(&reply, node.address, 0), t);
         }
-        t = start + 3_600;
+        t = start + u64::from(SlotTiming::DEFAULT.cyclic_us());
         while let Some(bytes) = self.master.next_acyclic(t) {
             let (envelope, request) = decode(&bytes).expect("a request");
             let node = &mut self.nodes[envelope.destination.slot().unwrap()];
