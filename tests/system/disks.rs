@@ -135,8 +135,9 @@ fn a_disk_that_fills_under_any_command_is_told() {
             // Before anything was computed: there is not even room for the head of a log.
             let begun = ["create the folder", "cannot lock", "cannot write the log"];
             let refused = stdout.is_empty() && begun.iter().any(|why| said.contains(why));
-            // A field test that cannot keep its runs ends; it goes on from those that it has kept.
-            let refused = refused || (full && arguments[0] == "field" && stdout.is_empty());
+            // A study that is a campaign and cannot keep its rows ends; it goes on from those that it has kept.
+            let is_campaign = ["field", "compare"].contains(&arguments[0]);
+            let refused = refused || (full && is_campaign && stdout.is_empty());
             if let (Leaves::Study(name), false) = (tried.leaves, refused) {
                 let summary: Value = serde_json::from_str(&stdout)
                     .unwrap_or_else(|e| panic!("no verdict ({e}), {told}"));
