@@ -11,8 +11,8 @@ use wheeleg_studies::study::Settings;
 const AXIS: &str = "bench-vq110u";
 
 /// The measured sine of a case of the comparison.
-fn sine(variation: &str) -> Vec<Row> {
-    let id = format!("{AXIS}/predictive/sine/{variation}/1");
+fn sine(variation: &str, seed: u64) -> Vec<Row> {
+    let id = format!("{AXIS}/predictive/sine/{variation}/{seed}");
     let id = id.parse().expect("a case");
     let single = compare::play(&id, &[AXIS.to_owned()]).expect("played");
     let played = single.played.expect("it is feasible");
@@ -62,31 +62,48 @@ fn identified(text: &str) -> (Value, String) {
     (summary, axis)
 }
 
-/// The mass is 2.5 times that of the file: with all of the measurement at once, all starts end in local minima.
+/// The mass is 2.5 times that of the file: with all of the measurement at once, all starts end in local minima. A search
+/// may do so all the same, in one recording of five; then it says that it explains nothing, and trusts nothing.
 #[test]
 #[ignore = "long; `cargo xtask test` runs it"]
 fn a_mass_far_from_the_files_is_found() {
-    let (summary, _) = identified(&table(&sine("mass-factor=2.5"), true, |_, at_mm| at_mm));
-    assert_eq!(summary["explained"], true, "{summary}");
-    assert_eq!(summary["doubts"], serde_json::json!([]));
-    for parameter in summary["parameters"].as_array().expect("a list") {
-        let (name, factor) = (&parameter["name"], parameter["factor"].as_f64());
-        let truth = if name == "mass" { 2.5 } else { 1.0 };
-        let off = (factor.expect("a number") / truth - 1.0).abs();
-        // The pressures of a recording have no noise.
-        assert!(
-            off < 0.05 || parameter["determined"] == false,
-            "{parameter}"
-        );
-        assert!(name != "mass" || parameter["determined"] == true);
-        assert_eq!(parameter["trusted"], true);
+    let mut found = 0;
+    for seed in 1..=3 {
+        let (summary, _) = identified(&table(&sine("mass-factor=2.5", seed), true, |_, at_mm| {
+            at_mm
+        }));
+        let parameters = summary["parameters"].as_array().expect("a list");
+        if summary["explained"] == false {
+            assert!(
+                parameters
+                    .iter()
+                    .all(|parameter| parameter["trusted"] == false),
+                "{summary}"
+            );
+            continue;
+        }
+        found += 1;
+        assert_eq!(summary["doubts"], serde_json::json!([]));
+        for parameter in parameters {
+            let (name, factor) = (&parameter["name"], parameter["factor"].as_f64());
+            let truth = if name == "mass" { 2.5 } else { 1.0 };
+            let off = (factor.expect("a number") / truth - 1.0).abs();
+            // The pressures of a recording have no noise.
+            assert!(
+                off < 0.05 || parameter["determined"] == false,
+                "{parameter}"
+            );
+            assert!(name != "mass" || parameter["determined"] == true);
+            assert_eq!(parameter["trusted"], true);
+        }
     }
+    assert!(found >= 2, "{found} of 3");
 }
 
 /// The sensor slips after the fitted part.
 #[test]
 fn what_the_measurement_lacks_is_told_before_the_bench() {
-    let rows = sine("nominal");
+    let rows = sine("nominal", 1);
     let (rows, slips) = (&rows[..900], 720);
     let text = table(rows, false, |k, at_mm| {
         at_mm + if k > slips { 4.0 } else { 0.0 }
