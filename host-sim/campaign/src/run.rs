@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 use wheeleg_config::plan::KeepLogs;
-use wheeleg_studies::study::{Progress, Signal, Stop};
+use wheeleg_studies::study::{Job, Progress, Signal, Stop};
 
 use crate::CampaignError;
 use crate::cases::Cases;
@@ -17,7 +17,7 @@ use crate::columns::Columns;
 use crate::compute::Simulate;
 use crate::row::Row;
 use crate::shard::Shard;
-use crate::simulate::log;
+use crate::simulate::{log, simulate};
 use crate::store::Store;
 use crate::work::Work;
 
@@ -172,6 +172,25 @@ pub fn run(
         aside: aside.into_inner().unwrap_or_default(),
         shared: shared.into_inner(),
     })
+}
+
+/// Computes the cases of a study that is a campaign, and tells what was set aside; with them, all rows that are there.
+///
+/// # Errors
+/// As [`run`], or a part that cannot be read.
+pub(crate) fn run_in(
+    job: &Job,
+    store: &Store,
+    cases: &Cases<'_>,
+    options: &Options,
+) -> Result<(Ran, Vec<Row>), CampaignError> {
+    let one = |case: &_| simulate(case, None, &options.stop);
+    let ran = run(store, cases, options, &one)?;
+    for (path, why) in &ran.aside {
+        let told = format!("set aside: {}: {why}", path.display());
+        job.progress.tell(&told);
+    }
+    Ok((ran, store.rows()?))
 }
 
 /// Writes the log of a case if the plan keeps it; the case is simulated again for this.

@@ -307,6 +307,15 @@ impl Store {
         Ok(())
     }
 
+    /// Whether the folder belongs to another plan or program.
+    ///
+    /// # Errors
+    /// [`CampaignError::Unreadable`] if its plan is invalid.
+    pub(crate) fn is_of_another(folder: &Path, plan: &PlanFile) -> Result<bool, CampaignError> {
+        let path = folder.join(PLAN_FILE);
+        Ok(path.exists() && PlanFile::read(&path)?.difference(plan).is_some())
+    }
+
     /// The plan found in a folder, if it is the one that is wanted.
     fn same_plan(
         found: PlanFile,

@@ -3,7 +3,7 @@
 use std::fs;
 
 use wheeleg_config::bench::{Air, Kind, Move, StartUp, Variation, Varied};
-use wheeleg_config::plan::{Plan, Resolver, Sources, Value};
+use wheeleg_config::plan::{OnBench, Plan, Resolver, Sources, Value};
 
 const HEAD: &str = "name = \"test\"\nroot = 1\n";
 const BASE: &str = "[base]\naxis = \"bench-vq110u\"\n";
@@ -16,17 +16,23 @@ fn plan(text: &str) -> Result<Plan, Vec<String>> {
     plan.map_err(|e| e.problems().iter().map(|p| p.summary()).collect())
 }
 
+/// The case of a plan with these values of its factors.
+fn case_of(text: &str, values: &[Value]) -> OnBench {
+    let plan = plan(text).unwrap_or_else(|told| panic!("{told:#?}"));
+    let case = Resolver::new(&plan).expect("read").resolve(values);
+    case.expect("it can be").on_bench().expect("a cylinder")
+}
+
 #[test]
 fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
-    let plan = plan(&format!(
+    let plan = format!(
         "{HEAD}{BASE}controller = \"fuzzy-pd\"\ndelays = \"identified\"\nair = \"unknown\"\nload_share = 0.2\n\
          [factor.move]\nparameter = \"move\"\ngrid = [\"hold\", \"sine\"]\n\
          [factor.law]\nparameter = \"controller\"\nchoice = {{ values = [\"predictive\"] }}\n\
          [factor.axis]\nparameter = \"axis\"\ngrid = [\"bench-vq110u\", \"small-12x50\"]\n\
          [factor.load]\nparameter = \"load_share\"\nuniform = {{ min = -0.1, max = 0.5 }}\n\
          [factor.variation]\nparameter = \"variation\"\ngrid = [\"friction=2\", \"drawn\"]\n"
-    ));
-    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
+    );
     let text = |text: &str| Value::Text(text.to_owned());
     let values = [
         text("sine"),
@@ -35,12 +41,7 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
         Value::Number(0.5),
         text("friction=2"),
     ];
-    let case = Resolver::new(&plan).expect("read").resolve(&values);
-    let bench = case
-        .expect("it can be")
-        .on_bench()
-        .expect("a cylinder")
-        .bench;
+    let bench = case_of(&plan, &values).bench;
     assert_eq!(
         (
             bench.motion,
@@ -64,19 +65,13 @@ fn a_base_may_be_a_cylinder_and_its_settings_may_be_factors() {
 /// A variation changes the plant that the factors have made, and its deviations are those of the plant that is played.
 #[test]
 fn a_variation_comes_after_the_factors_of_the_plant() {
-    let plan = plan(&format!(
+    let plan = format!(
         "{HEAD}{BASE}variation = \"mass-factor=2\"\n\
          [factor.mass]\nparameter = \"plant.moving.mass\"\ngrid = [3.0]\nunit = \"kg\"\n\
          [factor.bore]\nparameter = \"plant.cylinder.bore\"\ngrid = [21.0]\nunit = \"mm\"\n"
-    ));
-    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
+    );
     let values = [Value::Number(3.0), Value::Number(21.0)];
-    let case = Resolver::new(&plan).expect("read").resolve(&values);
-    let bench = case
-        .expect("it can be")
-        .on_bench()
-        .expect("a cylinder")
-        .bench;
+    let bench = case_of(&plan, &values).bench;
     assert_eq!(bench.varied(1).moving_mass_kg.to_bits(), 6.0_f64.to_bits());
     let told = bench.deviations(1);
     let told: Vec<_> = told
@@ -92,14 +87,8 @@ fn a_variation_comes_after_the_factors_of_the_plant() {
 /// With less supply the reservoir begins with less, too; the contact, which nobody changed, is not told.
 #[test]
 fn deviations_of_a_variation_are_those_of_the_plant() {
-    let plan = plan(&format!("{HEAD}{BASE}variation = \"supply-change=-2\"\n"));
-    let plan = plan.unwrap_or_else(|told| panic!("{told:#?}"));
-    let case = Resolver::new(&plan).expect("read").resolve(&[]);
-    let bench = case
-        .expect("it can be")
-        .on_bench()
-        .expect("a cylinder")
-        .bench;
+    let plan = format!("{HEAD}{BASE}variation = \"supply-change=-2\"\n");
+    let bench = case_of(&plan, &[]).bench;
     let told = bench.deviations(1);
     let names: Vec<&str> = told.iter().map(|d| d.name.as_str()).collect();
     assert_eq!(names, ["supply.set_pressure", "supply.initial_pressure"]);
@@ -109,11 +98,7 @@ fn deviations_of_a_variation_are_those_of_the_plant() {
 /// A variation is content of a case, and a case without one has the content that it had before there were any.
 #[test]
 fn a_variation_is_part_of_a_case_and_none_is_no_part() {
-    let content = |line: &str| {
-        let plan = plan(&format!("{HEAD}{BASE}{line}")).unwrap_or_else(|told| panic!("{told:#?}"));
-        let case = Resolver::new(&plan).expect("read").resolve(&[]);
-        case.expect("it can be").on_bench().expect("a cylinder")
-    };
+    let content = |line: &str| case_of(&format!("{HEAD}{BASE}{line}"), &[]);
     let none = content("");
     assert_eq!(none.bench.variation, Varied::Always(Variation::Nominal));
     assert_eq!(none.bench_json.get("variation"), None);

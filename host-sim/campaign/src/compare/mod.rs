@@ -25,7 +25,8 @@ use wheeleg_studies::study::{Finished, Job, STACK, Settings, Stopped};
 
 pub use overlays::Overlay;
 
-use crate::{CampaignError, Cases, Options as RunOptions, PlanFile, Store, run, simulate};
+use crate::run::run_in;
+use crate::{CampaignError, Cases, Options as RunOptions, PlanFile, Store};
 
 /// Options of a comparison.
 #[derive(Debug, Clone)]
@@ -184,11 +185,9 @@ pub fn compare(
     let folder = settings.out.join(CAMPAIGN);
     let mut also: &[&str] = &[];
     for (cases, file) in &campaigns {
-        match Store::ensure_not_of_another(&folder.join(&cases.plan().name), file) {
-            Ok(()) => {}
-            // Cases of other options or another program go with the results that were made of them.
-            Err(CampaignError::Refused { .. }) => also = &[CAMPAIGN],
-            Err(damaged) => return Err(damaged),
+        // Cases of other options or another program go with the results that were made of them.
+        if Store::is_of_another(&folder.join(&cases.plan().name), file)? {
+            also = &[CAMPAIGN];
         }
     }
     let axes = options.axes.iter().map(Path::new);
@@ -220,14 +219,8 @@ pub fn compare(
             program: options.program.clone(),
             ..whole
         };
-        let one = |case: &_| simulate(case, None, &settings.stop);
-        let ran = run(&store, &cases, &run_options, &one)?;
-        for (path, why) in &ran.aside {
-            let told = format!("set aside: {}: {why}", path.display());
-            job.progress.tell(&told);
-        }
+        let (ran, rows) = run_in(&job, &store, &cases, &run_options)?;
         found += ran.found;
-        let rows = store.rows()?;
         done += rows.len() as u64;
         of += ran.of;
         results.add(options, &configs, cases.columns(), &rows);

@@ -26,9 +26,8 @@ use wheeleg_studies::study::{self, Finished, Job, Settings};
 pub use claims::{CLAIMS, Claim, Met};
 pub use controls::{CONTROLS, Compared, Control};
 
-use crate::{
-    CampaignError, Cases, Columns, Options as RunOptions, PlanFile, Row, Store, run, simulate,
-};
+use crate::run::run_in;
+use crate::{CampaignError, Cases, Columns, Options as RunOptions, PlanFile, Row, Store};
 
 /// The scenarios, in the order of the page.
 pub const SCENARIOS: &[&str] = &[
@@ -297,11 +296,10 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
     let cases = Cases::new(&plan)?;
     let file = PlanFile::of(&plan, cases.work_s());
     let folder = settings.out.join(CAMPAIGN);
-    let also: &[&str] = match Store::ensure_not_of_another(&folder, &file) {
-        Ok(()) => &[],
-        // Runs of other scenarios, seeds or another program go with the results that were made of them.
-        Err(CampaignError::Refused { .. }) => &[CAMPAIGN],
-        Err(damaged) => return Err(damaged),
+    // Runs of other scenarios, seeds or another program go with the results that were made of them.
+    let also: &[&str] = match Store::is_of_another(&folder, &file)? {
+        true => &[CAMPAIGN],
+        false => &[],
     };
     let job = Job::begin_with("field", settings, &[], also)?;
     let store = Store::create(&folder, file, &settings.stop)?;
@@ -309,13 +307,7 @@ pub fn write(options: &Options, settings: &Settings) -> Result<Finished<Summary>
         program: options.program.clone(),
         ..RunOptions::whole(&settings.stop)
     };
-    let one = |case: &_| simulate(case, None, &settings.stop);
-    let ran = run(&store, &cases, &run_options, &one)?;
-    for (path, why) in &ran.aside {
-        let told = format!("set aside: {}: {why}", path.display());
-        job.progress.tell(&told);
-    }
-    let rows = store.rows()?;
+    let (ran, rows) = run_in(&job, &store, &cases, &run_options)?;
     let stopped = job.progress.stopped(rows.len() as u64, ran.of, "runs");
     let mut all = Vec::new();
     for scenario in &options.scenarios {
