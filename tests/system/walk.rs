@@ -8,7 +8,7 @@ use wheeleg_master::event::Event as MasterEvent;
 use wheeleg_master::layer1::walk::{WalkGeometry, WalkOrder};
 use wheeleg_protocol::Warning;
 use wheeleg_studies::analysis::{Target, analyse};
-use wheeleg_telemetry::Cause;
+use wheeleg_telemetry::{Cause, Recording};
 use wheeleg_units::VelocityMmS;
 
 /// Results of the scenario's bars for a seed.
@@ -175,13 +175,17 @@ fn a_robot_whose_wheels_and_feet_slip_slides_down_a_slope() {
     assert!(slides("foot-slips=0.05@5s") < -500.0);
 }
 
-/// Switches told as broken: side of the robot, side of the foot, and how it is broken.
-pub(crate) fn broken_switches(
-    scenario: &Scenario,
-    seed: u64,
-) -> Vec<(Side, Option<Sector>, Warning)> {
+/// A switch told as broken: side of the robot, side of the foot, and how it is broken.
+type Broken = (Side, Option<Sector>, Warning);
+
+/// The switches told as broken.
+pub(crate) fn broken_switches(scenario: &Scenario, seed: u64) -> Vec<Broken> {
     let robot = builtin::robot(&scenario.robot).expect("built in");
-    let recording = sil::run(scenario, &robot, seed);
+    broken_in(scenario, &sil::run(scenario, &robot, seed))
+}
+
+/// The same of a run.
+fn broken_in(scenario: &Scenario, recording: &Recording) -> Vec<Broken> {
     let told = recording.events.iter().filter_map(|e| match e.v.cause {
         Cause::Master(MasterEvent::FootSwitch {
             side,
@@ -196,26 +200,52 @@ pub(crate) fn broken_switches(
     told.collect()
 }
 
-/// Whether it sticks while the foot stands or while it swings, on the level or in front of a wall: a switch
+/// Whether it sticks while the foot stands or while it swings, on the level, in a turn or in front of a wall: a switch
 /// that sticks is told, although the leg then hardly moves forward any more.
 #[test]
 fn a_switch_that_sticks_closed_in_a_walk_is_told() {
     let front = (Side::Left, Some(Sector::Front), Warning::SwitchStuckClosed);
-    let rear = (Side::Left, Some(Sector::Rear), Warning::SwitchStuckClosed);
     let outer = (Side::Left, Some(Sector::Left), Warning::SwitchStuckClosed);
+    let inner = (Side::Right, Some(Sector::Left), Warning::SwitchStuckClosed);
     let cases = [
-        ("walk", "foot-switch-on:left.front@6s", front),
-        ("walk", "foot-switch-on:left.front@7.4s", front),
-        ("walk", "foot-switch-on:left.back@9s", rear),
-        ("walk", "foot-switch-on:left.left@6s", outer),
-        ("wall-30", "foot-switch-on:left.front@6s", front),
-        ("wall-30", "foot-switch-on:left.front@14s", front),
+        ("walk", 14.0, "foot-switch-on:left.front@7.4s", front),
+        ("walk", 14.0, "foot-switch-on:left.left@6s", outer),
+        ("spin", 14.0, "foot-switch-on:left.front@6s", front),
+        ("spin", 14.0, "foot-switch-on:right.left@6s", inner),
+        ("wall-30", 28.0, "foot-switch-on:left.front@6s", front),
+        ("wall-30", 28.0, "foot-switch-on:left.front@14s", front),
     ];
-    for (name, fault, told) in cases {
+    for (name, duration_s, fault, told) in cases {
         let mut scenario = builtin::scenario(name).expect("built in");
-        scenario.duration_s = if name == "walk" { 14.0 } else { 28.0 };
+        scenario.duration_s = duration_s;
         scenario.bars.clear();
         scenario.faults = vec![fault.parse().expect("a fault")];
         assert_eq!(broken_switches(&scenario, 1), [told], "{name}, {fault}");
+    }
+}
+
+/// Once it is told it counts as open: the robot walks on with the other three, where it used to give up, and also when
+/// the switch works again.
+#[test]
+fn a_walk_goes_on_without_a_switch_that_sticks_closed() {
+    for (place, sector) in [("front", Sector::Front), ("back", Sector::Rear)] {
+        let mut scenario = builtin::scenario("walk").expect("built in");
+        scenario.bars.clear();
+        scenario.faults = vec![
+            format!("foot-switch-on:left.{place}@6s..22s")
+                .parse()
+                .expect("a fault"),
+        ];
+        let robot = builtin::robot(&scenario.robot).expect("built in");
+        let recording = sil::run(&scenario, &robot, 1);
+        let told = (Side::Left, Some(sector), Warning::SwitchStuckClosed);
+        assert_eq!(broken_in(&scenario, &recording), [told]);
+        let speed_mm_s = |from_s: f64, until_s: f64| {
+            let rows = sil::window(&recording.body, from_s, until_s);
+            (rows[rows.len() - 1].v.x_mm - rows[0].v.x_mm) / (until_s - from_s)
+        };
+        let (without, mended) = (speed_mm_s(12.0, 22.0), speed_mm_s(23.0, 29.5));
+        println!("{place}: {without:.0} mm/s without the switch, {mended:.0} mm/s with it again");
+        assert!(without > 90.0 && mended > 90.0, "{without} {mended}");
     }
 }

@@ -348,7 +348,7 @@ pub struct Feedback {
     pub time_us: u64,
     /// Measured strokes, mm; `None` if the node did not answer in this cycle.
     pub strokes_mm: [Option<PositionMm>; JOINTS],
-    /// Foot switches of the left and right foot; `None` if not heard.
+    /// Switches of the left and right foot that count, without those that are found stuck closed; `None` if not heard.
     pub feet: [Option<FootSwitches>; WHEELS],
     /// Mean wheel travel since start-up, µm (positive forward).
     pub travel_um: i64,

@@ -56,7 +56,8 @@ pub struct Record {
     pub slots: SyncSlots,
     /// Reply of each node in this cycle; `None` if there was none.
     pub replies: [Option<SlotReply>; NODES],
-    /// Switches of the left and right foot, in each leg's frame.
+    /// Switches of the left and right foot that count, in each leg's frame: without those that are found stuck closed,
+    /// which the replies have.
     pub feet: [Option<FootSwitches>; WHEELS],
     /// Bearing of the touching side of each foot in the robot's frame, rad (see [`crate::contact`]).
     pub bearing_rad: [Option<f32>; WHEELS],

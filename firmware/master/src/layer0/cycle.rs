@@ -16,7 +16,6 @@ use crate::config::SwitchFrame;
 use crate::contact::{FootSwitches, INNER, OUTER, Side};
 use crate::event::{Event, Events};
 use crate::layer1::params::in_stroke;
-use crate::layer1::units::mm_to_um;
 use crate::setpoint::{Cylinder, Feedback, JOINTS, JointSetpoint, OnLinkLoss, Setpoints};
 use crate::telemetry::Record;
 
@@ -257,7 +256,7 @@ impl Layer0 {
         senses
     }
 
-    /// Switches of a foot in the leg's own frame.
+    /// Switches of a foot that count, in the leg's own frame.
     #[must_use]
     pub fn foot(&self, side: Side) -> Option<FootSwitches> {
         self.feet.get(side.index()).copied().flatten()
@@ -267,31 +266,32 @@ impl Layer0 {
         let senses = self.senses();
         let [left_mm, right_mm] = [Side::Left, Side::Right].map(|side| senses.vertical_mm(side));
         let shorter_mm = left_mm.min(right_mm);
-        for side in [Side::Left, Side::Right] {
+        let ways_um = self.foot_ways.update(&self.config.walk, &senses);
+        for (side, way_um) in [Side::Left, Side::Right].into_iter().zip(ways_um) {
             let node = self.nodes.get(side.joint(Cylinder::Vertical));
             let Some(reply) = node.and_then(|node| node.reply) else {
                 // Not heard in this cycle: the last state holds until the node is lost.
                 continue;
             };
-            let now = self.switches(side, reply.inputs);
-            let before = self.foot(side);
-            if let Some(foot) = self.feet.get_mut(side.index()) {
-                *foot = Some(now);
-            }
+            let closed = self.switches(side, reply.inputs);
             // A leg that carries no load is swinging.
             let vertical = self.setpoints.joints.get(side.joint(Cylinder::Vertical));
             let swings = vertical
                 .copied()
                 .flatten()
                 .is_some_and(|joint| joint.on_link_loss == OnLinkLoss::HoldThenExhaust);
-            // A foot that keeps its place on the ground is drawn back by b5 as the wheel moves on.
-            let b5 = senses.joint(side, Cylinder::Horizontal).unwrap_or_default();
-            let forward_um = mm_to_um(b5.stroke_mm).saturating_add(self.odometry.wheel_um(side));
             let b6_mm = reply.joint_position();
-            let watch = self.foot_watches.get_mut(side.index());
-            if let Some(stuck) =
-                watch.and_then(|watch| watch.sample(now, b6_mm, shorter_mm, forward_um, swings))
-            {
+            let places = self
+                .foot_watches
+                .get_mut(side.index())
+                .zip(self.feet.get_mut(side.index()));
+            let Some((watch, foot)) = places else {
+                continue;
+            };
+            let found = watch.sample(closed, b6_mm, shorter_mm, way_um, swings);
+            let now = watch.believed(closed);
+            let before = foot.replace(now);
+            if let Some(stuck) = found {
                 let warning = if stuck.closed {
                     Warning::SwitchStuckClosed
                 } else {

@@ -6,12 +6,13 @@
 //! * **Stuck closed.** During a swing, clear of where the foot stood, nothing should close it. If it
 //!   is seen closed there, and without having opened the foot then moves over the ground with it alone closed, it is
 //!   stuck. A foot that hangs by a switch at a wall keeps its place, whether it swings or "stands", and drawn back it
-//!   opens the switch. How far it moves is known along the wheels only: a robot that turns on the spot is told nothing.
+//!   opens the switch.
 //! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as even
 //!   ground does. If the other three close twice in a row and it does not, it is stuck: on uneven
 //!   ground it would have closed once.
 //!
-//! This takes some steps; the gait does not wait for it.
+//! This takes some steps; the gait does not wait for it. Once it is told, a switch that is stuck closed counts as open
+//! until it does open: the foot's contact is that of the other three.
 
 use wheeleg_units::PositionMm;
 
@@ -42,8 +43,9 @@ struct One {
     closed: bool,
     /// Stances in which it stayed open.
     open: u8,
-    /// Rearmost and foremost place of the foot over the ground, µm, with it alone closed, in that swing and since.
-    span_um: Option<[i64; 2]>,
+    /// Least and greatest of the foot's way over the ground, µm, with it alone closed, in that swing and since; ahead
+    /// and to the left.
+    span_um: Option<[[i64; 2]; 2]>,
     /// Already reported.
     told: bool,
 }
@@ -81,15 +83,19 @@ pub struct Stuck {
 
 impl One {
     /// Notes where the foot is over the ground with it alone closed.
-    fn note_alone(&mut self, forward_um: i64) {
-        let [rear, front] = self.span_um.unwrap_or([forward_um; 2]);
-        self.span_um = Some([rear.min(forward_um), front.max(forward_um)]);
+    fn note_alone(&mut self, way_um: [i64; 2]) {
+        let spans = self.span_um.get_or_insert(way_um.map(|um| [um; 2]));
+        for ([least, greatest], um) in spans.iter_mut().zip(way_um) {
+            *least = um.min(*least);
+            *greatest = um.max(*greatest);
+        }
     }
 
     /// Whether the foot has moved while it alone was closed, so that nothing presses on it.
     fn moves_freely(&self) -> bool {
+        let is_free = |[least, greatest]: [i64; 2]| greatest.saturating_sub(least) >= FREE_UM;
         self.span_um
-            .is_some_and(|[rear, front]| front.saturating_sub(rear) >= FREE_UM)
+            .is_some_and(|spans| spans.into_iter().any(is_free))
     }
 
     /// What it is found to be.
@@ -101,15 +107,23 @@ impl One {
 }
 
 impl FootWatch {
-    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, how far
-    /// forward the foot is over the ground, µm, and whether the leg swings; returns a switch that has just been found
-    /// stuck.
+    /// Those of the switches that count: without one that has been told to stay closed.
+    #[must_use]
+    pub fn believed(&self, now: FootSwitches) -> FootSwitches {
+        let told = |(bit, one): (u8, &One)| if one.told && one.closed { bit } else { 0 };
+        let stuck = [1_u8, 2, 4, 8].into_iter().zip(&self.switches).map(told);
+        FootSwitches(now.0 & !stuck.fold(0, |all, bit| all | bit))
+    }
+
+    /// Takes the switches of a cycle, with the stroke of the leg's b6, the shorter of both legs' strokes, the foot's way
+    /// over the ground so far, µm ahead and to the left, and whether the leg swings; returns a switch that has just been
+    /// found stuck.
     pub fn sample(
         &mut self,
         now: FootSwitches,
         b6_mm: PositionMm,
         shorter_mm: PositionMm,
-        forward_um: i64,
+        way_um: [i64; 2],
         swings: bool,
     ) -> Option<Stuck> {
         let now = now.0 & ALL;
@@ -141,7 +155,7 @@ impl FootWatch {
             let others = now & ALL & !bit;
             let alone = others == 0 && now & bit != 0;
             if alone && (place == Place::Air || one.closed) {
-                one.note_alone(forward_um);
+                one.note_alone(way_um);
             }
             let missing = others == ALL & !bit && now & bit == 0;
             if place == Place::Air && alone || place == Place::Ground && missing {
@@ -169,19 +183,21 @@ mod tests {
     type Stretch = (u8, i16, u32);
 
     /// Switches reported as stuck over these stretches; the other leg stands at `other_mm`, and a swinging foot moves
-    /// forward by `step_um` per cycle.
-    fn watched(stretches: &[Stretch], other_mm: i16, step_um: i64) -> Vec<Stuck> {
+    /// by `step_um` per cycle, ahead and to the left.
+    fn watched(stretches: &[Stretch], other_mm: i16, step_um: [i64; 2]) -> Vec<Stuck> {
         let mut watch = FootWatch::default();
         let mut found = Vec::new();
-        let mut forward_um = 0;
+        let mut way_um = [0; 2];
         for (raw, b6, cycles) in stretches {
             for _ in 0..*cycles {
                 let swings = *b6 <= 120;
-                forward_um += if swings { step_um } else { 0 };
+                for (way, step) in way_um.iter_mut().zip(step_um) {
+                    *way += if swings { step } else { 0 };
+                }
                 let b6_mm = PositionMm::from_int(*b6);
                 let shorter_mm = b6_mm.limit(PositionMm::ZERO, PositionMm::from_int(other_mm));
                 let raw = FootSwitches(*raw);
-                found.extend(watch.sample(raw, b6_mm, shorter_mm, forward_um, swings));
+                found.extend(watch.sample(raw, b6_mm, shorter_mm, way_um, swings));
             }
         }
         found
@@ -189,7 +205,10 @@ mod tests {
 
     /// The same with feet that swing freely, by 1 mm per cycle.
     fn stuck_switches(stretches: &[Stretch], other_mm: i16) -> Vec<Stuck> {
-        watched(stretches, other_mm, 1_000)
+        let ahead = watched(stretches, other_mm, [1_000, 0]);
+        let aside = watched(stretches, other_mm, [0, -1_000]);
+        assert_eq!(ahead, aside, "whatever the direction");
+        ahead
     }
 
     #[test]
@@ -213,6 +232,48 @@ mod tests {
                 assert_eq!(stuck_switches(&again, 180), [stuck, stuck]);
             }
         }
+    }
+
+    #[test]
+    fn a_switch_that_is_told_to_stay_closed_does_not_count_until_it_opens() {
+        let mut watch = FootWatch::default();
+        let full = PositionMm::from_int(180);
+        let mut sample = |raw: u8, cycle: i64| {
+            let (b6, swings) = if raw == ALL {
+                (180, false)
+            } else {
+                (100, true)
+            };
+            let raw = FootSwitches(raw);
+            let way_um = [1_000 * cycle, 0];
+            let found = watch.sample(raw, PositionMm::from_int(b6), full, way_um, swings);
+            (found.is_some(), watch.believed(raw).0)
+        };
+        assert_eq!(sample(ALL, 0), (false, ALL));
+        let told = (1..100).find(|cycle| {
+            let (told, counts) = sample(REAR, *cycle);
+            assert_eq!(counts, if told { 0 } else { REAR });
+            told
+        });
+        assert!(told.is_some());
+        assert_eq!(sample(REAR, 100), (false, 0));
+        assert_eq!(sample(ALL, 100), (false, ALL & !REAR), "on the ground");
+        assert_eq!(sample(0, 101), (false, 0));
+        assert_eq!(sample(REAR, 102), (false, REAR), "it has opened");
+        // One that is told to stay open has nothing to be left out.
+        let mut watch = FootWatch::default();
+        let mut told = false;
+        for cycle in 0..200 {
+            let raw = if cycle % 50 < 25 {
+                FRONT | OUTER | INNER
+            } else {
+                0
+            };
+            let found = watch.sample(FootSwitches(raw), full, full, [0; 2], false);
+            told |= found.is_some_and(|stuck| !stuck.closed);
+            assert_eq!(watch.believed(FootSwitches(raw)).0, raw);
+        }
+        assert!(told);
     }
 
     #[test]
@@ -244,12 +305,12 @@ mod tests {
             let step = [(FRONT, 100, 40), stand];
             let at_the_wall = [&[start][..], &step, &step, &step, &step].concat();
             // The wall gives by 4 mm in each swing.
-            assert_eq!(watched(&at_the_wall, 180, 100), []);
+            assert_eq!(watched(&at_the_wall, 180, [100, 100]), []);
             // The same without a wall: the foot moves on by 40 mm in each swing.
-            assert_eq!(watched(&at_the_wall, 180, 1_000), [front]);
+            assert_eq!(watched(&at_the_wall, 180, [1_000, 0]), [front]);
             // Drawn back from the wall, it opens.
             let drawn_back = [&at_the_wall[..], &[(0, 100, 40)]].concat();
-            assert_eq!(watched(&drawn_back, 180, 100), []);
+            assert_eq!(watched(&drawn_back, 180, [100, 100]), []);
         }
         // A switch that sticks in front of the wall is found when the foot has gone back from it, even if the switch has
         // ended its lowering in the air.
@@ -258,9 +319,9 @@ mod tests {
         for cycle in 0..400 {
             let swings = cycle % 100 >= 50;
             let b6_mm = PositionMm::from_int(if swings { 100 } else { 140 });
-            let forward_um = if cycle < 220 { 0 } else { -100_000 };
+            let way_um = [if cycle < 220 { 0 } else { -100_000 }, 0];
             let raw = FootSwitches(if cycle < 50 { ALL } else { FRONT });
-            let stuck = watch.sample(raw, b6_mm, b6_mm, forward_um, swings);
+            let stuck = watch.sample(raw, b6_mm, b6_mm, way_um, swings);
             found.extend(stuck.map(|stuck| (cycle, stuck)));
         }
         assert_eq!(found, [(220, front)]);

@@ -38,7 +38,7 @@ use crate::event::HoldReason;
 use crate::setpoint::{JOINTS, NODES, Phase, PushProfile, Setpoints, WHEELS};
 use crate::telemetry::Counters;
 use acyclic::{Job, Jobs};
-use behaviours::{Behaving, Orphan};
+use behaviours::{Behaving, FootWays, Orphan};
 use feet::FootWatch;
 use left_behind::LeftBehind;
 use line::Line;
@@ -126,8 +126,10 @@ pub struct Layer0 {
     direct_segment: u16,
     /// Count of layer 1's Hold commands, which end the user's references.
     holds: u8,
+    /// Switches of the feet that count: without those that are found stuck closed.
     feet: [Option<FootSwitches>; WHEELS],
     foot_watches: [FootWatch; WHEELS],
+    foot_ways: FootWays,
     slots: SyncSlots,
     counters: Counters,
 }
@@ -181,6 +183,7 @@ impl Layer0 {
             holds: 0,
             feet: [None; WHEELS],
             foot_watches: [FootWatch::default(); WHEELS],
+            foot_ways: FootWays::default(),
             slots: SyncSlots::NONE,
             counters: Counters::default(),
         }

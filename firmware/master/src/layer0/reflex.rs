@@ -14,8 +14,8 @@ enum Touch {
     /// The reflex is not requested.
     #[default]
     Off,
-    /// Requested, but the switches have not been seen open since. With a switch that is stuck closed the state stays
-    /// here, and the leg goes to its reference.
+    /// Requested, but the switches have not been seen open since. With a switch that is stuck closed, and not yet found,
+    /// the state stays here, and the leg goes to its reference.
     Waiting,
     /// The switches have been open: the next closing counts.
     Open,

@@ -2,7 +2,7 @@
 
 use wheeleg_units::PositionMm;
 
-use super::Senses;
+use super::{SIDES, Senses};
 use crate::contact::Side;
 use crate::layer1::units::metres;
 use crate::layer1::walk::{Twist, WalkGeometry};
@@ -22,6 +22,42 @@ impl Ways {
             *way = way.saturating_sub(before);
         }
         ways
+    }
+}
+
+/// Ways of the feet over the ground, as seen from the robot: how far each has moved ahead and to the left.
+///
+/// A foot that keeps its place on the ground has no way, however the robot moves, as long as no wheel slips.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::layer0) struct FootWays {
+    wheels: Ways,
+    /// Where the feet were at the last call, m from their yaw axes; `None` if a joint of the leg was not heard.
+    feet_m: [Option<[f32; 2]>; WHEELS],
+    ways_um: [[i64; 2]; WHEELS],
+}
+
+impl FootWays {
+    /// One cycle; returns the ways so far, µm.
+    pub(in crate::layer0) fn update(
+        &mut self,
+        geometry: &WalkGeometry,
+        senses: &Senses,
+    ) -> [[i64; 2]; WHEELS] {
+        let robot = moved(geometry, self.wheels.since(senses));
+        let feet = self.feet_m.iter_mut().zip(&mut self.ways_um);
+        for (side, (foot, way)) in SIDES.into_iter().zip(feet) {
+            let here = sensed_foot_m(geometry, senses, side);
+            let Some((here, before)) = here.zip(core::mem::replace(foot, here)) else {
+                continue;
+            };
+            let ground = robot.ground_m_s(geometry, side, before);
+            for (axis, way) in way.iter_mut().enumerate() {
+                let at = |of: [f32; 2]| of.get(axis).copied().unwrap_or(0.0);
+                let step_m = at(here) - at(before) - at(ground);
+                *way = way.saturating_add((step_m * 1e6) as i64);
+            }
+        }
+        self.ways_um
     }
 }
 

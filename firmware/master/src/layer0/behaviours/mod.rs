@@ -41,6 +41,7 @@ use crate::setpoint::{
 };
 use bump::Bump;
 use contact::Contact;
+pub(super) use ground::FootWays;
 use load_share::LoadShare;
 pub(super) use orphan::{CARRIED, Orphan};
 use overload::Overload;
