@@ -161,23 +161,9 @@ fn on_times(model: &AxisModel, openings: [i32; 4]) -> [i32; 4] {
     })
 }
 
-/// Stiffness of the air in both chambers, mN/mm; 5 % too high, by the factor of [`AxisModel::exponent_per_length`].
-fn stiffness(model: &AxisModel, observer: &Observer) -> i32 {
-    let (now, stroke) = (observer.expected(), observer.motion.stroke);
-    let of = |pressure: i32, force: i32, length: i32| {
-        mul_shr_sat(
-            mul_shr(pressure, force, 32),
-            model.exponent_per_length(length),
-            22,
-        )
-    };
-    let a = of(now.a, model.force_a, model.length_a(stroke));
-    a.saturating_add(of(now.b, model.force_b, model.length_b(stroke)))
-}
-
 /// Openings of the valves, µs, that move a resting piston by `error`, raw mm.
 fn openings(model: &AxisModel, observer: &Observer, error: i32) -> [i32; 4] {
-    let away = mul_shr_sat(stiffness(model, observer), error.saturating_abs(), 16);
+    let away = mul_shr_sat(observer.stiffness(model), error.saturating_abs(), 16);
     let wanted = mul_shr(away, INCH_SPRING, 16).saturating_add(model.coulomb);
     let now = observer.expected();
     let [fill_a, vent_a, fill_b, vent_b] = pulse_planner::valves(model, observer);

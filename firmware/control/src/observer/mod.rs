@@ -48,7 +48,7 @@ pub mod valve_delay;
 
 use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
-use crate::math::mul_shr;
+use crate::math::{mul_shr, mul_shr_sat};
 use crate::pwm::OnTimes;
 use mass::MassEstimator;
 use motion::{Inertia, Motion};
@@ -121,6 +121,21 @@ impl Observer {
             .saturating_add(ahead)
             .max(0)
             .min(model.stroke)
+    }
+
+    /// Stiffness of the air in both chambers if their valves are shut, mN/mm, at the expected pressures: n (pA AA / LA +
+    /// pB AB / LB), 5 % too high by the factor of [`AxisModel::exponent_per_length`].
+    pub(crate) fn stiffness(&self, model: &AxisModel) -> i32 {
+        let (now, stroke) = (self.expected(), self.motion.stroke);
+        let of = |pressure: i32, force: i32, length: i32| {
+            mul_shr_sat(
+                mul_shr(pressure, force, 32),
+                model.exponent_per_length(length),
+                22,
+            )
+        };
+        let a = of(now.a, model.force_a, model.length_a(stroke));
+        a.saturating_add(of(now.b, model.force_b, model.length_b(stroke)))
     }
 
     /// Largest error of the pressure force, mN.

@@ -143,7 +143,7 @@ fn a_step_makes_the_force_of_the_text() {
     let stroke = 90 << 16;
     let exact =
         air(now.a, 314.16, model.length_a(stroke)) + air(now.b, 263.89, model.length_b(stroke));
-    let found = f64::from(stiffness(&model, &observer));
+    let found = f64::from(observer.stiffness(&model));
     assert!((found / exact / 1.05 - 1.0).abs() < 0.01, "{found} {exact}");
     for error_mm in [-20, -12, 12, 20] {
         let opened = openings(&model, &observer, error_mm << 16);
@@ -181,7 +181,7 @@ fn a_force_below_the_finest_pulses_is_made_by_a_pair() {
                 assert_eq!(*open >= shortest, sent, "{level} {error}: {opened:?}");
                 assert!(sent || *open == 0);
             }
-            let wanted = 0.5 * 0.6 * f64::from(stiffness(&model, &observer)) + 1000.0;
+            let wanted = 0.5 * 0.6 * f64::from(observer.stiffness(&model)) + 1000.0;
             let off = made(&model, &observer, opened) - f64::from(error.signum()) * wanted;
             let grain = 0.02 * f64::from(model.pulse_force);
             assert!(off.abs() < grain, "{level} {error}: {off} of {wanted}");
