@@ -341,11 +341,14 @@ fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
             without_alarm(trace, name);
         }
     }
-    // Of 1,200 moves 7 are late and none is restless with the right times, 17 and 8 with the
-    // wrong ones. Of 200 alone, as many as this test once had, both were 1 with some seeds.
+    // Of 1,200 moves none is late and one is restless with the right times; of 7,200 that are none and one, too. With
+    // an explicit prediction (decision 69) 7 of 1,200 were late. Of 200 alone, as many as this test once had, both were
+    // 1 with some seeds.
     let (late, restless) = late_and_restless(&right);
-    assert!(late <= 18 && restless == 0, "{late}, {restless}");
+    println!("right times: {late} late, {restless} restless");
+    assert!(late <= 2 && restless <= 1, "{late}, {restless}");
     let (later, more_restless) = late_and_restless(&wrong);
+    println!("wrong times: {later} late, {more_restless} restless");
     assert!(later > late && later <= 60, "{later}, {late}");
     assert!(more_restless <= 20, "{more_restless}");
 }
