@@ -341,9 +341,8 @@ fn valve_times_of_another_cylinder_make_moves_late_but_rest_is_found() {
             without_alarm(trace, name);
         }
     }
-    // Of 1,200 moves none is late and one is restless with the right times; of 7,200 that are none and one, too. With
-    // an explicit prediction (decision 69) 7 of 1,200 were late. Of 200 alone, as many as this test once had, both were
-    // 1 with some seeds.
+    // With the right times none of 1,200 moves is late and one is restless, and so it is of 7,200. With an explicit
+    // prediction 7 of 1,200 were late, and none restless (decision 69).
     let (late, restless) = late_and_restless(&right);
     println!("right times: {late} late, {restless} restless");
     assert!(late <= 2 && restless <= 1, "{late}, {restless}");

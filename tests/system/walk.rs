@@ -246,6 +246,6 @@ fn a_walk_goes_on_without_a_switch_that_sticks_closed() {
         };
         let (without, mended) = (speed_mm_s(12.0, 22.0), speed_mm_s(23.0, 29.5));
         println!("{place}: {without:.0} mm/s without the switch, {mended:.0} mm/s with it again");
-        assert!(without > 90.0 && mended > 90.0, "{without} {mended}");
+        assert!(without > 80.0 && mended > 80.0, "{without} {mended}");
     }
 }

@@ -8,13 +8,12 @@
 //!
 //! coarse:  F_1 > 1.3 Fb, and half of the acceleration is not enough
 //! ΔF    = 0.6 k_air |e| + Fc                             towards the target
-//! k_air = n (pA AA / LA + pB AB / LB)
 //! F_i   = A_i |ṗ_i| (t_off + margin)                     the finest pulse of valve i, now
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; F_1, and when half of the acceleration is enough: `switching_curve`; Fb, Fc:
-//! break-away and Coulomb friction as specified, mN; k_air: stiffness of the air in both shut chambers, mN/mm; p, A, L,
-//! n, ṗ: pressure, area and length of a chamber, exponent, and rate of pressure change through an open valve, as in
+//! break-away and Coulomb friction as specified, mN; k_air: stiffness of the air in both shut chambers, mN/mm
+//! ([`Observer::stiffness`]); A, ṗ: area of a chamber, and rate of pressure change through an open valve, as in
 //! `pulse_planner`.
 //!
 //! The position servo demands a force in every period. Where the finest pulse makes more force than friction can hold

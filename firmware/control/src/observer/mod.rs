@@ -123,8 +123,8 @@ impl Observer {
             .min(model.stroke)
     }
 
-    /// Stiffness of the air in both chambers if their valves are shut, mN/mm, at the expected pressures: n (pA AA / LA +
-    /// pB AB / LB), 5 % too high by the factor of [`AxisModel::exponent_per_length`].
+    /// Stiffness of the air in both chambers if their valves are shut, mN/mm: n (pA AA / LA + pB AB / LB), with the expected
+    /// pressures and the lengths now; 5 % too high by the factor of [`AxisModel::exponent_per_length`].
     pub(crate) fn stiffness(&self, model: &AxisModel) -> i32 {
         let (now, stroke) = (self.expected(), self.motion.stroke);
         let of = |pressure: i32, force: i32, length: i32| {

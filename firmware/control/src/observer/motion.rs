@@ -55,7 +55,7 @@ pub struct Inertia {
     pub load_gain: i32,
     /// Speed lost to Coulomb friction in a period, raw mm/s.
     pub coulomb_speed: i32,
-    /// Speed lost to it in the dead time, raw mm/s.
+    /// Speed lost to it in the dead time by an explicit step, raw mm/s; the dead-time predictor takes a share of it.
     pub coulomb_speed_ahead: i32,
 }
 

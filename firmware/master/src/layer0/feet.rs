@@ -4,30 +4,35 @@
 //! closed, or closed while they are open, proves nothing yet. Two observations do:
 //!
 //! * **Stuck closed.** During a swing, clear of where the foot stood, nothing should close it. If it
-//!   is seen closed there, and without having opened the foot then moves over the ground with it alone closed, it is
-//!   stuck. A foot that hangs by a switch at a wall keeps its place, whether it swings or "stands", and drawn back it
+//!   is seen closed there, and without having opened the foot then moves over the ground with it alone closed, for a
+//!   second in all, it is stuck. A foot that hangs by a switch at a wall keeps its place, whether it swings or "stands", and drawn back it
 //!   opens the switch.
 //! * **Stuck open.** With the legs fully extended the soles lie in the plane of the wheels, as even
 //!   ground does. If the other three close twice in a row and it does not, it is stuck: on uneven
 //!   ground it would have closed once.
 //!
 //! This takes some steps; the gait does not wait for it. Once it is told, a switch that is stuck closed counts as open
-//! until it does open: the foot's contact is that of the other three.
+//! until it does open: the foot's contact is that of the other three, and so is what is found of these.
 
 use wheeleg_units::PositionMm;
 
-use crate::contact::FootSwitches;
+use crate::contact::{FRONT, FootSwitches, INNER, OUTER, REAR};
 
 /// Number of switches of a foot.
 const SWITCHES: usize = 4;
 /// Bits of all switches.
 const ALL: u8 = 0x0F;
+/// Bit of each switch.
+const BITS: [u8; SWITCHES] = [FRONT, OUTER, REAR, INNER];
 /// Cycles for which the other three must agree: 0.2 s, far longer than the foot takes to roll onto its sole.
 const AGREE: u8 = 20;
 /// A swinging foot drawn up by this much, mm, from where it stood is in the air.
 const CLEAR_MM: i16 = 15;
 /// Legs extended at least this far, mm, have their soles in the plane of the wheels.
 const LEVEL_MM: i16 = 175;
+/// Cycles for which a switch must have been closed alone: 1 s. Over rocks a foot may hang by one switch while the wheels
+/// slip, which looks as if it moved.
+const ALONE: u8 = 100;
 /// Stances in which a switch must stay open.
 const STANCES: u8 = 2;
 /// Nothing holds a foot that has moved over the ground by this much, µm. One that hangs at a wall moves by what its sole,
@@ -46,6 +51,8 @@ struct One {
     /// Least and greatest of the foot's way over the ground, µm, with it alone closed, in that swing and since; ahead
     /// and to the left.
     span_um: Option<[[i64; 2]; 2]>,
+    /// Cycles for which that has been so.
+    alone: u8,
     /// Already reported.
     told: bool,
 }
@@ -89,6 +96,7 @@ impl One {
             *least = um.min(*least);
             *greatest = um.max(*greatest);
         }
+        self.alone = self.alone.saturating_add(1);
     }
 
     /// Whether the foot has moved while it alone was closed, so that nothing presses on it.
@@ -100,7 +108,7 @@ impl One {
 
     /// What it is found to be.
     fn stuck(&self, bit: u8) -> Option<Stuck> {
-        let closed = self.closed && self.moves_freely();
+        let closed = self.closed && self.alone >= ALONE && self.moves_freely();
         let switch = FootSwitches(bit);
         (closed || self.open >= STANCES).then_some(Stuck { switch, closed })
     }
@@ -111,7 +119,7 @@ impl FootWatch {
     #[must_use]
     pub fn believed(&self, now: FootSwitches) -> FootSwitches {
         let told = |(bit, one): (u8, &One)| if one.told && one.closed { bit } else { 0 };
-        let stuck = [1_u8, 2, 4, 8].into_iter().zip(&self.switches).map(told);
+        let stuck = BITS.into_iter().zip(&self.switches).map(told);
         FootSwitches(now.0 & !stuck.fold(0, |all, bit| all | bit))
     }
 
@@ -134,9 +142,17 @@ impl FootWatch {
         let drawn_up = self
             .stood
             .is_some_and(|stood| stood.saturating_sub(b6_mm) >= clear);
-        let place = match now.count_ones() {
-            0 | 1 if swings && drawn_up => Place::Air,
-            3 | 4 if shorter_mm >= PositionMm::from_int(LEVEL_MM) => Place::Ground,
+        let changed = self.last.map_or(0, |last| last ^ now);
+        self.last = Some(now);
+        for (bit, one) in BITS.into_iter().zip(&mut self.switches) {
+            if changed & bit != 0 {
+                *one = One::default();
+            }
+        }
+        let counts = self.believed(FootSwitches(now)).0;
+        let place = match (counts.count_ones(), now.count_ones()) {
+            (0 | 1, _) if swings && drawn_up => Place::Air,
+            (_, 3 | 4) if shorter_mm >= PositionMm::from_int(LEVEL_MM) => Place::Ground,
             _ => Place::Between,
         };
         if place != self.place {
@@ -145,15 +161,10 @@ impl FootWatch {
                 one.agreed = 0;
             }
         }
-        let changed = self.last.map_or(0, |last| last ^ now);
-        self.last = Some(now);
         let mut found = None;
-        for (bit, one) in [1_u8, 2, 4, 8].into_iter().zip(&mut self.switches) {
-            if changed & bit != 0 {
-                *one = One::default();
-            }
+        for (bit, one) in BITS.into_iter().zip(&mut self.switches) {
             let others = now & ALL & !bit;
-            let alone = others == 0 && now & bit != 0;
+            let alone = counts == bit;
             if alone && (place == Place::Air || one.closed) {
                 one.note_alone(way_um);
             }
@@ -177,7 +188,6 @@ impl FootWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{FRONT, INNER, OUTER, REAR};
 
     /// A pattern, the stroke of b6, and the number of cycles.
     type Stretch = (u8, i16, u32);
@@ -250,12 +260,13 @@ mod tests {
             (found.is_some(), watch.believed(raw).0)
         };
         assert_eq!(sample(ALL, 0), (false, ALL));
-        let told = (1..100).find(|cycle| {
+        let told = (1..150).find(|cycle| {
             let (told, counts) = sample(REAR, *cycle);
             assert_eq!(counts, if told { 0 } else { REAR });
             told
         });
-        assert!(told.is_some());
+        // After a second, for 60 mm take 0.6 s here.
+        assert_eq!(told, Some(100));
         assert_eq!(sample(REAR, 100), (false, 0));
         assert_eq!(sample(ALL, 100), (false, ALL & !REAR), "on the ground");
         assert_eq!(sample(0, 101), (false, 0));
@@ -274,6 +285,25 @@ mod tests {
             assert_eq!(watch.believed(FootSwitches(raw)).0, raw);
         }
         assert!(told);
+    }
+
+    #[test]
+    fn a_second_switch_that_sticks_is_told_beside_a_first_one() {
+        let step = |stuck: u8| [(stuck, 100, 100), (ALL, 180, 200)];
+        let walk = [
+            &[(ALL, 180, 200)][..],
+            &step(REAR),
+            &step(REAR | OUTER),
+            &step(REAR | OUTER),
+        ];
+        let closed = |bit: u8| Stuck {
+            switch: FootSwitches(bit),
+            closed: true,
+        };
+        assert_eq!(
+            stuck_switches(&walk.concat(), 180),
+            [closed(REAR), closed(OUTER)]
+        );
     }
 
     #[test]

@@ -88,7 +88,7 @@ pub struct WheelSense {
 /// Everything that the behaviours sense, derived from slot replies alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Senses {
-    /// Switches of the feet, in each leg's frame.
+    /// Switches of the feet that count, in each leg's frame.
     pub feet: [Option<FootSwitches>; WHEELS],
     /// The joints; `None`: never heard.
     pub joints: [Option<JointSense>; JOINTS],
