@@ -205,10 +205,13 @@ fn broken_in(scenario: &Scenario, recording: &Recording) -> Vec<Broken> {
 #[test]
 fn a_switch_that_sticks_closed_in_a_walk_is_told() {
     let front = (Side::Left, Some(Sector::Front), Warning::SwitchStuckClosed);
+    let rear = (Side::Left, Some(Sector::Rear), Warning::SwitchStuckClosed);
     let outer = (Side::Left, Some(Sector::Left), Warning::SwitchStuckClosed);
     let inner = (Side::Right, Some(Sector::Left), Warning::SwitchStuckClosed);
     let cases = [
+        ("walk", 14.0, "foot-switch-on:left.front@6s", front),
         ("walk", 14.0, "foot-switch-on:left.front@7.4s", front),
+        ("walk", 14.0, "foot-switch-on:left.back@9s", rear),
         ("walk", 14.0, "foot-switch-on:left.left@6s", outer),
         ("spin", 14.0, "foot-switch-on:left.front@6s", front),
         ("spin", 14.0, "foot-switch-on:right.left@6s", inner),

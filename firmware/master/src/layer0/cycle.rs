@@ -281,11 +281,11 @@ impl Layer0 {
                 .flatten()
                 .is_some_and(|joint| joint.on_link_loss == OnLinkLoss::HoldThenExhaust);
             let b6_mm = reply.joint_position();
-            let places = self
+            let of_side = self
                 .foot_watches
                 .get_mut(side.index())
                 .zip(self.feet.get_mut(side.index()));
-            let Some((watch, foot)) = places else {
+            let Some((watch, foot)) = of_side else {
                 continue;
             };
             let found = watch.sample(closed, b6_mm, shorter_mm, way_um, swings);

@@ -163,12 +163,11 @@ impl FootWatch {
         }
         let mut found = None;
         for (bit, one) in BITS.into_iter().zip(&mut self.switches) {
-            let others = now & ALL & !bit;
             let alone = counts == bit;
+            let missing = now == ALL & !bit;
             if alone && (place == Place::Air || one.closed) {
                 one.note_alone(way_um);
             }
-            let missing = others == ALL & !bit && now & bit == 0;
             if place == Place::Air && alone || place == Place::Ground && missing {
                 one.agreed = one.agreed.saturating_add(1);
                 if one.agreed == AGREE {
