@@ -107,12 +107,13 @@ fn boards_at_a_port_are_armed_moved_and_hold_when_they_are_gone() {
     driver.keep_control(true);
     assert_eq!(refusal(&mut driver, "Arm", &json!({})), "slow_adapter");
     collects("1\n");
-    // A board whose answer a busy computer delayed is lost for a moment.
+    // A board whose answer a busy computer delayed is lost for a moment, before the arming or in it.
     let begin = Instant::now();
     loop {
         match driver.carry_out("Arm", &json!({}), 1000).expect("sent") {
             Outcome::Done => break,
-            Outcome::Refused { reason, .. } => assert_eq!(reason, "board_missing"),
+            Outcome::Refused { reason, .. }
+                if ["board_missing", "interrupted"].contains(&reason.as_str()) => {}
             other => panic!("{other:?}"),
         }
         assert!(begin.elapsed() < Duration::from_secs(20), "not armed");
