@@ -35,6 +35,7 @@ const fn told(part: Part) -> &'static str {
     match part {
         Part::LoadObserver => "load observer",
         Part::MassEstimator => "mass estimator and identification",
+        Part::FrictionEstimator => "friction learnt from sliding to and fro",
         Part::AirIdentification => "identification of the air only",
         Part::DeadTimePredictor => "dead-time prediction of the motion",
         Part::Parabola => {

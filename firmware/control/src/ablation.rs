@@ -12,6 +12,8 @@ pub enum Part {
     LoadObserver = 1,
     /// The mass stays as specified; pressures are not identified, either.
     MassEstimator,
+    /// Friction stays as specified.
+    FrictionEstimator,
     /// The mass comes only from three instants of the move, and the pressures stay as they are.
     AirIdentification,
     /// The law acts on the motion at the moment.
@@ -36,9 +38,10 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::LoadObserver,
         Self::MassEstimator,
+        Self::FrictionEstimator,
         Self::AirIdentification,
         Self::DeadTimePredictor,
         Self::Parabola,

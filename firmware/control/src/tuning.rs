@@ -81,6 +81,13 @@ tuning! {
     MASS_LEARNT_MOST: i32 = 12, "times the mass told", "a payload adds to it", "src/observer/mass.rs::what_cannot_be_is_bounded";
     MASS_LEARNT_LEAST: i32 = 39_322, "share of the mass told, × 2^16 (0.6)", "rod and carriage stay", "src/observer/mass.rs::a_mass_below_the_least_is_believed_when_it_is_told_again";
 
+    // Observer: friction.
+    FRICTION_PERIODS: i32 = 16, "periods (64 ms)", "searched: with 8 and with 32 about as many random cylinders are missed", "src/observer/friction.rs::a_mean_forgets_after_sixteen_periods";
+    FRICTION_PERIODS_MIN: i32 = 4, "periods (16 ms)", "searched: with 2 and with 8 about as many random cylinders are missed", "src/observer/friction.rs::four_periods_each_way_tell_the_friction";
+    FRICTION_AIR: i32 = 6400, "widths of both pressures' bounds as forces over the largest extending force, × 2^16 (0.098)", "searched: with a quarter more fine cylinders are missed, and with a twentieth more coarse ones", "src/observer/friction.rs::air_that_is_not_known_tells_no_friction";
+    FRICTION_LEAST: i32 = 1 << 15, "share of the friction specified, × 2^16 (0.5)", "what the law is meant for", "src/observer/friction.rs::what_cannot_be_is_bounded";
+    FRICTION_MOST: i32 = 1 << 17, "share of the friction specified, × 2^16 (2)", "what the law is meant for", "src/observer/friction.rs::what_cannot_be_is_bounded";
+
     // Observer: identification of mass and air.
     AIR_UNKNOWN: i32 = 1024, "widths of both pressures' bounds as forces, added and averaged over the move, over the largest extending force, × 2^12 (0.25)", "searched: with more the mass by three instants is wrong by up to five times", "src/observer/mass.rs::a_move_with_unknown_air_tells_its_mass_and_the_air";
     AIR_RESIDUAL: i64 = 1500, "expected error of the impulse as a share of the largest force over a period, × 2^12 (0.37)", "searched: with more, more of the error is left to the mass; with less, a vented axis is corrected for nothing", "src/observer/identification.rs::the_ridge_is_that_of_the_table";

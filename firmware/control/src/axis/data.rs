@@ -50,7 +50,7 @@ pub struct AxisData {
     /// Both chambers are filled before the law drives, and the law seats the piston at end stops. Otherwise the
     /// chambers count as vented.
     pub precharged: bool,
-    /// The mass is learnt from moves, during which the load must not change.
+    /// Mass and friction are learnt from moves, during which the load must not change.
     pub learns_mass: bool,
     /// Full stroke, mm.
     pub stroke: PositionMm,

@@ -128,7 +128,7 @@ pub struct AxisModel {
     pub release: i32,
     /// Both chambers are filled before the law drives.
     pub precharged: bool,
-    /// The mass is learnt from moves.
+    /// Mass and friction are learnt from moves.
     pub learns_mass: bool,
     /// Square of the time of one oscillation on the air of both chambers, periods² per kg × 2^8.
     pub oscillation: i32,

@@ -23,7 +23,7 @@
 //! Source: control of a plant with dead time by its predicted state (Smith 1957; Manitius and Olbrot 1979); one step of
 //! the linearly implicit trapezoidal rule (Hairer and Wanner, Solving Ordinary Differential Equations II, ch. IV.7).
 //!
-//! Assumes: valve delays, supply and friction as specified; within the dead time, a constant load as estimated and a
+//! Assumes: valve delays and supply as specified; friction as in use; within the dead time, a constant load as estimated and a
 //! force and a speed that change linearly. Where the piston would reach an end stop at its present speed, F expected
 //! counts on no compression (`trajectory`). If the supply falls, a filling pulse adds less to F expected than is counted.
 //!

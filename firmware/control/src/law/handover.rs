@@ -6,7 +6,7 @@
 //!
 //! | | what is kept when another part drives | why |
 //! |---|---|---|
-//! | continues | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, clock and period, a pressure swap | they follow what was sent, whoever sent it |
+//! | continues | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, friction in use, clock and period, a pressure swap | they follow what was sent, whoever sent it |
 //! | starts afresh at the end of each period whose last tick the other part has | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
 //! | is dropped at once | the part of the plan that was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
 //!

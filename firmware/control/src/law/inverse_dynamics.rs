@@ -34,7 +34,7 @@
 //! spring of its friction, faster than the curve allows, and with the full gain further pulses push it back.
 //! `switching_curve` determines whether half is enough.
 //!
-//! Assumes: friction and supply as specified; neither is learnt. Load and mass are those of the observer. The demanded
+//! Assumes: the supply as specified. Friction, load and mass are those of the observer. The demanded
 //! force is reached at the end of the dead time, as far as the pulses of one period can make it. If the supply falls,
 //! F_in and F_out are overestimated, and under a load the piston brakes too late. The force that is missing is made up
 //! by the load estimate while the piston moves, and by the ramp while it stands.

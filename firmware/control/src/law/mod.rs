@@ -30,7 +30,8 @@
 //!
 //! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, otherwise only 10.
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
-//!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`).
+//!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`). Friction, wherever the
+//!    law uses it, is that of the axis data times the share that the observer has learnt.
 //! 3. `plan_period`: if the target is new, patience starts afresh, a landing is allowed (`standstill`), and the ramp is
 //!    forgotten.
 //! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
@@ -67,7 +68,7 @@
 //! | somebody else drives the valves | `handover`: the observer counts what they send. When the law acts again, its standstill, ramp and preload start afresh (if the other part had the last tick of a period); everything else continues |
 //! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers with a time constant of about 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
-//! | friction that is not as specified | it appears as load. Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
+//! | friction that is not as specified | it appears as load, until the piston has slid to and fro at one target; then it is learnt, within half and twice (`observer/friction.rs`). Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
 //! Tests are at the end of each file, or in `tests.rs` in the folder of its name; those of `handover`, `seat` and
 //! `preload` are in `tests.rs` here and in `tests/preload.rs`. `tests/system/control_bars.rs` shows what all of it is
@@ -263,12 +264,14 @@ impl Predictive {
     }
 
     /// Plans the pulses of the next period.
-    fn plan_period(&mut self, model: &AxisModel, input: &JointInput) {
+    fn plan_period(&mut self, specified: &AxisModel, input: &JointInput) {
+        let model = &self.observer.learnt(specified);
         let reference = input.reference.raw();
         let reference_speed = input.reference_velocity.raw();
         if self.standstill.aim(model, reference) {
             self.ramp = BreakawayRamp::default();
             self.inching = Inching::default();
+            self.observer.aim();
         }
         let stands = self.is_settled() || self.observer.motion.speed.wrapping_abs() < STILL_SPEED;
         let preload = self.preload(model, input, stands);

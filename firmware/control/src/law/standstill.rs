@@ -54,7 +54,7 @@
 //! widens; the 24 bands, and the one band of a new target, are those of the axis data (0.12 mm on the bench). Times are
 //! in periods of four ticks: 4 ms with ticks of 1 ms.
 //!
-//! Assumes: where friction is relied on, at least 0.85 of the specified value; that shut valves hold the air, so that a
+//! Assumes: where friction is relied on, at least 0.85 of the friction in use; that shut valves hold the air, so that a
 //! piston at rest stays there; noise of the measured stroke below a third of the band. If the supply falls, a piston at
 //! rest stays there, because rest needs no air. A piston on its way may lack the force to arrive: it stays in SERVO,
 //! its band widens by no more than 2.4 times, and supervision sees the error. REST learns nothing about the force: a

@@ -44,8 +44,8 @@
 //! the factors are searched ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l does not
 //! depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as specified; the mass in use; on the landing at least 0.6 of the specified
-//! friction; and that a force can be built up within
+//! Assumes: dead time, supply and conductance as specified; the mass in use; on the landing at least 0.6 of the friction
+//! in use; and that a force can be built up within
 //! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that
 //! it demands comes later or not at all, and the piston falls behind the curve or overshoots the target.
 //!

@@ -34,7 +34,7 @@
 //! small. Only the same bound and doubt guard against this.
 //!
 //! Assumes: the load does not change during the move; axes for which it does switch learning off
-//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction and supply as specified, within what doubt covers. If the
+//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction in use and supply as specified, within what doubt covers. If the
 //! supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J line: no
 //! more than the two bounds let through.
 //!

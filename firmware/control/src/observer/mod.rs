@@ -7,6 +7,7 @@
 //! | [`pressure`] | pressure of a chamber, and its bounds | openings, motion |
 //! | [`motion`] | stroke, speed, load | pressure force, measured stroke |
 //! | `trajectory` | where the piston goes in the dead time | motion |
+//! | `friction` | friction as a share of that specified, from sliding to and fro | pressure force, speed |
 //! | [`mass`] | moving mass, from three instants of a move | pressure force, speed |
 //! | `identification` | mass and pressures from one move, where these are unknown | the same, bounds |
 //!
@@ -19,7 +20,9 @@
 //! 4. `motion`: stroke and speed are predicted with that mean, then corrected with the measured stroke, and the load
 //!    with them.
 //! 5. `trajectory` of the next period.
-//! 6. `mass`, if the axis learns it: adds one period of the move under way. When the move has ended, the mass and, by
+//! 6. `friction`, if the axis learns: the means of this target, and with them the share of the friction. All of the above, and
+//!    the law, use the model with that friction from the next period on.
+//! 7. `mass`, if the axis learns: adds one period of the move under way. When the move has ended, the mass and, by
 //!    `identification`, the pressures are corrected; the load gives back the error that it had absorbed from the
 //!    pressures.
 //!
@@ -39,6 +42,7 @@
 //! a sensor fault, after damaged memory, and for new axis data.
 
 pub mod flow;
+mod friction;
 mod identification;
 pub mod mass;
 pub mod motion;
@@ -50,6 +54,7 @@ use crate::ablation::{Part, is_without};
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat};
 use crate::pwm::OnTimes;
+use friction::FrictionEstimator;
 use mass::MassEstimator;
 use motion::{Inertia, Motion};
 use pressure::{Chamber, ChamberMotion, Period, Pressures, Sent};
@@ -69,6 +74,7 @@ pub struct Observer {
     /// Quantities that follow from the mass, as specified or learnt.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
+    friction: FrictionEstimator,
     trajectory: PeriodTrajectory,
 }
 
@@ -85,6 +91,7 @@ impl Observer {
             force: model.pressure_force(pressures),
             inertia: Inertia::new(model, model.mass),
             mass: MassEstimator::default(),
+            friction: FrictionEstimator::default(),
             trajectory: PeriodTrajectory::default(),
         }
     }
@@ -166,16 +173,27 @@ impl Observer {
         &self.motion
     }
 
+    /// The target is a new one: friction is learnt from the sliding at one target.
+    pub(crate) fn aim(&mut self) {
+        self.friction.aim();
+    }
+
+    /// The axis with the friction that has been learnt, given the one with that of its data.
+    pub(crate) fn learnt(&self, specified: &AxisModel) -> AxisModel {
+        specified.with_friction(self.friction.share())
+    }
+
     /// One period, with the on-times planned for it, those that others made in it, and the stroke at its moment, raw
     /// mm. Returns a mass that was learnt in it, kg × 2^16.
     pub(crate) fn update(
         &mut self,
-        model: &AxisModel,
+        specified: &AxisModel,
         period: &Period,
         plan: OnTimes,
         external: OnTimes,
         stroke: i32,
     ) -> Option<i32> {
+        let model = &self.learnt(specified);
         let PeriodTrajectory {
             middle,
             speed,
@@ -201,16 +219,21 @@ impl Observer {
         let before = self.force;
         self.force = model.pressure_force(self.pressures());
         let force = before.saturating_add(self.force) >> 1;
+        let speed = self.motion.speed;
         self.motion.predict(model, &self.inertia, force);
         self.motion.correct(model, &self.inertia, stroke);
         self.trajectory = PeriodTrajectory::of(model, &self.motion);
 
-        if !model.learns_mass || is_without(Part::MassEstimator) {
+        if !model.learns_mass {
             return None;
         }
         let widths = self.widths(model);
+        self.learn_friction(specified, speed, force, widths);
+        if is_without(Part::MassEstimator) {
+            return None;
+        }
         let found = self.mass.update(model, self.motion.speed, force, widths)?;
-        self.inertia = Inertia::new(model, found.mass);
+        self.inertia = Inertia::new(&self.learnt(specified), found.mass);
         let [share_a, share_b] = found.shares;
         if share_a | share_b != 0 {
             self.a.correct(share_a);
@@ -222,6 +245,18 @@ impl Observer {
             self.force = corrected;
         }
         Some(found.mass)
+    }
+
+    /// Friction from a period that began at the speed `before`, raw mm/s.
+    fn learn_friction(&mut self, specified: &AxisModel, before: i32, force: i32, widths: [i32; 2]) {
+        let (inertia, motion) = (&self.inertia, &self.motion);
+        if !is_without(Part::FrictionEstimator)
+            && self
+                .friction
+                .update(specified, inertia, motion, before, force, widths)
+        {
+            self.inertia = Inertia::new(&self.learnt(specified), self.inertia.mass);
+        }
     }
 }
 

@@ -19,8 +19,8 @@
 //! |---|---|---|
 //! | x, v | mm, mm/s | stroke, speed; positive extends |
 //! | F, load | mN | pressure force; external force plus model error |
-//! | Fc, Fb | mN | Coulomb and break-away friction, as specified; the observer uses 0.92 of Fc |
-//! | d | mN s/mm (N s/m) | viscous friction, as specified |
+//! | Fc, Fb | mN | Coulomb and break-away friction, as specified or learnt; the observer uses 0.92 of Fc |
+//! | d | mN s/mm (N s/m) | viscous friction, likewise |
 //! | m | kg | mass, as specified or learnt |
 //! | T | s | period |
 //!
@@ -30,7 +30,8 @@
 //! the first period in which its condition does not hold.
 //!
 //! Assumes: a load that is constant but for corrections, the mass of the estimator, friction between half and twice the
-//! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load. If
+//! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load, until `friction` has
+//! learnt them. If
 //! the supply falls, F is wrong by what the filled chamber lacks; the load cancels that with a time constant of about 20 ms while the piston slides.
 //! While the piston is stuck the load stays as it was: F + load is then wrong until it slides.
 //!
