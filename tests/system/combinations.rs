@@ -22,12 +22,12 @@ const ROOT_VARIABLE: &str = "WHEELEG_COMBINATIONS_ROOT";
 const CASES: [(&str, bool, f64, f64); 8] = [
     ("bench-vq110u", true, 0.005, 0.023),
     ("bench-vq110u", false, 0.003, 0.0075),
-    ("small-12x50", true, 0.01, 0.036),
+    ("small-12x50", true, 0.01, 0.02),
     ("small-12x50", false, 0.01, 0.02),
     ("long-16x400", true, 0.01, 0.03),
     ("long-16x400", false, 0.01, 0.02),
-    ("heavy-40x250", true, 0.025, 0.1),
-    ("heavy-40x250", false, 0.025, 0.05),
+    ("heavy-40x250", true, 0.025, 0.03),
+    ("heavy-40x250", false, 0.025, 0.03),
 ];
 
 fn played(axis: &str, drawn: bool, root: u64, count: u64) -> Vec<Row> {

@@ -19,6 +19,11 @@
 //! that vents: the force is there as soon as either chamber can make it. The swap ends once the expected excess of the
 //! counter chamber is at most 10 kPa. Source: this project (decision 38).
 //!
+//! **Out of reach.** A piston that still stands when the break-away ramp has grown by one break-away force (0.2 s), although all
+//! the force is demanded, is held by air that the observer does not know of: mostly by a full counter chamber that counts as
+//! vented, into which no pulse would be planned. Then both targets lie beyond what valves can make, and the valves stay
+//! open until the piston moves: whatever was assumed, filling ends at the supply and venting at the atmosphere.
+//!
 //! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its
 //! pressure, and the force is less than demanded. For the swap: that the counter chamber's pressure is estimated to
 //! within 10 kPa.
@@ -28,7 +33,7 @@
 use crate::axis::AxisModel;
 use crate::math::{mul_shr, mul_shr_sat};
 use crate::observer::pressure::Pressures;
-use crate::tuning::SWAP_LAG;
+use crate::tuning::{PRESSURE_MAX, SWAP_LAG};
 use wheeleg_units::{Duty, saturate_i32};
 
 /// Limits a pressure to what the valves can make.
@@ -141,6 +146,16 @@ impl PressureSwap {
             },
         }
     }
+}
+
+/// Pressures that no valve reaches, for a force in the direction of `force`.
+pub(super) const fn out_of_reach(force: i32) -> Pressures {
+    let (a, b) = if force > 0 {
+        (PRESSURE_MAX, 0)
+    } else {
+        (0, PRESSURE_MAX)
+    };
+    Pressures { a, b }
 }
 
 /// A force that the supply can deliver, as a share of its largest, in steps of 2^-14.

@@ -62,6 +62,11 @@ pub(super) struct BreakawayRamp {
 }
 
 impl BreakawayRamp {
+    /// Whether it has grown by more than one break-away force.
+    pub(super) const fn exceeds_breakaway(self, model: &AxisModel) -> bool {
+        self.force.wrapping_abs() >> 8 > model.breakaway
+    }
+
     /// One period at `speed`, raw mm/s, with `missing` raw mm to a reference of `reference_speed`. A piston slower than
     /// sliding speed only yields on the spring of its friction; that takes nothing off the ramp.
     fn update(&mut self, model: &AxisModel, speed: i32, missing: i32, reference_speed: i32) {

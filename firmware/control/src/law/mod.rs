@@ -67,6 +67,7 @@
 //! | no new reference | the node lets the last one continue at its speed for one bus cycle and then stand; when it gives up on the master it shuts the valves. The law comes to rest at whatever reference it is given |
 //! | somebody else drives the valves | `handover`: the observer counts what they send. When the law acts again, its standstill, ramp and preload start afresh (if the other part had the last tick of a period); everything else continues |
 //! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers with a time constant of about 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
+//! | a full chamber that counts as vented | the piston stands although all the force is demanded. After 0.2 s of that the valves stay open until it moves (`allocation`) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | it appears as load, until the piston has slid to and fro at one target; then it is learnt, within half and twice (`observer/friction.rs`). Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
@@ -359,9 +360,13 @@ impl Predictive {
     /// Plans pulses that make a force, mN; near the target, pulses of one chamber only.
     fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
         let possible = allocation::possible_force(model, force);
-        let target = self.swap.targets(model, possible, self.observer.expected());
-        self.plan = pulse_planner::plan(model, &self.observer, target, self.begin, near);
         self.limited = possible != force;
+        let target = if self.limited && self.ramp.exceeds_breakaway(model) {
+            allocation::out_of_reach(force)
+        } else {
+            self.swap.targets(model, possible, self.observer.expected())
+        };
+        self.plan = pulse_planner::plan(model, &self.observer, target, self.begin, near);
         self.duty = allocation::duty(model, possible);
     }
 }

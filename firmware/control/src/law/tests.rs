@@ -343,3 +343,76 @@ fn a_seat_has_its_target_zone_speed_and_force() {
         (seated, press)
     );
 }
+
+/// A piston that stands under all the force that there should be is held by air that the observer does not know of: the
+/// counter chamber, which counts as vented, is vented, and the drive chamber, which counts as full, is filled. Not at once,
+/// and not for a force that can be made.
+#[test]
+fn a_piston_that_stands_under_full_force_gets_open_valves() {
+    let model = model();
+    for (measured, reference, drive) in [(60, 150, [0, 3]), (120, 30, [2, 1])] {
+        let mut law = Predictive::new(&model);
+        let mut open = 0;
+        for tick in 0..3000 {
+            let on = law.drive(&model, &input(measured, reference)).on;
+            let both = drive.iter().all(|valve| on[*valve] == 1000);
+            open = if both { open + 1 } else { 0 };
+            assert!(both || tick < 2500, "{tick}: {on:?}");
+            // The first pulses fill and vent the chambers as far as is known; then nothing is left to do.
+            assert!(!both || tick < 600 || law.limited, "{tick}: {on:?}");
+        }
+        assert!(open < 2800, "{open} ticks");
+    }
+    // 1 mm off, a small force is asked for as long.
+    let mut law = Predictive::new(&model);
+    for tick in 0..1000 {
+        law.drive(&model, &input(90, 91));
+        assert!(!law.limited, "{tick}");
+    }
+}
+
+/// Friction is fed forward, and counted on, as learnt. A new target keeps it, and begins to learn anew.
+#[test]
+fn the_law_uses_the_friction_that_is_learnt() {
+    use crate::observer::friction::FrictionEstimator;
+    let model = model();
+    let rested = |share: i32| {
+        let mut law = Predictive::new(&model);
+        for _ in 0..200 {
+            law.drive(&model, &input(90, 90));
+        }
+        law.observer.friction = FrictionEstimator::of(share);
+        law
+    };
+    let force = |share: i32| {
+        let mut law = rested(share);
+        let own = law.observer.learnt(&model);
+        law.force_demand(&own, 90 << 16, 20 << 16)
+    };
+    // A start from rest at 20 mm/s: all of the break-away friction, and the viscous friction.
+    let all = f64::from(model.breakaway) + 20.0 / 256.0 * f64::from(model.viscous);
+    let less = f64::from(force(1 << 16) - force(1 << 15)) / all;
+    assert!((less - 0.5).abs() < 0.02, "{less}");
+    // In the closed loop, too: the duty of the same demand.
+    let duty = |share: i32| {
+        let mut law = rested(share);
+        let starts = JointInput {
+            reference_velocity: VelocityMmS::from_int(20),
+            ..input(90, 90)
+        };
+        for _ in 0..4 {
+            law.drive(&model, &starts);
+        }
+        law.duty.raw()
+    };
+    assert!(duty(1 << 15) < duty(1 << 16));
+    // Another target.
+    let mut law = rested(1 << 15);
+    assert_eq!(law.observer.friction, FrictionEstimator::of(1 << 15));
+    for _ in 0..4 {
+        law.drive(&model, &input(90, 130));
+    }
+    let mut anew = FrictionEstimator::of(1 << 15);
+    anew.aim();
+    assert_eq!(law.observer.friction, anew);
+}

@@ -90,6 +90,20 @@ impl FrictionEstimator {
         self.share
     }
 
+    /// Friction learnt before a test.
+    #[cfg(test)]
+    pub(crate) fn of(share: i32) -> Self {
+        let sliding = Sliding {
+            periods: FRICTION_PERIODS,
+            ..Sliding::default()
+        };
+        Self {
+            extending: sliding,
+            retracting: sliding,
+            share,
+        }
+    }
+
     /// The target is a new one.
     pub(crate) fn aim(&mut self) {
         self.extending = Sliding::default();

@@ -42,7 +42,7 @@
 //! a sensor fault, after damaged memory, and for new axis data.
 
 pub mod flow;
-mod friction;
+pub(crate) mod friction;
 mod identification;
 pub mod mass;
 pub mod motion;
@@ -74,7 +74,7 @@ pub struct Observer {
     /// Quantities that follow from the mass, as specified or learnt.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
-    friction: FrictionEstimator,
+    pub(crate) friction: FrictionEstimator,
     trajectory: PeriodTrajectory,
 }
 
