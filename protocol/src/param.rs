@@ -413,7 +413,7 @@ parameters! {
         RestRelease = 0x013B, "rest_release", "mm", I16F16, "0" ..= "50", default "0", any_time,
             "Predictive law: a piston at rest stays so up to this error; 0: up to three times the rest band.";
         MassLearning = 0x013C, "mass_learning", "1", Flag, "0" ..= "1", default "1", disarmed,
-            "Predictive law: mass and friction are learnt from free moves; 0: they stay as given, for an axis that the ground or a stop loads in mid-move.";
+            "Predictive law: mass and friction are learnt from the motion; 0: they stay as given, for an axis that the ground or a stop loads in mid-move.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

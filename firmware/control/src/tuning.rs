@@ -69,7 +69,7 @@ tuning! {
     REBOUND_SPEED: i32 = 20 << 16, "raw mm/s (20 mm/s)", "a rebound from an end stop is over within a period", "src/observer/motion.rs::an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
     STOP_ZONE: i32 = 1 << 16, "raw mm (1 mm)", "give of a stop, and error of the stroke told", "src/observer/motion.rs::an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
     CUSHION: i32 = 6 << 16, "raw mm (6 mm)", "length of the longest cushion of the cylinders in axes/", "src/observer/motion.rs::an_end_stop_holds_a_piston_and_its_cushion_is_no_load";
-    FRICTION_COUNTED: i32 = 60_293, "share of the friction told, × 2^16 (0.92)", "searched: friction that is less than told would let the observer overlook speed", "src/observer/motion.rs::a_sliding_piston_loses_speed_to_friction";
+    FRICTION_COUNTED: i32 = 60_293, "share of the friction in use, × 2^16 (0.92)", "searched: friction that is less than told would let the observer overlook speed", "src/observer/motion.rs::a_sliding_piston_loses_speed_to_friction";
     MASS_MIN: i32 = 1311, "kg × 2^16 (0.02 kg)", "the least that may be told; format: its inverse fits", "src/observer/motion.rs::no_mass_counts_as_less_than_the_least_that_may_be_told";
 
     // Observer: mass.
@@ -82,9 +82,9 @@ tuning! {
     MASS_LEARNT_LEAST: i32 = 39_322, "share of the mass told, × 2^16 (0.6)", "rod and carriage stay", "src/observer/mass.rs::a_mass_below_the_least_is_believed_when_it_is_told_again";
 
     // Observer: friction.
-    FRICTION_PERIODS: i32 = 16, "periods (64 ms)", "searched: with 8 and with 32 about as many random cylinders are missed", "src/observer/friction.rs::a_mean_forgets_after_sixteen_periods";
-    FRICTION_PERIODS_MIN: i32 = 4, "periods (16 ms)", "searched: with 2 and with 8 about as many random cylinders are missed", "src/observer/friction.rs::four_periods_each_way_tell_the_friction";
-    FRICTION_AIR: i32 = 6400, "widths of both pressures' bounds as forces over the largest extending force, × 2^16 (0.098)", "searched: with a quarter more fine cylinders are missed, and with a twentieth more coarse ones", "src/observer/friction.rs::air_that_is_not_known_tells_no_friction";
+    FRICTION_PERIODS: i32 = 16, "periods (64 ms)", "searched: with 32 about as many random cylinders are missed, and more of `heavy-40x250`", "src/observer/friction.rs::a_mean_forgets_after_sixteen_periods";
+    FRICTION_PERIODS_MIN: i32 = 4, "periods (16 ms)", "searched: with 8 about as many random cylinders are missed", "src/observer/friction.rs::four_periods_each_way_tell_the_friction";
+    FRICTION_AIR: i32 = 6400, "widths of both pressures' bounds as forces over the largest extending force, × 2^16 (0.098)", "searched: a quarter misses more fine cylinders, a twentieth more coarse ones", "src/observer/friction.rs::air_that_is_not_known_tells_no_friction";
     FRICTION_LEAST: i32 = 1 << 15, "share of the friction specified, × 2^16 (0.5)", "what the law is meant for", "src/observer/friction.rs::what_cannot_be_is_bounded";
     FRICTION_MOST: i32 = 1 << 17, "share of the friction specified, × 2^16 (2)", "what the law is meant for", "src/observer/friction.rs::what_cannot_be_is_bounded";
 
@@ -112,7 +112,7 @@ tuning! {
     FULL_FRICTION_SPEED: i32 = 10, "mm/s", "searched: steeper, the feed-forward is a relay", "src/law/inverse_dynamics/tests.rs::friction_is_fed_forward_in_proportion_up_to_ten_mm_s";
     START_SPEED: i32 = 3 << 16, "raw mm/s (3 mm/s)", "measured: from 5 on the largest error of an S-curve is 0.08 mm larger; from 1 on, slow references are followed less closely", "src/law/inverse_dynamics/tests.rs::a_start_from_rest_begins_with_all_of_the_break_away_friction";
     START_BANDS: i32 = 2, "bands", "that far, and the piston has begun to move, as after a preload", "src/law/standstill/tests.rs::a_start_lasts_until_the_piston_has_moved_by_two_bands";
-    LANDING_FRICTION: i32 = 39_322, "share of the friction told, × 2^16 (0.6)", "measured: with 0.85 a third more combinations are missed, since friction may be half of what is told (decision 65)", "src/law/switching_curve.rs::a_landing_is_as_fast_as_friction_can_stop";
+    LANDING_FRICTION: i32 = 39_322, "share of the friction in use, × 2^16 (0.6)", "measured: with 0.85 a third more combinations are missed, since friction may be half of what is told (decision 65)", "src/law/switching_curve.rs::a_landing_is_as_fast_as_friction_can_stop";
     BRAKE_FORCE_USED: i32 = 45_875, "share of the force that can brake, × 2^16 (0.7)", "searched: leaves the rest for what is not known", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
     BRAKE_LEAST: i32 = 200, "mm/s²", "a piston whose load is beyond its force still approaches", "src/law/inverse_dynamics/tests.rs::what_a_load_leaves_for_braking_slows_the_approach";
     IMPATIENT_DIVISOR: i32 = 2, "times less acceleration is asked for where patience is over and half is enough", "a swing that lasts is a loop with too much gain; a quarter was no better (decision 61)", "src/law/inverse_dynamics/tests.rs::half_the_acceleration_is_asked_for_where_patience_is_over_and_that_makes_a_pulse";
@@ -151,7 +151,7 @@ tuning! {
     RELEASE_WIDEST: i32 = mm(45), "raw mm (0.45 mm)", "the bench tolerates 0.5 mm", "src/law/standstill/tests.rs::a_wide_band_is_released_within_the_bar";
     RELEASE_BEYOND_SIXTEENTHS: i32 = 8, "sixteenths of the band beyond one that is wider than the widest release", "searched: hysteresis of a wide band", "src/law/standstill/tests.rs::a_wide_band_is_released_within_the_bar";
     RELEASE_PERIODS: u16 = 5, "periods (20 ms)", "noise is outside for less long", "src/law/standstill/tests.rs::rest_ends_after_five_periods_outside_twice_the_band_and_at_once_with_a_new_target";
-    FRICTION_STOPS: i32 = 55_705, "share of the friction told, × 2^16 (0.85)", "searched", "src/law/standstill/tests.rs::friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
+    FRICTION_STOPS: i32 = 55_705, "share of the friction in use, × 2^16 (0.85)", "searched", "src/law/standstill/tests.rs::friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
     STOP_ZONE_BANDS: i32 = 12, "bands", "searched", "src/law/standstill/tests.rs::friction_that_stops_the_piston_in_the_band_is_left_to_do_so";
     STOP_LEAST_SHIFT: u32 = 2, "log2 of the friction over the least that stops", "less is not to be counted on", "src/law/standstill/tests.rs::friction_that_a_force_takes_away_stops_nothing";
     PAUSE_SPENT: u16 = 8, "periods of a pause that one beside the band counts for", "searched", "src/law/standstill/tests.rs::a_pause_beside_the_band_is_short";

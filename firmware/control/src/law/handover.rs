@@ -7,7 +7,7 @@
 //! | | what is kept when another part drives | why |
 //! |---|---|---|
 //! | continues | pressures with their bounds, tracks of the valves, motion, load, mass in use with its gains, doubt and the move under way, friction in use, clock and period, a pressure swap | they follow what was sent, whoever sent it |
-//! | starts afresh at the end of each period whose last tick the other part has | standstill, with the present stroke as its target; break-away ramp; preload; inching | they belong to a rest and to forces that the law has not made |
+//! | starts afresh at the end of each period whose last tick the other part has | standstill, with the present stroke as its target; break-away ramp; preload; inching; the means of the friction | they belong to a rest, to forces that the law has not made, and to sliding that somebody may have pushed |
 //! | is dropped at once | the part of the plan that was not sent: a coil that is on counts as off from the end of the tick | it does not happen |
 //!
 //! A part that drives for less than a period, and not in its last tick, leaves rest, ramp and preload as they were. An
@@ -44,6 +44,7 @@ impl Predictive {
             self.preload = Preload::default();
             self.inching = Inching::default();
             self.standstill = Standstill::at(self.observer.motion.stroke);
+            self.observer.aim();
         }
         self.next_tick(measured);
         VelocityMmS::from_raw(self.observer.motion.speed)

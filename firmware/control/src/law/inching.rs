@@ -12,7 +12,7 @@
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; F_1, and when half of the acceleration is enough: `switching_curve`; Fb, Fc:
-//! break-away and Coulomb friction as specified, mN; k_air: stiffness of the air in both shut chambers, mN/mm
+//! break-away and Coulomb friction in use, mN; k_air: stiffness of the air in both shut chambers, mN/mm
 //! ([`Observer::stiffness`]); A, ṗ: area of a chamber, and rate of pressure change through an open valve, as in
 //! `pulse_planner`.
 //!
@@ -33,7 +33,8 @@
 //! The state is AWAY while a preload or a seat decides, while the reference moves, and after a new target. The
 //! break-away ramp and patience continue as they would without inching.
 //!
-//! Assumes: flows that stay constant over the pulse, friction as specified. The net force on a piston at rest can be
+//! Assumes: flows that stay constant over the pulse, friction as in use. Whether valves are coarse may change as friction is
+//! learnt; a step under way is then dropped. The net force on a piston at rest can be
 //! anywhere within its friction; it is taken as zero (estimates from the observer, or from the effect of the last step,
 //! did worse). If the supply is lower, a filling pulse does less than planned, and another step follows.
 //!

@@ -62,6 +62,14 @@ pub(super) struct BreakawayRamp {
 }
 
 impl BreakawayRamp {
+    /// Grown to this force, mN.
+    #[cfg(test)]
+    pub(super) const fn of(force: i32) -> Self {
+        Self {
+            force: force.wrapping_shl(8),
+        }
+    }
+
     /// Whether it has grown by more than one break-away force.
     pub(super) const fn exceeds_breakaway(self, model: &AxisModel) -> bool {
         self.force.wrapping_abs() >> 8 > model.breakaway

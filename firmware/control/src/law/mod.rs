@@ -46,6 +46,7 @@
 //!    which uses `switching_curve`.
 //! 9. F\*, limited to what the supply can deliver, is turned into two pressures (`allocation`) and their pulses
 //!    (`pulse_planner`).
+//!    A piston that is held under full force gets targets out of reach instead.
 //! 10. The on-times of the next tick are cut out of the plan (`due`).
 //!
 //! All gains and thresholds are in [`crate::tuning`], each with its unit, its reason, and the file and name of the test
@@ -62,12 +63,12 @@
 //!
 //! | what happens | what follows |
 //! |---|---|
-//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`) and passes on the last good stroke. Two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, the mass is that of the axis data, and the pressures start from the assumption of a power-up, with bounds from atmosphere to supply |
+//! | an invalid sample | the node, not the law, sees it (`firmware/node/src/sensor.rs`) and passes on the last good stroke. Two in a row are a fault, and the node shuts the valves. With the first good sample after that it makes a new law: no history is left, mass and friction are those of the axis data, and the pressures start from the assumption of a power-up, with bounds from atmosphere to supply |
 //! | a frozen potentiometer | the node notices the missing motion (`no_motion_detector.rs` there) |
 //! | no new reference | the node lets the last one continue at its speed for one bus cycle and then stand; when it gives up on the master it shuts the valves. The law comes to rest at whatever reference it is given |
 //! | somebody else drives the valves | `handover`: the observer counts what they send. When the law acts again, its standstill, ramp and preload start afresh (if the other part had the last tick of a period); everything else continues |
 //! | the supply is lower than specified | nobody notices. The estimated pressure of a filled chamber is too high, and pulses do less than planned. While the piston slides, the load estimate absorbs the difference, so the speed recovers with a time constant of about 20 ms, up to the force that is left. A piston at rest stays at rest. The mass learnt in such a move is wrong ([`crate::observer::mass`] says how far it is trusted) |
-//! | a full chamber that counts as vented | the piston stands although all the force is demanded. After 0.2 s of that the valves stay open until it moves (`allocation`) |
+//! | a full chamber that counts as vented | the piston stands. Once all the force is demanded, but not before 0.2 s of standing, the valves stay open until it slides (`allocation`) |
 //! | an end stop | `seat` with a precharge; without one the position servo and `standstill`. The observer holds the piston there and learns no load ([`crate::observer::motion`]) |
 //! | friction that is not as specified | it appears as load, until the piston has slid to and fro at one target; then it is learnt, within half and twice (`observer/friction.rs`). Feeding forward more than the real friction makes a relay near the target, so the feed-forward is faded out there (`standstill`) |
 //!
@@ -99,7 +100,7 @@ use crate::observer::Observer;
 use crate::observer::motion::Motion;
 use crate::observer::pressure::{Period, Pressures};
 use crate::pwm::OnTimes;
-use crate::tuning::{REFERENCE_RESTS, STILL_SPEED};
+use crate::tuning::{REFERENCE_RESTS, SLIDING_SPEED, STILL_SPEED};
 use allocation::PressureSwap;
 use dead_time_predictor::PredictedState;
 use inching::{Inch, Inching};
@@ -319,7 +320,13 @@ impl Predictive {
             (None, _) if self.standstill.valves_closed() => return self.shut(model),
             (None, _) => self.force_demand(model, reference, reference_speed),
         };
-        self.make_force(model, force, preload.is_none() && self.standstill.is_near());
+        let is_held = !decides && self.is_held(model, reference);
+        self.make_force(
+            model,
+            force,
+            preload.is_none() && self.standstill.is_near(),
+            is_held,
+        );
     }
 
     /// What a step on coarse valves demands for the next period; `None` if preload or seat decides.
@@ -357,11 +364,21 @@ impl Predictive {
         self.duty = Duty::ZERO;
     }
 
-    /// Plans pulses that make a force, mN; near the target, pulses of one chamber only.
-    fn make_force(&mut self, model: &AxisModel, force: i32, near: bool) {
+    /// Whether something holds the piston back, and no end stop: it has stood until the ramp had grown by one break-away
+    /// force, and does not slide yet.
+    fn is_held(&self, model: &AxisModel, reference: i32) -> bool {
+        let motion = &self.observer.motion;
+        self.ramp.exceeds_breakaway(model)
+            && motion.speed.wrapping_abs() <= SLIDING_SPEED
+            && !motion.at_end_stop(model, reference, true)
+    }
+
+    /// Plans pulses that make a force, mN; near the target, pulses of one chamber only. If the piston is held and all of the
+    /// force is demanded, the valves stay open.
+    fn make_force(&mut self, model: &AxisModel, force: i32, near: bool, is_held: bool) {
         let possible = allocation::possible_force(model, force);
         self.limited = possible != force;
-        let target = if self.limited && self.ramp.exceeds_breakaway(model) {
+        let target = if self.limited && is_held {
             allocation::out_of_reach(force)
         } else {
             self.swap.targets(model, possible, self.observer.expected())

@@ -28,7 +28,7 @@
 //! from x₀. While it lasts, `standstill` is not updated: REST stays REST. An announcement that is not followed leaves
 //! nothing behind but the air.
 //!
-//! Assumes: at least half of the specified friction, so that the piston stands; that the errors of the observer's load
+//! Assumes: at least half of the friction in use, so that the piston stands; that the errors of the observer's load
 //! and pressures are covered by the other half; the move as announced. If the supply falls, the drive chamber has less
 //! pressure than estimated: the force falls short of the edge, the piston stands, and the move begins later. The
 //! counter chamber vents as before.

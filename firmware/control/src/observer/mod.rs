@@ -1,4 +1,4 @@
-//! The observer: estimates pressures, motion, load and mass of an axis with one potentiometer.
+//! The observer: estimates pressures, motion, load, mass and friction of an axis with one potentiometer.
 //!
 //! | file | what it estimates | from |
 //! |---|---|---|
@@ -20,8 +20,8 @@
 //! 4. `motion`: stroke and speed are predicted with that mean, then corrected with the measured stroke, and the load
 //!    with them.
 //! 5. `trajectory` of the next period.
-//! 6. `friction`, if the axis learns: the means of this target, and with them the share of the friction. All of the above, and
-//!    the law, use the model with that friction from the next period on.
+//! 6. `friction`, if the axis learns: the means of this target, and with them the share of the friction. From then on the
+//!    law uses the model with that friction, and from the next period on the observer does.
 //! 7. `mass`, if the axis learns: adds one period of the move under way. When the move has ended, the mass and, by
 //!    `identification`, the pressures are corrected; the load gives back the error that it had absorbed from the
 //!    pressures.
@@ -71,7 +71,7 @@ pub struct Observer {
     pub(crate) motion: Motion,
     /// Pressure force at the moment, mN.
     pub(crate) force: i32,
-    /// Quantities that follow from the mass, as specified or learnt.
+    /// Quantities that follow from mass and friction, as specified or learnt.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
     pub(crate) friction: FrictionEstimator,
@@ -219,7 +219,7 @@ impl Observer {
         let before = self.force;
         self.force = model.pressure_force(self.pressures());
         let force = before.saturating_add(self.force) >> 1;
-        let speed = self.motion.speed;
+        let speed_before = self.motion.speed;
         self.motion.predict(model, &self.inertia, force);
         self.motion.correct(model, &self.inertia, stroke);
         self.trajectory = PeriodTrajectory::of(model, &self.motion);
@@ -228,7 +228,7 @@ impl Observer {
             return None;
         }
         let widths = self.widths(model);
-        self.learn_friction(specified, speed, force, widths);
+        self.learn_friction(specified, speed_before, force, widths);
         if is_without(Part::MassEstimator) {
             return None;
         }
@@ -243,17 +243,24 @@ impl Observer {
             let wrong = corrected.saturating_sub(self.force);
             self.motion.load = self.motion.load.saturating_sub(wrong);
             self.force = corrected;
+            self.friction.aim();
         }
         Some(found.mass)
     }
 
-    /// Friction from a period that began at the speed `before`, raw mm/s.
-    fn learn_friction(&mut self, specified: &AxisModel, before: i32, force: i32, widths: [i32; 2]) {
+    /// Friction from a period that began at `speed_before`, raw mm/s.
+    fn learn_friction(
+        &mut self,
+        specified: &AxisModel,
+        speed_before: i32,
+        force: i32,
+        widths: [i32; 2],
+    ) {
         let (inertia, motion) = (&self.inertia, &self.motion);
         if !is_without(Part::FrictionEstimator)
             && self
                 .friction
-                .update(specified, inertia, motion, before, force, widths)
+                .update(specified, inertia, motion, speed_before, force, widths)
         {
             self.inertia = Inertia::new(&self.learnt(specified), self.inertia.mass);
         }

@@ -45,7 +45,7 @@ use crate::tuning::{
     STUCK_SPEED,
 };
 
-/// The part of the observer that depends on the moving mass; recomputed when the mass changes.
+/// The part of the observer that depends on mass and Coulomb friction; recomputed when either is learnt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Inertia {
     /// Mass, kg × 2^16.

@@ -90,7 +90,7 @@ pub struct MotionModel {
     margin: i32,
     /// Nine tenths of the largest forces, extending and retracting, mN.
     nearly_all: (i32, i32),
-    /// Coulomb friction, mN.
+    /// Coulomb friction, mN: that of the axis data, never the learnt one. Supervision does not trust the law.
     coulomb: i32,
     /// Viscous friction, mN per mm/s × 2^8.
     viscous: i32,
