@@ -120,9 +120,9 @@ tuning! {
 
     // Law: allocation and pulses.
     SWAP_LAG: i32 = 10_000 << 8, "1/256 Pa (10 kPa)", "what a valve changes in a period", "src/law/allocation.rs::a_counter_chamber_that_lags_is_made_up_for";
+    HELD_BREAKAWAYS: i32 = 1, "break-away forces by which the ramp has grown", "0.2 s of standing: a step starts before (decision 72)", "src/law/tests.rs::a_piston_that_is_held_under_full_force_gets_open_valves";
     PRESSURE_RATE_LEAST: i32 = 205, "1/256 Pa per 16 µs (50 Pa/ms)", "otherwise a chamber already at supply or atmosphere would be given an endless pulse", "src/law/pulse_planner.rs::a_chamber_at_its_end_asks_for_a_pulse_that_ends";
     PULSE_LENGTHENED_LEAST: i32 = 20, "µs", "less is not worth a tick", "src/law/pulse_planner.rs::a_pulse_under_way_is_lengthened_by_what_is_worth_it";
-
     OPENING_LONGEST: i32 = 60_000, "µs", "a step is no move: longer than any that a chamber has room for", "src/law/inching/tests.rs::an_opening_is_bounded_on_both_sides";
 
     // Law: inching.

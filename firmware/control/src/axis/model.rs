@@ -16,10 +16,11 @@
 //! Names in capitals are factors of [`crate::tuning`]. The gains of the observer are those of a fading memory,
 //! `observer/motion.rs`.
 //!
-//! Source: conductance and critical ratio by ISO 6358; ρ0 and T0 of the reference atmosphere by ISO 8778; the rest DERIVED.
+//! Source: conductance and critical ratio by ISO 6358; ρ0 and T0 of the reference atmosphere by ISO 8778; the rest
+//! DERIVED.
 //!
-//! Assumes: all four valves have the same conductance; supply, friction and valve delays are as specified. Friction that
-//! has been learnt replaces that of the data (`AxisModel::with_friction`).
+//! Assumes: all four valves have the same conductance; supply, friction and valve delays are as specified. Friction
+//! that has been learnt replaces that of the data (`AxisModel::with_friction`).
 
 use super::data::{AxisData, AxisField};
 use crate::observer::flow::FlowCurve;

@@ -14,16 +14,16 @@
 //! thin rod. This is neither the stiffest level, which is the highest, nor the one at which filling and venting are
 //! equally fast.
 //!
-//! **Pressure swap.** A chamber vents no faster than its valve lets it. In a move after a preload, and in one from an end
-//! stop, the drive chamber compensates for the excess pressure that is still in the counter chamber, and falls back as
-//! that vents: the force is there as soon as either chamber can make it. The swap ends once the expected excess of the
-//! counter chamber is at most 10 kPa. Source: this project (decision 38).
+//! **Pressure swap.** A chamber vents no faster than its valve lets it. In a move after a preload, and in one from an
+//! end stop, the drive chamber compensates for the excess pressure that is still in the counter chamber, and falls back
+//! as that vents: the force is there as soon as either chamber can make it. The swap ends once the expected excess of
+//! the counter chamber is at most 10 kPa. Source: this project (decision 38).
 //!
-//! **Out of reach.** A piston that stands until the break-away ramp has grown by one break-away force (0.2 s), and then under
-//! all the force that can be demanded, is held by air that the observer does not know of: mostly by a full counter chamber
-//! that counts as vented, for which no pulse would be planned. Then both targets lie beyond what valves can make, and the
-//! valves stay open until the piston slides: whatever was assumed, filling ends at the supply and venting at the
-//! atmosphere.
+//! **Out of reach.** A piston that stands until the break-away ramp has grown by one break-away force (0.2 s), and then
+//! under all the force that can be demanded, is held by air that the observer does not know of: mostly by a full
+//! counter chamber that counts as vented, for which no pulse would be planned. Then both targets lie beyond what valves
+//! can make, and the valves stay open until the piston slides: whatever was assumed, filling ends at the supply and
+//! venting at the atmosphere.
 //!
 //! Assumes: areas, supply and atmosphere as specified. If the supply is lower, the drive chamber does not reach its
 //! pressure, and the force is less than demanded. For the swap: that the counter chamber's pressure is estimated to

@@ -23,9 +23,10 @@
 //! Source: control of a plant with dead time by its predicted state (Smith 1957; Manitius and Olbrot 1979); one step of
 //! the linearly implicit trapezoidal rule (Hairer and Wanner, Solving Ordinary Differential Equations II, ch. IV.7).
 //!
-//! Assumes: valve delays and supply as specified; friction as in use; within the dead time, a constant load as estimated and a
-//! force and a speed that change linearly. Where the piston would reach an end stop at its present speed, F expected
-//! counts on no compression (`trajectory`). If the supply falls, a filling pulse adds less to F expected than is counted.
+//! Assumes: valve delays and supply as specified; friction as in use; within the dead time, a constant load as
+//! estimated and a force and a speed that change linearly. Where the piston would reach an end stop at its present
+//! speed, F expected counts on no compression (`trajectory`). If the supply falls, a filling pulse adds less to F
+//! expected than is counted.
 //!
 //! `inverse_dynamics` acts on x' and v'; `standstill`, `seat` and `preload` act on the motion now.
 //!
@@ -181,7 +182,8 @@ mod tests {
     }
 
     /// Integrated in steps of a microsecond, with a force that changes linearly but for the air that the gained speed
-    /// compresses: the end of the dead time and the largest speed on the way, mm/s. `data` gives mass and viscous friction.
+    /// compresses: the end of the dead time and the largest speed on the way, mm/s. `data` gives mass and viscous
+    /// friction.
     fn integrated(
         data: &AxisData,
         end_us: i32,

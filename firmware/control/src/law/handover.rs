@@ -44,7 +44,7 @@ impl Predictive {
             self.preload = Preload::default();
             self.inching = Inching::default();
             self.standstill = Standstill::at(self.observer.motion.stroke);
-            self.observer.aim();
+            self.observer.forget_sliding();
         }
         self.next_tick(measured);
         VelocityMmS::from_raw(self.observer.motion.speed)

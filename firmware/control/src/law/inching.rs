@@ -26,17 +26,17 @@
 //! **Which valves.** Fill the drive chamber or vent the counter chamber, if ΔF is at least 0.8 of the finest pulse of
 //! that valve and its chamber has room. If both are possible, fill when the mean of the pressures is below the middle,
 //! otherwise vent, so that the pressures stay about it. If neither is possible, use a *vernier* pair: both chambers are
-//! filled, or both vented, starting together, and the difference of their forces acts. All openings are sent as planned,
-//! unless `standstill` shuts the valves. A step waits until the air has come to rest and all valves are ready.
+//! filled, or both vented, starting together, and the difference of their forces acts. All openings are sent as
+//! planned, unless `standstill` shuts the valves. A step waits until the air has come to rest and all valves are ready.
 //!
 //! `standstill` has priority: where it holds the valves shut (CATCH, PAUSE, REST), the rest of the pulses is dropped.
 //! The state is AWAY while a preload or a seat decides, while the reference moves, and after a new target. The
 //! break-away ramp and patience continue as they would without inching.
 //!
-//! Assumes: flows that stay constant over the pulse, friction as in use. Whether valves are coarse may change as friction is
-//! learnt; a step under way is then dropped. The net force on a piston at rest can be
-//! anywhere within its friction; it is taken as zero (estimates from the observer, or from the effect of the last step,
-//! did worse). If the supply is lower, a filling pulse does less than planned, and another step follows.
+//! Assumes: flows that stay constant over the pulse, friction as in use. Whether valves are coarse may change as
+//! friction is learnt; a step under way is then dropped. The net force on a piston at rest can be anywhere within its
+//! friction; it is taken as zero (estimates from the observer, or from the effect of the last step, did worse). If the
+//! supply is lower, a filling pulse does less than planned, and another step follows.
 //!
 //! Source: stepwise positioning of a drive with stiction (impulse control: Armstrong-Hélouvry et al., Automatica 30,
 //! 1994, section 4.5); the vernier pair: `docs/decisions/0064-inching-on-coarse-valves.md`.

@@ -19,8 +19,8 @@
 //! | sat(u) | 1 | u limited to ±1 |
 //! | ramp | mN | towards r: +5 Fb per second while \|v\| < 3 mm/s or stuck, and r rests; −41 % per period above 10 mm/s; at most F_out; unchanged in between, and while the valves are shut |
 //!
-//! **Start.** A piston that still stands where it rested (`standstill`), while the reference moves faster than 3 mm/s, is
-//! given all of its break-away friction in the direction of the reference. In proportion to the wanted speed the
+//! **Start.** A piston that still stands where it rested (`standstill`), while the reference moves faster than 3 mm/s,
+//! is given all of its break-away friction in the direction of the reference. In proportion to the wanted speed the
 //! force would come only when the piston already lags: it takes a dead time, and at the break-away the reference of an
 //! S-curve gains 10 mm/s in 30 ms.
 //!
@@ -50,7 +50,7 @@ use crate::axis::AxisModel;
 use crate::math::{along, clip, mul_shr, mul_shr_sat, within};
 use crate::observer::Observer;
 use crate::tuning::{
-    ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED,
+    ACCELERATION_LIMIT_HALVES, BRAKE_FORCE_USED, BRAKE_LEAST, FULL_FRICTION_SPEED, HELD_BREAKAWAYS,
     IMPATIENT_DIVISOR, RAMP_DECAY, REFERENCE_RESTS, SLIDING_SPEED, START_SPEED, STILL_SPEED,
 };
 
@@ -70,9 +70,9 @@ impl BreakawayRamp {
         }
     }
 
-    /// Whether it has grown by more than one break-away force.
-    pub(super) const fn exceeds_breakaway(self, model: &AxisModel) -> bool {
-        self.force.wrapping_abs() >> 8 > model.breakaway
+    /// Whether something holds the piston back: it has stood until the ramp had grown by [`HELD_BREAKAWAYS`].
+    pub(super) const fn is_held(self, model: &AxisModel) -> bool {
+        self.force.wrapping_abs() >> 8 > model.breakaway.saturating_mul(HELD_BREAKAWAYS)
     }
 
     /// One period at `speed`, raw mm/s, with `missing` raw mm to a reference of `reference_speed`. A piston slower than

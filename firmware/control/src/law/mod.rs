@@ -30,8 +30,8 @@
 //!
 //! 1. [`Predictive::drive`] is called in every tick. In the last tick of a period it does 2 to 10, otherwise only 10.
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
-//!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`). Friction, wherever the
-//!    law uses it, is that of the axis data times the share that the observer has learnt.
+//!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`). Friction,
+//!    wherever the law uses it, is that of the axis data times the share that the observer has learnt.
 //! 3. `plan_period`: if the target is new, patience starts afresh, a landing is allowed (`standstill`), and the ramp is
 //!    forgotten.
 //! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
@@ -40,10 +40,10 @@
 //! 6. `standstill`, unless 4 has decided: its state follows from 5, or otherwise from how the piston approaches the
 //!    target.
 //! 7. `allocation`: the pressure swap starts with a preload, or when the piston stands at an end stop.
-//! 8. F\* is that of 4 or 5, if one of them gave a force. There is no pulse if 4 says so, or if the state of 6 is PAUSE, CATCH or REST. If the
-//!    valves are coarse and the piston is near, `inching` gives the pulses of a step, or none, and 9 is skipped.
-//!    Otherwise F\* is that of the position servo: `dead_time_predictor`, break-away ramp, then `inverse_dynamics`,
-//!    which uses `switching_curve`.
+//! 8. F\* is that of 4 or 5, if one of them gave a force. There is no pulse if 4 says so, or if the state of 6 is
+//!    PAUSE, CATCH or REST. If the valves are coarse and the piston is near, `inching` gives the pulses of a step, or
+//!    none, and 9 is skipped. Otherwise F\* is that of the position servo: `dead_time_predictor`, break-away ramp, then
+//!    `inverse_dynamics`, which uses `switching_curve`.
 //! 9. F\*, limited to what the supply can deliver, is turned into two pressures (`allocation`) and their pulses
 //!    (`pulse_planner`).
 //!    A piston that is held under full force gets targets out of reach instead.
@@ -273,7 +273,7 @@ impl Predictive {
         if self.standstill.aim(model, reference) {
             self.ramp = BreakawayRamp::default();
             self.inching = Inching::default();
-            self.observer.aim();
+            self.observer.forget_sliding();
         }
         let stands = self.is_settled() || self.observer.motion.speed.wrapping_abs() < STILL_SPEED;
         let preload = self.preload(model, input, stands);
@@ -364,17 +364,16 @@ impl Predictive {
         self.duty = Duty::ZERO;
     }
 
-    /// Whether something holds the piston back, and no end stop: it has stood until the ramp had grown by one break-away
-    /// force, and does not slide yet.
+    /// Whether something holds the piston back that is no end stop, and it does not slide yet.
     fn is_held(&self, model: &AxisModel, reference: i32) -> bool {
         let motion = &self.observer.motion;
-        self.ramp.exceeds_breakaway(model)
+        self.ramp.is_held(model)
             && motion.speed.wrapping_abs() <= SLIDING_SPEED
             && !motion.at_end_stop(model, reference, true)
     }
 
-    /// Plans pulses that make a force, mN; near the target, pulses of one chamber only. If the piston is held and all of the
-    /// force is demanded, the valves stay open.
+    /// Plans pulses that make a force, mN; near the target, pulses of one chamber only. If the piston is held and all
+    /// of the force is demanded, the valves stay open.
     fn make_force(&mut self, model: &AxisModel, force: i32, near: bool, is_held: bool) {
         let possible = allocation::possible_force(model, force);
         self.limited = possible != force;

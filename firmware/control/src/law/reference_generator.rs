@@ -20,10 +20,10 @@
 //! may exceed a T_t. A new target is accepted at any time and approached from the present r and v.
 //!
 //! If the reference ran away from a piston that has not begun to move, it would demand a speed that no valve can
-//! deliver, and the piston would then overshoot. Ahead of a stuck piston the reference brakes fully from a lead of 2 ℓ on, at the
-//! latest: it stops at most 2 ℓ + v²/(2 a) ahead, where v is its speed there. From rest that is less than 4 ℓ (3.2 ℓ at 350 mm/s,
-//! 1500 mm/s² and 4 mm). If the piston jams in motion it may be far more (45 to 49 mm at the full 350 mm/s). Whoever
-//! supervises the piston must compare it with the command.
+//! deliver, and the piston would then overshoot. Ahead of a stuck piston the reference brakes fully from a lead of 2 ℓ
+//! on, at the latest: it stops at most 2 ℓ + v²/(2 a) ahead, where v is its speed there. From rest that is less than 4
+//! ℓ (3.2 ℓ at 350 mm/s, 1500 mm/s² and 4 mm). If the piston jams in motion it may be far more (45 to 49 mm at the full
+//! 350 mm/s). Whoever supervises the piston must compare it with the command.
 //!
 //! Assumes: a tick of 1 ms and a call in every tick, whatever tick the law is made for (the joint board has this tick,
 //! and calls it in `firmware/node/src/joint/reference.rs`); v_max and a that the axis can follow; a true measured

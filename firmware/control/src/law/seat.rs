@@ -23,9 +23,9 @@
 //! Source: force control against a stiff environment instead of position control (the switch of hybrid control, Raibert
 //! and Craig 1981).
 //!
-//! Assumes: a specified stroke length that is right to 0.5 mm; supply as specified, break-away friction as in use; chambers
-//! filled by a precharge, so that the expected force is right to a quarter. If the supply falls, the expected force is
-//! overestimated, and the piston rests pressed by less than 3 Fb.
+//! Assumes: a specified stroke length that is right to 0.5 mm; supply as specified, break-away friction as in use;
+//! chambers filled by a precharge, so that the expected force is right to a quarter. If the supply falls, the expected
+//! force is overestimated, and the piston rests pressed by less than 3 Fb.
 //!
 //! Config [`AxisModel`]; no state of its own: PRESS and REST are those of `standstill`. Update [`Predictive::seat`].
 

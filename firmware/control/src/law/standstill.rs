@@ -12,8 +12,8 @@
 //! ```
 //!
 //! Updated once per period, unless a preload or a seat decides. In the band: |e| < band. Slow: |v| < 4 mm/s. The valves
-//! are shut in CATCH, PAUSE and REST. All states but REST and PRESS are decided anew in each period: CATCH if the piston
-//! is caught; otherwise PAUSE if one is under way; otherwise SERVO.
+//! are shut in CATCH, PAUSE and REST. All states but REST and PRESS are decided anew in each period: CATCH if the
+//! piston is caught; otherwise PAUSE if one is under way; otherwise SERVO.
 //!
 //! * **Stopping distance.** With shut valves friction alone stops the piston in the band if F_s (e' − band) < m v²/2 <
 //!   F_s (e' + band), e' = e sgn v, F_s = 0.85 Fc − (F + load) sgn v. This is used within 12 bands of the target and
@@ -35,8 +35,8 @@
 //!   3 mm/s) beside the band. The pause continues to count in CATCH, but not in REST and PRESS: what is left of it
 //!   resumes after them, except after a seat that was reached, which clears pause and patience.
 //! * **Release.** REST ends
-//!   - at once, when the reference moves (faster than 1 mm/s). Patience then continues from about 100 periods, or afresh
-//!     once the reference has moved by more than one band;
+//!   - at once, when the reference moves (faster than 1 mm/s). Patience then continues from about 100 periods, or
+//!     afresh once the reference has moved by more than one band;
 //!   - at once, when the reference has moved more than one band from the target of this rest, if the measured stroke is
 //!     also outside the band of release of the new target. If it is not outside, the new target does not end the rest
 //!     but becomes its target;

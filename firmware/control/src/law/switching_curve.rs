@@ -17,16 +17,17 @@
 //! ```
 //!
 //! e: error, mm; v: speed, mm/s; k: slope, D: gain of the speed error, 1/s; a_b: deceleration, mm/s²; T_d: dead time,
-//! s; m: mass in use, m_n: nimble mass, kg; Fc: Coulomb friction, mN; Ḟ, mN/s; v_A, v_B: choked speed of each chamber as
-//! an outlet, mm/s, as K in [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as there, p_m as in
-//! `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm. `inverse_dynamics` may lower
-//! a_b under a load.
+//! s; m: mass in use, m_n: nimble mass, kg; Fc: Coulomb friction, mN; Ḟ, mN/s; v_A, v_B: choked speed of each chamber
+//! as an outlet, mm/s, as K in [`crate::observer::pressure`]. F_1: force of the finest pulse, mN, with n, C and ρ0 as
+//! there, p_m as in `allocation`, area AB and volume VB of B, margin of the axis data; band: rest band, mm.
+//! `inverse_dynamics` may lower a_b under a load.
 //!
 //! **Landing.** Near the target the straight line is slower than friction needs it to be: a piston that follows it is
 //! pushed all the way, often stops a millimetre short, stands there and slips again. On its first approach to a resting
-//! target (`standstill`) it comes in along the parabola of its friction, of which only a part is counted on, because the true one may be
-//! less. The demanded deceleration still uses the slope k, not that of the landing. Beyond e_l the landing is never the faster one, since a_f is at
-//! most a_b/2, and a piston with little friction for its mass stays on the straight line nearly all the way.
+//! target (`standstill`) it comes in along the parabola of its friction, of which only a part is counted on, because
+//! the true one may be less. The demanded deceleration still uses the slope k, not that of the landing. Beyond e_l the
+//! landing is never the faster one, since a_f is at most a_b/2, and a piston with little friction for its mass stays on
+//! the straight line nearly all the way.
 //!
 //! **Half is enough.** A piston that stands off its target by e is moved by the force m D k e (`inverse_dynamics`),
 //! plus friction and ramp. Two halves meet on the way to the valves: `allocation` gives half of a force to each
@@ -40,14 +41,14 @@
 //!
 //! Source: the parabola is the time-optimal curve of a mass that brakes with a_b; the straight line at its foot removes
 //! the chatter of an ideal switch (Workman 1987, "proximate time-optimal servomechanism"). One curve serves 1 and 400
-//! mm. Scaling by dead time, choked speed and mass is this project's (decision 38), and so is the landing (decision 65);
-//! the factors are searched ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l does not
-//! depend on the mass.
+//! mm. Scaling by dead time, choked speed and mass is this project's (decision 38), and so is the landing (decision
+//! 65); the factors are searched ([`crate::tuning`]). Within the limits of k and a_b, and unless a load lowers a_b, e_l
+//! does not depend on the mass.
 //!
-//! Assumes: dead time, supply and conductance as specified; the mass in use; on the landing at least 0.6 of the friction
-//! in use; and that a force can be built up within
-//! about a dead time, which the nimble mass represents. If the supply falls, the curve stays as it is: the force that
-//! it demands comes later or not at all, and the piston falls behind the curve or overshoots the target.
+//! Assumes: dead time, supply and conductance as specified; the mass in use; on the landing at least 0.6 of the
+//! friction in use; and that a force can be built up within about a dead time, which the nimble mass represents. If the
+//! supply falls, the curve stays as it is: the force that it demands comes later or not at all, and the piston falls
+//! behind the curve or overshoots the target.
 //!
 //! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each newly learnt mass; no state; updates
 //! [`SpeedGains::speed`] and [`SpeedGains::landing`].

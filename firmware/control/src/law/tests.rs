@@ -359,9 +359,9 @@ fn held(model: &AxisModel, share: f64, speed_mm_s: i32) -> Predictive {
 }
 
 /// A piston that stands under all the force that there should be is held by air that the observer does not know of: the
-/// counter chamber, which counts as vented, is vented, and the drive chamber, which counts as full, is filled. Not before
-/// the ramp has grown by a break-away force, not for a force that can be made, not for a piston that slides, and not at
-/// an end stop.
+/// counter chamber, which counts as vented, is vented, and the drive chamber, which counts as full, is filled. Not
+/// before the ramp has grown by a break-away force, not for a force that can be made, not for a piston that slides, and
+/// not at an end stop.
 #[test]
 fn a_piston_that_is_held_under_full_force_gets_open_valves() {
     let model = model();
@@ -384,8 +384,8 @@ fn a_piston_that_is_held_under_full_force_gets_open_valves() {
     assert!(at_stop.is_held(&model, 90 << 16));
 }
 
-/// The same from power-up on: a piston that does not move. At first the chambers are filled and vented as far as is known,
-/// and in the end the valves stay open. Preload and seat never ask for it.
+/// The same from power-up on: a piston that does not move. At first the chambers are filled and vented as far as is
+/// known, and in the end the valves stay open. Preload and seat never ask for it.
 #[test]
 fn a_piston_that_does_not_move_gets_open_valves_in_the_end() {
     let model = model();
@@ -492,6 +492,6 @@ fn the_law_uses_the_friction_that_is_learnt() {
         law.drive(&model, &input(90, 130));
     }
     let mut anew = FrictionEstimator::of(1 << 15);
-    anew.aim();
+    anew.forget_sliding();
     assert_eq!(law.observer.friction, anew);
 }

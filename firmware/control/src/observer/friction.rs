@@ -15,8 +15,8 @@
 //! | T | s | the period |
 //! | Fc, d | mN, mN s/mm | Coulomb and viscous friction, as specified |
 //!
-//! The mean force is friction less load one way, and friction and load the other way: half the difference is friction. A
-//! load, and an error of the pressures, drop out as far as they stay the same. So both means begin anew with each
+//! The mean force is friction less load one way, and friction and load the other way: half the difference is friction.
+//! A load, and an error of the pressures, drop out as far as they stay the same. So both means begin anew with each
 //! target, whenever the pressures are corrected, and while another part drives. At one target both directions usually
 //! follow each other within tenths of a second: the piston hunts or has overshot. These pistons need it most: more than
 //! the real friction fed forward makes a relay, and less leaves the piston standing. The share is kept from target to
@@ -25,8 +25,8 @@
 //! accelerates.
 //!
 //! A period counts as sliding if the piston is faster than 10 mm/s at both of its moments, in one direction, and more
-//! than 6 mm from its ends (no cushion). It counts only while both widths of the bounds of the pressures, as forces, are
-//! together within a tenth of the largest extending force: air that is not known would appear as friction.
+//! than 6 mm from its ends (no cushion). It counts only while both widths of the bounds of the pressures, as forces,
+//! are together within a tenth of the largest extending force: air that is not known would appear as friction.
 //!
 //! Assumes: a load that does not change while the piston hunts; axes for which it does switch learning off
 //! ([`crate::axis::AxisData::learns_mass`]). Coulomb, viscous and break-away friction that differ from the specified
@@ -112,15 +112,15 @@ impl FrictionEstimator {
         self.share ^= 1 << bit;
     }
 
-    /// The target is a new one, or what has been measured at it is not to be trusted.
-    pub(crate) fn aim(&mut self) {
+    /// Forgets the sliding so far; what has been learnt stays.
+    pub(crate) fn forget(&mut self) {
         self.extending = Sliding::default();
         self.retracting = Sliding::default();
     }
 
-    /// One period, after which the piston moves as in `motion`, and before which its speed was `before` (raw mm/s), with
-    /// the mean pressure force `force` and with the `widths` of the bounds of both pressures as forces, mN. `specified`
-    /// is the model with the friction of the axis data. Returns whether friction was learnt.
+    /// One period, after which the piston moves as in `motion`, and before which its speed was `before` (raw mm/s),
+    /// with the mean pressure force `force` and with the `widths` of the bounds of both pressures as forces, mN.
+    /// `specified` is the model with the friction of the axis data. Returns whether the share has changed.
     pub(crate) fn update(
         &mut self,
         specified: &AxisModel,
@@ -169,8 +169,8 @@ impl FrictionEstimator {
             .wrapping_shl(16)
             .checked_div(i64::from(out.specified.saturating_add(back.specified)))
             .unwrap_or(i64::from(ONE));
-        self.share = found.clamp(i64::from(FRICTION_LEAST), i64::from(FRICTION_MOST)) as i32;
-        true
+        let share = found.clamp(i64::from(FRICTION_LEAST), i64::from(FRICTION_MOST)) as i32;
+        core::mem::replace(&mut self.share, share) != share
     }
 }
 
@@ -219,7 +219,7 @@ mod tests {
                 model: model(),
                 estimator: FrictionEstimator::default(),
                 mass_kg: 2.0,
-                friction: 1.0,
+                friction: 0.8,
                 load_n: 30.0,
                 wrong_n: -20.0,
                 stroke_mm: 90,
@@ -229,7 +229,7 @@ mod tests {
     }
 
     impl Hunting {
-        /// So many periods that begin and end at 20 mm/s or more in this direction. Returns how many taught something.
+        /// So many periods that begin and end at 20 mm/s or more in this direction. Returns how many changed the share.
         fn slides(&mut self, periods: i32, sign: f64) -> usize {
             self.slides_at(periods, sign, 20.0)
         }
@@ -298,10 +298,10 @@ mod tests {
 
     #[test]
     fn four_periods_each_way_tell_the_friction() {
-        for (out, back, taught) in [(4, 4, 1), (3, 40, 0), (40, 3, 0), (40, 0, 0), (4, 8, 5)] {
+        for (out, back, tells) in [(4, 4, true), (3, 40, false), (40, 3, false), (40, 0, false)] {
             let mut hunting = Hunting::default();
             hunting.slides(out, 1.0);
-            assert_eq!(hunting.slides(back, -1.0), taught, "{out} {back}");
+            assert_eq!(hunting.slides(back, -1.0) > 0, tells, "{out} {back}");
         }
     }
 
@@ -384,7 +384,7 @@ mod tests {
         hunting.slides(10, 1.0);
         hunting.slides(10, -1.0);
         let learnt = hunting.estimator.share();
-        hunting.estimator.aim();
+        hunting.estimator.forget();
         hunting.friction = 1.5;
         assert_eq!(hunting.slides(40, 1.0), 0, "one direction");
         assert_eq!(hunting.estimator.share(), learnt);

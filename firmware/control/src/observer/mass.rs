@@ -19,9 +19,9 @@
 //! determines a mass if it took at least 80 ms, reached 200 mm/s, and was 100 mm/s above the line; otherwise nothing
 //! changes.
 //!
-//! If the bounds of the pressures are far apart in such a move (both widths, as forces, together on average by more than
-//! a quarter of the largest extending force), as after a power-up with unknown air, the force is not accurate enough for the mass. Then the mass
-//! comes, together with the pressures, from [`super::identification`].
+//! If the bounds of the pressures are far apart in such a move (both widths, as forces, together on average by more
+//! than a quarter of the largest extending force), as after a power-up with unknown air, the force is not accurate
+//! enough for the mass. Then the mass comes, together with the pressures, from [`super::identification`].
 //!
 //! **Doubt.** The peak above the line is a small difference of large impulses. In a long move at nearly constant speed
 //! a small error of viscous friction or pressure can make the mass appear as a quarter of the true one. A mass below
@@ -34,9 +34,9 @@
 //! small. Only the same bound and doubt guard against this.
 //!
 //! Assumes: the load does not change during the move; axes for which it does switch learning off
-//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction in use and supply as specified, within what doubt covers. If the
-//! supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J line: no
-//! more than the two bounds let through.
+//! ([`crate::axis::AxisData::learns_mass`]). Viscous friction in use and supply as specified, within what doubt covers.
+//! If the supply falls, F is too high while a chamber is filled, and the mass is wrong by the share of that in J − J
+//! line: no more than the two bounds let through.
 //!
 //! Config [`AxisModel`], state [`MassEstimator`], update [`MassEstimator::update`].
 

@@ -20,8 +20,8 @@
 //! 4. `motion`: stroke and speed are predicted with that mean, then corrected with the measured stroke, and the load
 //!    with them.
 //! 5. `trajectory` of the next period.
-//! 6. `friction`, if the axis learns: the means of this target, and with them the share of the friction. From then on the
-//!    law uses the model with that friction, and from the next period on the observer does.
+//! 6. `friction`, if the axis learns: the means of this target, and with them the share of the friction. From then on
+//!    observer and law use the model with that friction.
 //! 7. `mass`, if the axis learns: adds one period of the move under way. When the move has ended, the mass and, by
 //!    `identification`, the pressures are corrected; the load gives back the error that it had absorbed from the
 //!    pressures.
@@ -130,8 +130,8 @@ impl Observer {
             .min(model.stroke)
     }
 
-    /// Stiffness of the air in both chambers if their valves are shut, mN/mm: n (pA AA / LA + pB AB / LB), with the expected
-    /// pressures and the lengths now; 5 % too high by the factor of [`AxisModel::exponent_per_length`].
+    /// Stiffness of the air in both chambers if their valves are shut, mN/mm: n (pA AA / LA + pB AB / LB), with the
+    /// expected pressures and the lengths now; 5 % too high by the factor of [`AxisModel::exponent_per_length`].
     pub(crate) fn stiffness(&self, model: &AxisModel) -> i32 {
         let (now, stroke) = (self.expected(), self.motion.stroke);
         let of = |pressure: i32, force: i32, length: i32| {
@@ -173,9 +173,9 @@ impl Observer {
         &self.motion
     }
 
-    /// The target is a new one: friction is learnt from the sliding at one target.
-    pub(crate) fn aim(&mut self) {
-        self.friction.aim();
+    /// Friction is learnt from the sliding at one target, and from what the law itself does: begins anew.
+    pub(crate) fn forget_sliding(&mut self) {
+        self.friction.forget();
     }
 
     /// The axis with the friction that has been learnt, given the one with that of its data.
@@ -193,7 +193,7 @@ impl Observer {
         external: OnTimes,
         stroke: i32,
     ) -> Option<i32> {
-        let model = &self.learnt(specified);
+        let mut model = self.learnt(specified);
         let PeriodTrajectory {
             middle,
             speed,
@@ -213,27 +213,30 @@ impl Observer {
         let [plan_a, plan_b] = by_chamber(plan);
         let [external_a, external_b] = by_chamber(external);
         let sent = |plan, external| Sent { plan, external };
-        self.a.update(model, period, &a, sent(plan_a, external_a));
-        self.b.update(model, period, &b, sent(plan_b, external_b));
+        self.a.update(&model, period, &a, sent(plan_a, external_a));
+        self.b.update(&model, period, &b, sent(plan_b, external_b));
 
         let before = self.force;
         self.force = model.pressure_force(self.pressures());
         let force = before.saturating_add(self.force) >> 1;
         let speed_before = self.motion.speed;
-        self.motion.predict(model, &self.inertia, force);
-        self.motion.correct(model, &self.inertia, stroke);
-        self.trajectory = PeriodTrajectory::of(model, &self.motion);
+        self.motion.predict(&model, &self.inertia, force);
+        self.motion.correct(&model, &self.inertia, stroke);
+        self.trajectory = PeriodTrajectory::of(&model, &self.motion);
 
         if !model.learns_mass {
             return None;
         }
-        let widths = self.widths(model);
-        self.learn_friction(specified, speed_before, force, widths);
+        let widths = self.widths(&model);
+        if self.learns_friction(specified, speed_before, force, widths) {
+            model = self.learnt(specified);
+            self.inertia = Inertia::new(&model, self.inertia.mass);
+        }
         if is_without(Part::MassEstimator) {
             return None;
         }
-        let found = self.mass.update(model, self.motion.speed, force, widths)?;
-        self.inertia = Inertia::new(&self.learnt(specified), found.mass);
+        let found = self.mass.update(&model, self.motion.speed, force, widths)?;
+        self.inertia = Inertia::new(&model, found.mass);
         let [share_a, share_b] = found.shares;
         if share_a | share_b != 0 {
             self.a.correct(share_a);
@@ -243,27 +246,24 @@ impl Observer {
             let wrong = corrected.saturating_sub(self.force);
             self.motion.load = self.motion.load.saturating_sub(wrong);
             self.force = corrected;
-            self.friction.aim();
+            self.friction.forget();
         }
         Some(found.mass)
     }
 
-    /// Friction from a period that began at `speed_before`, raw mm/s.
-    fn learn_friction(
+    /// A period that began at `speed_before`, raw mm/s. Returns whether the friction in use changes with it.
+    fn learns_friction(
         &mut self,
         specified: &AxisModel,
         speed_before: i32,
         force: i32,
         widths: [i32; 2],
-    ) {
+    ) -> bool {
         let (inertia, motion) = (&self.inertia, &self.motion);
-        if !is_without(Part::FrictionEstimator)
+        !is_without(Part::FrictionEstimator)
             && self
                 .friction
                 .update(specified, inertia, motion, speed_before, force, widths)
-        {
-            self.inertia = Inertia::new(&self.learnt(specified), self.inertia.mass);
-        }
     }
 }
 

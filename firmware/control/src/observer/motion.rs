@@ -30,10 +30,10 @@
 //! the first period in which its condition does not hold.
 //!
 //! Assumes: a load that is constant but for corrections, the mass of the estimator, friction between half and twice the
-//! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load, until `friction` has
-//! learnt them. If
-//! the supply falls, F is wrong by what the filled chamber lacks; the load cancels that with a time constant of about 20 ms while the piston slides.
-//! While the piston is stuck the load stays as it was: F + load is then wrong until it slides.
+//! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load,
+//! until `friction` has learnt them. If the supply falls, F is wrong by what the filled chamber lacks; the load cancels
+//! that with a time constant of about 20 ms while the piston slides. While the piston is stuck the load stays as it
+//! was: F + load is then wrong until it slides.
 //!
 //! Config [`AxisModel`] and [`Inertia`], state [`Motion`], updates [`Motion::predict`] and [`Motion::correct`].
 
