@@ -414,6 +414,8 @@ parameters! {
             "Predictive law: a piston at rest stays so up to this error; 0: up to three times the rest band.";
         MassLearning = 0x013C, "mass_learning", "1", Flag, "0" ..= "1", default "1", disarmed,
             "Predictive law: mass and friction are learnt from the motion; 0: they stay as given, for an axis that the ground or a stop loads in mid-move.";
+        StandingMass = 0x013D, "standing_mass", "kg", I16F16, "0" ..= "200", default "0", disarmed,
+            "Predictive law without mass learning: mass that the piston moves while a foot switch of its board is closed; 0: moving_mass.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

@@ -42,6 +42,25 @@ fn the_walk_on_the_level_meets_its_bars() {
     met(&builtin::scenario("walk").expect("built in"), 1..=3);
 }
 
+/// Less friction in the cylinders than their boards count on, down to half: the nose does not bounce on the air of its
+/// legs, because the boards of b6 count on the mass of the robot while their feet stand.
+#[test]
+fn a_robot_with_half_the_friction_walks_as_well() {
+    let scenario = builtin::scenario("walk").expect("built in");
+    for (seed, share) in [(1, 0.5), (2, 0.5), (3, 0.75)] {
+        let mut robot = builtin::robot(&scenario.robot).expect("built in");
+        for cylinder in &mut robot.plant.cylinders {
+            cylinder.friction.coulomb_n *= share;
+            cylinder.friction.static_n *= share;
+        }
+        let recording = sil::run(&scenario, &robot, seed);
+        let targets = analyse(&scenario, &robot, &recording).targets;
+        let missed = targets.iter().filter(|t| t.required && !t.pass);
+        let missed: Vec<_> = missed.map(|t| (&t.id, t.value)).collect();
+        assert!(missed.is_empty(), "{share} of the friction: {missed:?}");
+    }
+}
+
 /// A walk of 20 s with this order, and the bars in SI.
 fn walk(order: WalkOrder, bars: &[(Measure, f64, f64)]) -> Scenario {
     let mut scenario = builtin::scenario("walk").expect("built in");

@@ -104,6 +104,8 @@ pub struct AxisModel {
     pub period: i32,
     /// Mass, kg × 2^16, as specified.
     pub mass: i32,
+    /// Mass while the foot at the rod stands, likewise.
+    pub standing_mass: i32,
     /// Mass up to which the valves can follow the speed law, kg × 2^16.
     pub nimble_mass: i32,
     /// Force F_1 of the finest pulse, mN: the shortest opening of B's vent valve at mid-stroke.
@@ -299,6 +301,13 @@ impl AxisModel {
             moment: number(moment_us),
             period: seconds_32(period_us),
             mass: number(raw(data.mass)),
+            standing_mass: number(raw(
+                if data.learns_mass || data.standing_mass == PositionMm::ZERO {
+                    data.mass
+                } else {
+                    data.standing_mass
+                },
+            )),
             // 0.01 to 1000 kg: beyond the range of the axis data, and fits.
             nimble_mass: number(nimble_16.clamp(655, 1000 << 16)),
             // Below 2^41 mN/s and 2^16 µs.

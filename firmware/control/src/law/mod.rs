@@ -32,6 +32,8 @@
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
 //!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`). Friction,
 //!    wherever the law uses it, is that of the axis data times the share that the observer has learnt.
+//!    Where no mass is learnt, the mass in use is that of the axis data, and while a foot at the rod stands that of the
+//!    standing leg.
 //! 3. `plan_period`: if the target is new, patience starts afresh, a landing is allowed (`standstill`), and the ramp is
 //!    forgotten.
 //! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
@@ -233,6 +235,7 @@ impl Predictive {
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
         if self.ends_period(input.measured) {
             self.observe_period(model, input.measured);
+            self.carry(model, input.stands);
             self.drives = true;
             self.plan_period(model, input);
         }
@@ -244,6 +247,19 @@ impl Predictive {
             duty: self.duty,
             settled: self.is_settled(),
             limited: self.limited,
+        }
+    }
+
+    /// Uses the mass that the piston moves, unless it is learnt: with a standing foot, a share of the robot.
+    fn carry(&mut self, model: &AxisModel, stands: bool) {
+        let mass = if stands {
+            model.standing_mass
+        } else {
+            model.mass
+        };
+        if !model.learns_mass && mass != self.observer.inertia.mass {
+            self.observer.carry(model, mass);
+            self.gains = SpeedGains::new(model, mass);
         }
     }
 

@@ -29,6 +29,48 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
     law
 }
 
+/// With a standing foot the piston moves a share of the robot, and the law counts on it from the next period on; not
+/// where the mass is learnt.
+#[test]
+fn a_standing_foot_gives_the_law_its_mass() {
+    let kg = |data: &AxisData, stands: bool| {
+        let model = AxisModel::new(data, Micros(1000)).expect("in range");
+        let mut law = Predictive::new(&model);
+        let mut told = [false, stands, false].map(|stands| {
+            for _ in 0..PERIOD_TICKS {
+                let now = JointInput {
+                    stands,
+                    ..input(90, 90)
+                };
+                law.drive(&model, &now);
+            }
+            assert_eq!(law.gains, SpeedGains::new(&model, law.mass()));
+            f64::from(law.mass()) / 65_536.0
+        });
+        told.iter_mut()
+            .for_each(|kg| *kg = (*kg * 10.0).round() / 10.0);
+        told
+    };
+    let told = AxisData {
+        mass: PositionMm::from_f64(0.8),
+        standing_mass: PositionMm::from_int(5),
+        learns_mass: false,
+        ..AxisData::default()
+    };
+    assert_eq!(kg(&told, true), [0.8, 5.0, 0.8]);
+    assert_eq!(kg(&told, false), [0.8; 3]);
+    let learns = AxisData {
+        learns_mass: true,
+        ..told
+    };
+    assert_eq!(kg(&learns, true), [0.8; 3]);
+    let none = AxisData {
+        standing_mass: PositionMm::ZERO,
+        ..told
+    };
+    assert_eq!(kg(&none, true), [0.8; 3]);
+}
+
 /// Every bit of the law's state is in its `Hash`: flipping any of them changes the sum.
 #[test]
 fn the_hash_covers_what_is_kept() {
@@ -492,6 +534,6 @@ fn the_law_uses_the_friction_that_is_learnt() {
         law.drive(&model, &input(90, 130));
     }
     let mut anew = FrictionEstimator::of(1 << 15);
-    anew.forget_sliding();
+    anew.forget();
     assert_eq!(law.observer.friction, anew);
 }

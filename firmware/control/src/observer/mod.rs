@@ -173,6 +173,11 @@ impl Observer {
         &self.motion
     }
 
+    /// Takes a mass (kg × 2^16) that was not learnt: the piston begins to move it, or no longer does.
+    pub(crate) fn carry(&mut self, specified: &AxisModel, mass: i32) {
+        self.inertia = Inertia::new(&self.learnt(specified), mass);
+    }
+
     /// Friction is learnt from the sliding at one target, and from what the law itself does: begins anew.
     pub(crate) fn forget_sliding(&mut self) {
         self.friction.forget();

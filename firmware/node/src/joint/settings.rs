@@ -194,6 +194,7 @@ fn gains(parameters: &JointParameters) -> JointGains {
             critical_ratio: gain(P::CriticalRatio),
             supply: position(P::SupplyPressure),
             mass: position(P::MovingMass),
+            standing_mass: position(P::StandingMass),
             coulomb: position(P::FrictionCoulomb),
             breakaway: position(P::FrictionBreakaway),
             viscous: position(P::FrictionViscous),

@@ -85,6 +85,7 @@ pub fn axis_data(axis: &AxisParams) -> AxisData {
         critical_ratio: gain(JointParam::CriticalRatio),
         supply: fixed(JointParam::SupplyPressure),
         mass: fixed(JointParam::MovingMass),
+        standing_mass: PositionMm::ZERO,
         coulomb: fixed(JointParam::FrictionCoulomb),
         breakaway: fixed(JointParam::FrictionBreakaway),
         viscous: fixed(JointParam::FrictionViscous),
