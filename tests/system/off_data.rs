@@ -266,26 +266,8 @@ fn robots_off_their_data_walk() {
     let numbers = first..first + robots;
     let level = scenario("walk");
     let played = many("[base]\nscenario = \"walk\"\n", &numbers, |case| {
-        let sound = builtin::robot(&level.robot).expect("built in");
-        let mut robot = off_its_data(sound, case.seed);
-        for (name, id) in [
-            ("WT_MASS", wheeleg_protocol::param::JointParam::MovingMass),
-            (
-                "WT_STAND",
-                wheeleg_protocol::param::JointParam::StandingMass,
-            ),
-        ] {
-            if let Ok(kg) = std::env::var(name) {
-                let raw = (kg.parse::<f64>().unwrap() * 65_536.0) as i32;
-                for j in [2, 5] {
-                    for (i, r) in &mut robot.node.joints[j] {
-                        if *i == id as u16 {
-                            *r = raw;
-                        }
-                    }
-                }
-            }
-        }
+        let nominal = builtin::robot(&level.robot).expect("built in");
+        let robot = off_its_data(nominal, case.seed);
         let recording = sil::run(&level, &robot, case.seed);
         let targets = analyse(&level, &robot, &recording).targets;
         let value = |id: &str| targets.iter().find(|t| t.id == id).and_then(|t| t.value);
