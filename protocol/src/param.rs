@@ -391,7 +391,7 @@ parameters! {
         SupplyPressure = 0x0130, "supply_pressure", "kPa", I16F16, "200" ..= "1700", default "701.325", disarmed,
             "Axis data: supply pressure, absolute.";
         MovingMass = 0x0131, "moving_mass", "kg", I16F16, "0.02" ..= "200", default "1.5", disarmed,
-            "Axis data: mass that moves with the rod, a first guess.";
+            "Axis data: mass that moves with the rod; a first guess where the mass is learnt.";
         FrictionCoulomb = 0x0132, "friction_coulomb", "N", I16F16, "0" ..= "500", default "10", disarmed,
             "Axis data: Coulomb friction.";
         FrictionBreakaway = 0x0133, "friction_breakaway", "N", I16F16, "0" ..= "500", default "15", disarmed,
@@ -415,7 +415,7 @@ parameters! {
         MassLearning = 0x013C, "mass_learning", "1", Flag, "0" ..= "1", default "1", disarmed,
             "Predictive law: mass and friction are learnt from the motion; 0: they stay as given, for an axis that the ground or a stop loads in mid-move.";
         StandingMass = 0x013D, "standing_mass", "kg", I16F16, "0" ..= "200", default "0", disarmed,
-            "Predictive law without mass learning: mass that the piston moves while a foot switch of its board is closed; 0: moving_mass.";
+            "Predictive law without mass learning: mass that the piston moves while a foot switch of its board is closed, at least 0.02 kg; 0: moving_mass.";
     }
     /// Parameters of a wheel board.
     WheelParam, WHEEL_PARAMS, Wheel {

@@ -299,7 +299,9 @@ fn robots_off_their_data_walk() {
         least(&speeds)
     );
     assert_eq!(faults, 0);
-    assert!(is_no_step_back(robots - carried as u64, robots, 0.1));
+    // 23 of 23 on 2026-12-01, 11 of them with another mass on standing legs.
+    assert!(is_no_step_back(robots - carried as u64, robots, 0.02));
+    assert!(least(&supported) > 95.0, "{supported:?}");
     assert!(least(&speeds) > 80.0, "{speeds:?}");
 }
 

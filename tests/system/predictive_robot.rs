@@ -84,8 +84,8 @@ fn standing_the_sinusoid_and_the_safe_states_meet_all_targets() {
     assert!(all_targets, "{told}");
 }
 
-/// The foot is slow where it may meet the ground: 100 mm/s are wanted in the last 10 mm. With the mass of a standing leg in
-/// the air its b6 sticks and jumps, at 210 mm/s.
+/// The foot is slow where it may meet the ground: 100 mm/s are wanted in the last 10 mm. A board that is told 1.5 kg
+/// instead of the 0.66 that b6 moves in the air makes it stick and jump, at 210 mm/s.
 #[test]
 fn a_foot_is_slow_near_the_ground() {
     let robot = builtin::robot("wheeleg").expect("built in");
@@ -99,7 +99,7 @@ fn a_foot_is_slow_near_the_ground() {
         };
         let (speed_mm_s, time_s) = (value("M4-b6"), value("M1-b6"));
         println!("seed {seed}: {speed_mm_s:.1} mm/s, down after {time_s:.3} s");
-        assert!((75.0..=125.0).contains(&speed_mm_s), "{speed_mm_s}");
+        assert!((75.0..=110.0).contains(&speed_mm_s), "{speed_mm_s}");
         // The push begins 1 s after the lowering.
         assert!((0.5..1.0).contains(&time_s), "{time_s}");
     }

@@ -10,6 +10,8 @@ mod requests;
 mod settings;
 
 #[cfg(test)]
+mod foot_tests;
+#[cfg(test)]
 mod integrity_tests;
 
 pub use no_motion_detector::MotionAccount;

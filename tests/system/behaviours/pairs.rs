@@ -99,7 +99,7 @@ pub(super) const PAIRS: &[Pair] = &[
         metric: "touchdown force, N",
         less: true,
         asked: 0.7,
-        bracket: Some([0.5, 0.78]),
+        bracket: Some([0.5, 0.7]),
         duration_s: 12.0,
         walk: FLAT,
         rest: level,

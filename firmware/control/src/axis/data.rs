@@ -28,7 +28,8 @@ pub struct AxisData {
     pub supply: PositionMm,
     /// Mass that moves with the rod, kg, 0.02…200: the initial value.
     pub mass: PositionMm,
-    /// Mass that the piston moves while the foot at its rod stands, kg, 0…200; 0, and where the mass is learnt: `mass`.
+    /// Mass that the piston moves while the foot at its rod stands, kg, 0.02…200; 0, and where the mass is
+    /// learnt: `mass`.
     pub standing_mass: PositionMm,
     /// Coulomb friction, N, 0…500.
     pub coulomb: PositionMm,
@@ -144,7 +145,9 @@ impl AxisData {
         within(ratio, 0, highest_ratio, F::CriticalRatio)?;
         within(self.supply.raw(), 200 << 16, 1700 << 16, F::Supply)?;
         within(self.mass.raw(), least, 200 << 16, F::Mass)?;
-        within(self.standing_mass.raw(), 0, 200 << 16, F::Mass)?;
+        if self.standing_mass != PositionMm::ZERO {
+            within(self.standing_mass.raw(), least, 200 << 16, F::Mass)?;
+        }
         let coulomb = self.coulomb.raw();
         within(coulomb, 0, 500 << 16, F::Friction)?;
         within(self.breakaway.raw(), coulomb, 500 << 16, F::Friction)?;

@@ -123,6 +123,15 @@ impl JointController {
         }
     }
 
+    /// Notes whether the foot at the rod stands, before [`JointController::step`] or [`JointController::observe`]. The
+    /// predictive law then counts on the standing mass; the output of the other laws does not depend on it.
+    #[inline]
+    pub fn set_foot_stands(&mut self, stands: bool) {
+        if let Some(law) = &mut self.predictive {
+            law.set_foot_stands(stands);
+        }
+    }
+
     /// Selects the correction, without a bump. The integral starts from zero.
     #[inline]
     pub fn set_correction(&mut self, correction: Correction) {

@@ -59,9 +59,6 @@ pub struct JointInput {
     /// The reference announced for later, and when it takes effect. The predictive law vents the counter chamber ahead
     /// of a known move; the output of the other laws does not depend on it.
     pub announced: Option<Announced>,
-    /// The foot at the piston's rod stands: a switch of it is closed. The predictive law then counts on the standing
-    /// mass; the output of the other laws does not depend on it.
-    pub stands: bool,
 }
 
 /// A reference known ahead of time.

@@ -95,6 +95,7 @@ impl Predictive {
         if let Some(mass) = learnt {
             self.gains = SpeedGains::new(model, mass);
         }
+        self.carry(model);
         self.begin = period.next;
         self.plan = [0; 4];
         self.external = [0; 4];

@@ -34,7 +34,7 @@
 //! break-away ramp and patience continue as they would without inching.
 //!
 //! Assumes: flows that stay constant over the pulse, friction as in use. Whether valves are coarse may change as
-//! friction is learnt; a step under way is then dropped. The net force on a piston at rest can be anywhere within its
+//! friction is learnt or a foot lands; a step under way is then dropped. The net force on a piston at rest can be anywhere within its
 //! friction; it is taken as zero (estimates from the observer, or from the effect of the last step, did worse). If the
 //! supply is lower, a filling pulse does less than planned, and another step follows.
 //!

@@ -32,8 +32,8 @@
 //! 2. `observe_period` (`handover`): the observer takes what was sent and the mean of the last two strokes (its steps
 //!    are in [`crate::observer`]). If it has learnt a new mass, the gains are recomputed (`switching_curve`). Friction,
 //!    wherever the law uses it, is that of the axis data times the share that the observer has learnt.
-//!    Where no mass is learnt, the mass in use is that of the axis data, and while a foot at the rod stands that of the
-//!    standing leg.
+//!    Where no mass is learnt, the mass in use is that of the axis data, or the standing mass while the foot at the rod
+//!    stands.
 //! 3. `plan_period`: if the target is new, patience starts afresh, a landing is allowed (`standstill`), and the ramp is
 //!    forgotten.
 //! 4. `preload`: if the piston rests (or stands at a stop) and a move is announced, this gives a force, or no pulse if
@@ -140,6 +140,8 @@ pub struct Predictive {
     swap: PressureSwap,
     inching: Inching,
 
+    /// The foot at the rod stands.
+    foot_stands: bool,
     /// A stroke has been measured.
     primed: bool,
     /// The law commands the coils, and nobody else.
@@ -182,6 +184,7 @@ impl Predictive {
             preload: Preload::default(),
             swap: PressureSwap::No,
             inching: Inching::default(),
+            foot_stands: false,
             primed: false,
             drives: false,
             tick_of_period: 0,
@@ -212,7 +215,7 @@ impl Predictive {
         self.observer.pressures()
     }
 
-    /// Mass in use, kg × 2^16: as specified or as learnt.
+    /// Mass in use, kg × 2^16: as specified, that of a standing foot, or as learnt.
     #[must_use]
     pub const fn mass(&self) -> i32 {
         self.observer.inertia.mass
@@ -235,7 +238,6 @@ impl Predictive {
     pub fn drive(&mut self, model: &AxisModel, input: &JointInput) -> Drive {
         if self.ends_period(input.measured) {
             self.observe_period(model, input.measured);
-            self.carry(model, input.stands);
             self.drives = true;
             self.plan_period(model, input);
         }
@@ -250,9 +252,14 @@ impl Predictive {
         }
     }
 
+    /// Whether the foot at the rod stands, from the next period on.
+    pub const fn set_foot_stands(&mut self, stands: bool) {
+        self.foot_stands = stands;
+    }
+
     /// Uses the mass that the piston moves, unless it is learnt: with a standing foot, a share of the robot.
-    fn carry(&mut self, model: &AxisModel, stands: bool) {
-        let mass = if stands {
+    fn carry(&mut self, model: &AxisModel) {
+        let mass = if self.foot_stands {
             model.standing_mass
         } else {
             model.mass

@@ -50,7 +50,7 @@
 //! supply falls, the curve stays as it is: the force that it demands comes later or not at all, and the piston falls
 //! behind the curve or overshoots the target.
 //!
-//! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each newly learnt mass; no state; updates
+//! Config [`AxisModel`] and [`SpeedGains`], which is recomputed with each new mass; no state; updates
 //! [`SpeedGains::speed`] and [`SpeedGains::landing`].
 
 use crate::ablation::{Part, is_without};

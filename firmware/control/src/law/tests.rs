@@ -33,16 +33,17 @@ fn moving(model: &AxisModel, ticks: u32) -> Predictive {
 /// where the mass is learnt.
 #[test]
 fn a_standing_foot_gives_the_law_its_mass() {
-    let kg = |data: &AxisData, stands: bool| {
+    let kg_of = |data: &AxisData, stands: bool, drives: bool| {
         let model = AxisModel::new(data, Micros(1000)).expect("in range");
         let mut law = Predictive::new(&model);
         let mut told = [false, stands, false].map(|stands| {
+            law.set_foot_stands(stands);
             for _ in 0..PERIOD_TICKS {
-                let now = JointInput {
-                    stands,
-                    ..input(90, 90)
-                };
-                law.drive(&model, &now);
+                if drives {
+                    law.drive(&model, &input(90, 90));
+                } else {
+                    law.observe(&model, PositionMm::from_int(90));
+                }
             }
             assert_eq!(law.gains, SpeedGains::new(&model, law.mass()));
             f64::from(law.mass()) / 65_536.0
@@ -56,6 +57,11 @@ fn a_standing_foot_gives_the_law_its_mass() {
         standing_mass: PositionMm::from_int(5),
         learns_mass: false,
         ..AxisData::default()
+    };
+    let kg = |data: &AxisData, stands: bool| {
+        let driven = kg_of(data, stands, true);
+        assert_eq!(driven, kg_of(data, stands, false), "whoever drives");
+        driven
     };
     assert_eq!(kg(&told, true), [0.8, 5.0, 0.8]);
     assert_eq!(kg(&told, false), [0.8; 3]);

@@ -71,7 +71,7 @@ pub struct Observer {
     pub(crate) motion: Motion,
     /// Pressure force at the moment, mN.
     pub(crate) force: i32,
-    /// Quantities that follow from mass and friction, as specified or learnt.
+    /// Quantities that follow from mass and friction in use.
     pub(crate) inertia: Inertia,
     mass: MassEstimator,
     pub(crate) friction: FrictionEstimator,

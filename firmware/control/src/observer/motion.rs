@@ -21,7 +21,7 @@
 //! | F, load | mN | pressure force; external force plus model error |
 //! | Fc, Fb | mN | Coulomb and break-away friction, as specified or learnt; the observer uses 0.92 of Fc |
 //! | d | mN s/mm (N s/m) | viscous friction, likewise |
-//! | m | kg | mass, as specified or learnt |
+//! | m | kg | mass, as specified, of a standing foot, or learnt |
 //! | T | s | period |
 //!
 //! ε is limited to ±8 mm, the load to the largest force that the supply can deliver. A piston is **pressed against an
@@ -29,7 +29,7 @@
 //! It is **in a cushion** within 6 mm of an end on its way there: what brakes it there is not load. **Stuck ends** with
 //! the first period in which its condition does not hold.
 //!
-//! Assumes: a load that is constant but for corrections, the mass of the estimator, friction between half and twice the
+//! Assumes: a load that is constant but for corrections, the mass in use, friction between half and twice the
 //! specified one. Within these the bars are kept (`tests/system/control_bars.rs`). Friction errors appear as load,
 //! until `friction` has learnt them. If the supply falls, F is wrong by what the filled chamber lacks; the load cancels
 //! that with a time constant of about 20 ms while the piston slides. While the piston is stuck the load stays as it
@@ -45,7 +45,7 @@ use crate::tuning::{
     STUCK_SPEED,
 };
 
-/// The part of the observer that depends on mass and Coulomb friction; recomputed when either is learnt.
+/// The part of the observer that depends on mass and Coulomb friction; recomputed when either changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Inertia {
     /// Mass, kg × 2^16.

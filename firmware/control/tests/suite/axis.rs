@@ -139,6 +139,14 @@ fn wrong_axis_data_are_refused_by_name() {
         ..AxisData::default()
     };
     assert_eq!(AxisModel::new(&bad, TICK).err(), Some(AxisField::Bore));
+    for (kg, refused) in [(0.0, false), (0.01, true), (0.03, false), (201.0, true)] {
+        let data = AxisData {
+            standing_mass: PositionMm::from_f64(kg),
+            ..AxisData::default()
+        };
+        let found = AxisModel::new(&data, TICK).err();
+        assert_eq!(found, refused.then_some(AxisField::Mass), "{kg} kg");
+    }
     let gains = JointGains {
         law: Law::Predictive,
         axis: bad,

@@ -424,7 +424,6 @@ fn input() -> impl Strategy<Value = JointInput> {
             reference: PositionMm::from_raw(reference),
             reference_velocity: VelocityMmS::from_raw(velocity),
             announced: None,
-            stands: velocity & 1 == 1,
         }
     })
 }
@@ -492,7 +491,6 @@ proptest! {
                 reference: PositionMm::from_int(sign * reference),
                 reference_velocity: VelocityMmS::from_int(sign * velocity),
                 announced: None,
-                stands: false,
             };
             let (a, b) = (plus.step(&make(1)), minus.step(&make(-1)));
             prop_assert_eq!(a.duty.negated(), b.duty);

@@ -277,7 +277,6 @@ fn joint_law_matches_the_exact_sequence() {
             reference: PositionMm::from_raw(int(&row[1])),
             reference_velocity: VelocityMmS::from_raw(int(&row[2])),
             announced: None,
-            stands: false,
         });
         let duty = (output.duty.to_f64() - real(&row[3])).abs();
         let velocity = (output.velocity.to_f64() - real(&row[4])).abs();

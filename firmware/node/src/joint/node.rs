@@ -19,7 +19,7 @@ use crate::{ConfigError, JOINT_TICK, SELF_TEST_TICKS, SWITCH_TICKS};
 use wheeleg_control::joint::JointController;
 use wheeleg_control::law::reference_generator::Reference;
 use wheeleg_control::pwm::ValvePwm;
-use wheeleg_protocol::{BoardKind, Fault, FaultBits, ResetCause};
+use wheeleg_protocol::{BoardKind, Fault, FaultBits, InputBits, ResetCause};
 use wheeleg_units::{Micros, PositionMm, Ticks};
 
 /// State that only a tick changes, sealed between two ticks.
@@ -233,6 +233,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             self.axis_fault(fault, now);
         }
 
+        self.controller
+            .set_foot_stands(self.switches.state() & InputBits::FOOT.raw() != 0);
         let on_times = if !self.core.mode().may_drive() {
             self.rest(now)
         } else if self.state.precharge.is_under_way() {
@@ -364,7 +366,8 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
         Checksum::made(|sum| self.target.hash(sum))
     }
 
-    /// Checksum of what shapes the outputs of the next tick and is changed by every tick.
+    /// Checksum of what shapes the outputs of the next tick and is changed by every tick. The debounced switches are not
+    /// in it: a flipped bit of theirs is mended by the next three samples.
     #[inline(never)]
     fn moving(&self) -> Checksum {
         Checksum::made(|sum| {

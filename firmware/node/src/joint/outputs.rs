@@ -11,7 +11,7 @@ use crate::supervisor::ExhaustKind;
 use wheeleg_control::joint::{JointInput, JointLimits};
 use wheeleg_control::pwm::OnTimes;
 use wheeleg_control::valve::{ValveMode, ValveOpenings};
-use wheeleg_protocol::{Fault, InputBits, Limit, LimitBits};
+use wheeleg_protocol::{Fault, Limit, LimitBits};
 use wheeleg_units::{Duty, Micros, PositionMm, Ticks, VelocityMmS};
 
 impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
@@ -37,7 +37,6 @@ impl<V: ValveBank, S: PositionSensor, W: SwitchBank> JointNode<V, S, W> {
             reference: reference.position,
             reference_velocity: reference.velocity,
             announced,
-            stands: self.switches.state() & InputBits::FOOT.raw() != 0,
         });
         // The law limits its reference to the stroke, and its error counts from there.
         let waits = supervised.saturating_sub(reference.position);

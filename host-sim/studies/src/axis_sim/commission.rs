@@ -103,12 +103,12 @@ fn raw(design: &Design, parameter: JointParam) -> Option<i32> {
         P::RestBand => a.band.raw(),
         P::RestRelease => a.release.raw(),
         P::MassLearning => i32::from(a.learns_mass),
-        P::StandingMass => a.standing_mass.raw(),
         P::WatchdogCycles
         | P::HoldTime
         | P::ExhaustDuty
         | P::MotionMargin
         | P::Precharge
+        | P::StandingMass
         | P::ReferenceAcceleration
         | P::ReferenceLead => return None,
     })

@@ -93,7 +93,6 @@ impl Board for Firmware {
                 reference,
                 after: Ticks(after),
             }),
-            stands: false,
         });
         let on_us = match output.direct {
             Some(on) => on,
