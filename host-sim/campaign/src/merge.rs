@@ -332,6 +332,8 @@ mod tests {
     use wheeleg_config::plan::{Plan, Sources};
 
     use super::*;
+    use parquet::file::reader::{FileReader as _, SerializedFileReader};
+
     use crate::store::{PlanFile, write_whole};
     use crate::table::TableReader;
     use crate::{Figure, Status, report};
@@ -401,15 +403,22 @@ mod tests {
         assert_eq!(groups(), [65_000, 1_500]);
         assert!(indices().into_iter().eq(0..CASES));
 
-        // A byte that is not what was written is found wherever it is: of the rows, in both groups.
+        // A byte that is not what was written is found wherever the hash of the table looks: in the identities of the
+        // cases, of both groups.
         let whole = std::fs::read(&out).expect("a table");
+        let reader = SerializedFileReader::new(File::open(&out).expect("a file")).expect("a table");
         let damaged = folder.path().join("damaged.parquet");
-        for share in [0.01, 0.3, 0.6, 0.9] {
-            let mut bytes = whole.clone();
-            let at = (share * bytes.len() as f64) as usize;
-            bytes[at] ^= 0x10;
-            std::fs::write(&damaged, &bytes).expect("written");
-            assert!(report::Merged::read(&damaged).is_err(), "{share}");
+        for group in reader.metadata().row_groups() {
+            let identities = group.column(0);
+            assert_eq!(identities.column_path().string(), "case");
+            let (begin, length) = identities.byte_range();
+            for share in [0.2, 0.5, 0.9] {
+                let mut bytes = whole.clone();
+                let at = begin as usize + (share * length as f64) as usize;
+                bytes[at] ^= 0x10;
+                std::fs::write(&damaged, &bytes).expect("written");
+                assert!(report::Merged::read(&damaged).is_err(), "{share}");
+            }
         }
 
         std::fs::remove_file(store.part(3)).expect("there");
