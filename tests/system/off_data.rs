@@ -270,8 +270,8 @@ fn robots_off_their_data_walk() {
         let robot = off_its_data(nominal, case.seed);
         let recording = sil::run(&level, &robot, case.seed);
         let targets = analyse(&level, &robot, &recording).targets;
-        let value = |id: &str| targets.iter().find(|t| t.id == id).and_then(|t| t.value);
-        let [speed, supported, faults] = ["speed", "supported", "faults"].map(value);
+        let [speed, supported, faults] =
+            ["speed", "supported", "faults"].map(|id| sil::value(&targets, id));
         let sound = faults == Some(0.0);
         let told = format!(
             "robot {}: {speed:?} mm/s, {supported:?} % supported",

@@ -93,11 +93,8 @@ fn a_foot_is_slow_near_the_ground() {
     for seed in 1..=3 {
         let recording = sil::run(&scenario, &robot, seed);
         let targets = analyse(&scenario, &robot, &recording).targets;
-        let value = |id: &str| {
-            let target = targets.iter().find(|t| t.id == id);
-            target.and_then(|t| t.value).expect("measured")
-        };
-        let (speed_mm_s, time_s) = (value("M4-b6"), value("M1-b6"));
+        let [speed_mm_s, time_s] =
+            ["M4-b6", "M1-b6"].map(|id| sil::value(&targets, id).expect("measured"));
         println!("seed {seed}: {speed_mm_s:.1} mm/s, down after {time_s:.3} s");
         assert!((75.0..=110.0).contains(&speed_mm_s), "{speed_mm_s}");
         // The push begins 1 s after the lowering.

@@ -56,11 +56,8 @@ fn a_robot_with_half_the_friction_walks_nearly_as_well() {
         }
         let recording = sil::run(&scenario, &robot, seed);
         let targets = analyse(&scenario, &robot, &recording).targets;
-        let value = |id: &str| {
-            let target = targets.iter().find(|t| t.id == id);
-            target.and_then(|t| t.value).expect("measured")
-        };
-        let [speed, supported, faults] = ["speed", "supported", "faults"].map(value);
+        let [speed, supported, faults] =
+            ["speed", "supported", "faults"].map(|id| sil::value(&targets, id).expect("measured"));
         println!("{share} of the friction: {speed:.1} mm/s, {supported:.2} % supported");
         assert!(supported >= least && speed > 110.0 && faults == 0.0);
     }

@@ -11,6 +11,7 @@ use wheeleg_config::{
 };
 use wheeleg_protocol::param::JointParam;
 use wheeleg_remote_host::{Nodes, PilSummary};
+use wheeleg_studies::analysis::Target;
 use wheeleg_telemetry::{FootSample, JointSample, Recorder, Recording, Row};
 
 /// The one robot.
@@ -62,6 +63,12 @@ fn with_events(motion: Motion, duration_s: f64, events: &[(f64, EventAction)]) -
         bars: Vec::new(),
         ..scenario("three-step")
     }
+}
+
+/// What was measured for a target of this id.
+pub(crate) fn value(targets: &[Target], id: &str) -> Option<f64> {
+    let target = targets.iter().find(|target| target.id == id);
+    target.and_then(|target| target.value)
 }
 
 /// Simulates a scenario to its end, with some nodes outside.

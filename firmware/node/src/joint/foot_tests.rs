@@ -1,33 +1,14 @@
 //! A closed foot switch gives the law of its board the standing mass.
 
+use super::integrity_tests::{Sensor, Valves};
 use super::node::JointNode;
 use crate::NodeIdentity;
-use crate::hardware::{NoSwitches, PinError, PositionSensor, SensorError, SwitchBank, ValveBank};
+use crate::hardware::{NoSwitches, PinError, SwitchBank};
 use crate::parameters::JointParameters;
 use core::cell::Cell;
 use wheeleg_protocol::Address;
 use wheeleg_protocol::param::JointParam;
-use wheeleg_units::{AdcCode, Micros};
-
-struct Valves;
-
-impl ValveBank for Valves {
-    fn max_duty(&self) -> u16 {
-        1000
-    }
-
-    fn write(&mut self, _: [u16; 4]) -> Result<(), PinError> {
-        Ok(())
-    }
-}
-
-struct Sensor;
-
-impl PositionSensor for Sensor {
-    fn read(&mut self) -> Result<AdcCode, SensorError> {
-        Ok(AdcCode::new(36_000))
-    }
-}
+use wheeleg_units::Micros;
 
 /// Four switches with these levels.
 struct Feet<'a>(&'a Cell<u8>);
@@ -52,40 +33,41 @@ fn parameters(learns: bool) -> JointParameters {
         })
 }
 
-/// Mass that the law of a board counts on, kg, a period after these levels have been debounced.
-fn masses<W: SwitchBank>(
-    switches: W,
-    parameters: JointParameters,
-    mut set: impl FnMut(u8),
-    levels: &[u8],
-) -> Vec<i32> {
+/// Levels of the four switches, one after the other.
+const LEVELS: [u8; 7] = [0, 0b0001, 0, 0b1000, 0b1111, 0b0010, 0];
+
+/// Mass that the law of a board counts on, kg, a period after each of the levels has been debounced.
+fn masses<W: SwitchBank>(switches: W, feet: &Cell<u8>, learns: bool) -> [i32; 7] {
     let identity = NodeIdentity {
         address: Address::joint(3).expect("a joint"),
         unique_id: [0; 12],
     };
-    let mut node =
-        JointNode::new(identity, parameters, Valves, Sensor, switches).expect("in range");
+    let mut node = JointNode::new(
+        identity,
+        parameters(learns),
+        Valves([0; 4]),
+        Sensor,
+        switches,
+    )
+    .expect("in range");
     let mut now = 0;
-    let mut found = Vec::new();
-    for level in levels {
-        set(*level);
+    LEVELS.map(|level| {
+        feet.set(level);
         for _ in 0..8 {
             node.tick(Micros(now));
             now += 1000;
         }
-        let law = node.controller.predictive().expect("law 5");
-        found.push(law.mass() >> 16);
-    }
-    found
+        node.controller.predictive().expect("law 5").mass() >> 16
+    })
 }
 
 #[test]
 fn any_closed_foot_switch_gives_the_law_the_standing_mass() {
-    let levels = [0, 0b0001, 0, 0b1000, 0b1111, 0b0010, 0];
     let feet = Cell::new(0);
-    let told = |learns| masses(Feet(&feet), parameters(learns), |l| feet.set(l), &levels);
-    assert_eq!(told(false), [1, 4, 1, 4, 4, 4, 1]);
-    assert_eq!(told(true), [1; 7], "a mass that is learnt");
-    let none = masses(NoSwitches, parameters(false), |_| (), &levels);
+    let told = masses(Feet(&feet), &feet, false);
+    assert_eq!(told, [1, 4, 1, 4, 4, 4, 1]);
+    let learns = masses(Feet(&feet), &feet, true);
+    assert_eq!(learns, [1; 7], "a mass that is learnt");
+    let none = masses(NoSwitches, &feet, false);
     assert_eq!(none, [1; 7], "a board without switches");
 }

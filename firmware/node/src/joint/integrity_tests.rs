@@ -19,7 +19,7 @@ use wheeleg_protocol::{
 };
 use wheeleg_units::{AdcCode, Micros, PositionMm};
 
-struct Valves([u16; 4]);
+pub(super) struct Valves(pub(super) [u16; 4]);
 
 impl ValveBank for Valves {
     fn max_duty(&self) -> u16 {
@@ -32,7 +32,7 @@ impl ValveBank for Valves {
     }
 }
 
-struct Sensor;
+pub(super) struct Sensor;
 
 impl PositionSensor for Sensor {
     fn read(&mut self) -> Result<AdcCode, SensorError> {
